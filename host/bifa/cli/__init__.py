@@ -1,0 +1,32 @@
+"""The command `bifa`: one command a file; each file offers `register(app)`.
+
+Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, so that `bifa --help` is instant.
+"""
+
+import importlib
+import pkgutil
+import sys
+
+import typer
+
+from bifa.errors import BifaError
+
+app = typer.Typer(
+    name="bifa",
+    help="Drive a soft in-pipe robot from an Arduino Uno and learn from data how it really behaves.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+)
+
+for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
+    importlib.import_module(f"{__name__}.{_module}").register(app)
+
+
+def main() -> None:
+    """Run the command; an expected error ends in one clear sentence and exit status 2."""
+    try:
+        app()
+    except BifaError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(2)
