@@ -1,0 +1,241 @@
+"""What a system has to say about itself so that it can be fitted and diagnosed.
+
+A `System` is a model with named parameters, a library of effects that the model may lack, and trials:
+measured records with the experiment that made them. The fitting code (`bifa.identify`) and the engine
+(`bifa.discrepancy`) know nothing else; the robot is one system, `docs/adding-your-own-system.md` shows
+another.
+
+Every parameter of the base model has a plain name (`body_damping_Ns_m`), every parameter of an effect the
+name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+Theta = Mapping[str, float]
+Channels = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number to be estimated.
+
+    `value` is where the search starts; `lower` and `upper` bound it. `plausible` is the narrower range in
+    which a sane value lies (None: nothing is known): a fit that leaves it is evidence against the model,
+    not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
+    a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
+    deviation of its spread.
+    """
+
+    name: str
+    unit: str
+    value: float
+    lower: float
+    upper: float
+    plausible: tuple[float, float] | None = None
+    scale: float | None = None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.lower < self.upper:
+            raise ValueError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
+        if not self.lower <= self.value <= self.upper:
+            raise ValueError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
+
+    @property
+    def step_scale(self) -> float:
+        """`scale`, or where none is given a tenth of |value|, or of the range for a value of 0."""
+        if self.scale is not None:
+            return self.scale
+        return 0.1 * (abs(self.value) or min(self.upper - self.lower, 1e6))
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Something real that the base model leaves out.
+
+    `parameters[0]` is the effect's size: the effect vanishes where it equals `absent` (0 unless said
+    otherwise). `parameters` have local names (`force_N`); in `theta` they appear as `hysteresis.force_N`.
+    Their `value` is a typical magnitude. `starts` are sizes from which fits begin; empty means 0.3, 1 and 3
+    times the typical one (and the same with the other sign, where the bounds allow it). `enters` names the
+    term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it can
+    show at all (empty: all).
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    enters: str
+    experiments: tuple[str, ...] = ()
+    confusable_with: tuple[str, ...] = ()
+    equation: str = ""
+    source: str = ""
+    starts: tuple[float, ...] = ()
+    absent: float = 0.0
+
+    def full_name(self, parameter: Parameter) -> str:
+        return f"{self.name}.{parameter.name}"
+
+    @property
+    def size_name(self) -> str:
+        """The full name of the parameter that sizes the effect."""
+        return self.full_name(self.parameters[0])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One measured record.
+
+    `channels` maps a channel's name to its samples, shape (n,), unit in the name; NaN where a sample is
+    missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise
+    floor comes from them. `session_order` is the trial's place in the day, None if not known. `payload` is
+    the system's own.
+    """
+
+    name: str
+    experiment: str
+    condition: Hashable
+    time_s: np.ndarray
+    channels: Channels
+    session_order: int | None = None
+    payload: Any = None
+
+
+@dataclass(frozen=True)
+class CorrectionSite:
+    """A term of an equation that may be replaced by "the model's term plus a curve learnt from data".
+
+    The curve is a function of `variable` between `lower` and `upper` (constant beyond), one curve for each
+    direction of motion if `by_direction`. `scale` is the change of the term that matters, in `unit`.
+    Example: site `body_spring`, term "force of the body's spring", variable "displacement", unit N.
+    """
+
+    name: str
+    term: str
+    variable: str
+    unit: str
+    lower: float
+    upper: float
+    scale: float
+    by_direction: bool = False
+    experiments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A learnt curve at a site: `table` holds its values on a uniform grid from the site's lower to its
+    upper end.
+
+    Shape (1, n), or (2, n) by direction: row 0 for increasing, row 1 for decreasing `variable`. Interpolate
+    linearly.
+    """
+
+    site: str
+    table: np.ndarray
+
+
+@dataclass(frozen=True)
+class CandidateExperiment:
+    """An experiment that could be run next: `trial` is what `predict` gets; its channels hold NaN, one for
+    each sample that would be taken. `settings` is what a person or a rig needs to run it."""
+
+    experiment: str
+    settings: Mapping[str, Any]
+    trial: Trial
+
+
+class System(Protocol):
+    """Derive from this class and fill in the first five; the rest have defaults that say "nothing special".
+
+    `predict` is called from several threads at once: it must not change the system, and is fast when it
+    releases the GIL.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]  # of the base model, those that are to be fitted
+    effects: Mapping[str, Effect]
+    trials: tuple[Trial, ...]
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        """Simulate a trial freely (from its initial state and inputs, never from measured outputs).
+
+        `theta` holds every base parameter, those of the active `effects`, and this trial's nuisances under
+        their own names. Returns the same channels and shapes as `trial.channels`; NaN where the simulation
+        failed. `coarse` allows a cheaper simulation, good enough for derivatives; otherwise the
+        integrator's error must be well under the noise, or it will be taken for structure.
+        """
+        ...
+
+    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+        """Named quantities, shape (n,) each, on which a residual may depend: "displacement", "direction of
+        motion", "velocity", "command", "time since the last switch", "position in the pipe" ..."""
+        return {"time": trial.time_s}
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        """What varies from run to run in this trial: fitted for each trial, with a Gaussian prior of mean
+        `value` and standard deviation `scale`."""
+        return ()
+
+    def matters(self, parameter: str, trial: Trial) -> bool:
+        """False if this parameter of the base model cannot change this trial: saves a simulation per derivative."""
+        return True
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound, and
+        all there is where no condition was repeated. 0: not known."""
+        return 0.0
+
+    @property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        return {}
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return ()
+
+
+@dataclass(frozen=True)
+class Vector:
+    """An order of named parameters, base first, then those of the active effects: between mapping and array."""
+
+    parameters: tuple[Parameter, ...]
+    effects: tuple[str, ...] = ()
+    names: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "names", tuple(p.name for p in self.parameters))
+
+    @classmethod
+    def of(cls, system: System, effects: Sequence[str] = ()) -> Vector:
+        """The base parameters of `system` and those of `effects`, the latter under their full names."""
+        parameters = list(system.parameters)
+        for name in effects:
+            effect = system.effects[name]
+            parameters += [replace(p, name=effect.full_name(p)) for p in effect.parameters]
+        return cls(tuple(parameters), tuple(effects))
+
+    def start(self) -> np.ndarray:
+        return np.array([p.value for p in self.parameters])
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
+
+    def scales(self) -> np.ndarray:
+        return np.array([p.step_scale for p in self.parameters])
+
+    def theta(self, values: np.ndarray) -> dict[str, float]:
+        return dict(zip(self.names, map(float, values), strict=True))
+
+    def values(self, theta: Theta) -> np.ndarray:
+        return np.array([theta[name] for name in self.names])
