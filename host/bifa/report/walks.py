@@ -68,7 +68,10 @@ def _draw_column(axes: Sequence, walk: Walk, cycles: int) -> None:
             linewidth=0,
         )
         pressures.plot(
-            time_s, walk.measured[f"pressure_{chamber}_psi"][shown], color=CHAMBER_COLOURS[chamber], label=chamber
+            time_s,
+            walk.measured[f"pressure_{chamber}_psi"][shown],
+            color=CHAMBER_COLOURS[chamber],
+            label=chamber,
         )
     displacement.plot(time_s, walk.measured["displacement_head_mm"][shown], color=MEASURED, label="measured")
     if walk.predicted is not None:
@@ -94,4 +97,3 @@ def _draw_column(axes: Sequence, walk: Walk, cycles: int) -> None:
     outputs.set_ylim(-0.15, 3.6)
     displacement.set_xlabel("time [s]")
     displacement.set_xlim(0, horizon_s)
-

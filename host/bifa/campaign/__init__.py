@@ -1,0 +1,1 @@
+"""The whole loop as stages: measure, fit, diagnose, optimise, walk, compare."""
