@@ -1,13 +1,28 @@
-"""One look for every figure: the three chambers keep their colours, grids stay quiet."""
+"""One look for every figure: the three chambers keep their colours, grids stay quiet, light and dark."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 CHAMBERS = ("body", "head", "tail")
 # Okabe and Ito's palette: distinct for readers with any colour vision, and on paper.
 CHAMBER_COLOURS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
-MEASURED = "#222222"
-PREDICTED = "#CC79A7"
+
+
+@dataclass(frozen=True)
+class Palette:
+    """Colours that depend on the background."""
+
+    ink: str
+    quiet: str
+    measured: str
+    predicted: str
+    before: str
+    after: str
+
+
+LIGHT = Palette("#222222", "#8a8a8a", "#222222", "#C2559D", "#B8B8B8", "#0072B2")
+DARK = Palette("#e6e6e6", "#8f8f8f", "#e6e6e6", "#E59CCB", "#6b6b6b", "#56B4E9")
 
 _RC = {
     "font.size": 9,
@@ -29,10 +44,13 @@ _RC = {
 
 
 @contextmanager
-def figure_style() -> Iterator[None]:
+def figure_style(dark: bool = False) -> Iterator[Palette]:
     """Matplotlib without a display and with the project's look, inside the block only."""
     import matplotlib
 
     matplotlib.use("Agg")
-    with matplotlib.rc_context(_RC):
-        yield
+    palette = DARK if dark else LIGHT
+    ink = dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), palette.ink)
+    background = {"figure.facecolor": "#16181c" if dark else "white", "axes.facecolor": "#16181c" if dark else "white"}
+    with matplotlib.rc_context(_RC | ink | background | {"grid.color": palette.quiet}):
+        yield palette

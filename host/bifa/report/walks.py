@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
-from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, MEASURED, PREDICTED, figure_style
+from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, Palette, figure_style
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,9 @@ class Walk:
     predicted: Mapping[str, np.ndarray] | None = None
 
 
-def draw_walks(walks: Sequence[Walk], path: Path, cycles: int = 5) -> None:
+def draw_walks(walks: Sequence[Walk], path: Path | BytesIO, cycles: int = 5, dark: bool = False) -> None:
     """Write the figure of the first `cycles` cycles of each walk to `path` (PNG or SVG)."""
-    with figure_style():
+    with figure_style(dark) as palette:
         import matplotlib.pyplot as plt
 
         figure, axes = plt.subplots(
@@ -38,7 +39,7 @@ def draw_walks(walks: Sequence[Walk], path: Path, cycles: int = 5) -> None:
             height_ratios=(1.0, 1.3, 1.6),
         )
         for column, walk in zip(axes.T, walks, strict=True):
-            _draw_column(column, walk, cycles)
+            _draw_column(column, walk, cycles, palette)
         axes[0, 0].set_yticks([0.4, 1.6, 2.8], CHAMBERS)
         axes[0, 0].set_ylabel("CPG output")
         axes[1, 0].set_ylabel("pressure [psi]")
@@ -47,11 +48,11 @@ def draw_walks(walks: Sequence[Walk], path: Path, cycles: int = 5) -> None:
         axes[2, 0].legend(loc="upper left")
         figure.align_ylabels()
         figure.tight_layout()
-        figure.savefig(path)
+        figure.savefig(path, format=path.suffix[1:] if isinstance(path, Path) else "png")
         plt.close(figure)
 
 
-def _draw_column(axes: Sequence, walk: Walk, cycles: int) -> None:
+def _draw_column(axes: Sequence, walk: Walk, cycles: int, palette: Palette) -> None:
     outputs, pressures, displacement = axes
     horizon_s = walk.period_s * cycles
     shown = walk.measured["time_s"] <= horizon_s
@@ -73,13 +74,13 @@ def _draw_column(axes: Sequence, walk: Walk, cycles: int) -> None:
             color=CHAMBER_COLOURS[chamber],
             label=chamber,
         )
-    displacement.plot(time_s, walk.measured["displacement_head_mm"][shown], color=MEASURED, label="measured")
+    displacement.plot(time_s, walk.measured["displacement_head_mm"][shown], color=palette.measured, label="measured")
     if walk.predicted is not None:
         shown = walk.predicted["time_s"] <= horizon_s
         displacement.plot(
             walk.predicted["time_s"][shown],
             walk.predicted["displacement_head_mm"][shown],
-            color=PREDICTED,
+            color=palette.predicted,
             linestyle="--",
             label="predicted by the model",
         )
