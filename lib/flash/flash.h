@@ -1,0 +1,31 @@
+// Constants that live in flash: on an AVR they would otherwise be copied into its 2 KB of RAM.
+#pragma once
+
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define BIFA_FLASH PROGMEM
+#else
+#define BIFA_FLASH
+#endif
+
+namespace bifa {
+
+/// A character of a text in flash: a type of its own, so that such a text cannot be read as if it were in RAM.
+struct FlashChar;
+/// A zero-terminated text in flash.
+using FlashText = const FlashChar*;
+
+#ifdef __AVR__
+#define BIFA_TEXT(literal) (reinterpret_cast<::bifa::FlashText>(PSTR(literal)))
+inline uint8_t flash_byte(const void* address) { return pgm_read_byte(address); }
+inline void flash_copy(void* to, const void* from, uint16_t size) { memcpy_P(to, from, size); }
+#else
+#define BIFA_TEXT(literal) (reinterpret_cast<::bifa::FlashText>(literal))
+inline uint8_t flash_byte(const void* address) { return *static_cast<const uint8_t*>(address); }
+inline void flash_copy(void* to, const void* from, uint16_t size) { memcpy(to, from, size); }
+#endif
+
+}  // namespace bifa

@@ -1,0 +1,32 @@
+// Parameters by name or number: read, write, check, format.
+#pragma once
+
+#include "parameter_table.h"
+
+namespace bifa {
+
+/// Copies the descriptor of one parameter out of flash.
+ParameterDescriptor descriptor(ParameterId id);
+
+/// Value of one parameter in wire units.
+uint32_t value_of(const ParameterSet& set, ParameterId id);
+
+/// Puts a value (wire units) that is known to lie within its range.
+void put_value(ParameterSet& set, ParameterId id, uint32_t value);
+
+/// Whether a value (wire units) lies within the parameter's range.
+bool in_range(ParameterId id, uint32_t value);
+
+/// Finds a parameter by its name; false if there is none.
+bool find_parameter(const char* name, ParameterId& id);
+
+/// Whether every field lies in its range. Use it on every set that comes from outside: the wire, EEPROM.
+bool is_valid(const ParameterSet& set);
+
+/// The factory preset of that number (0 is the baseline).
+ParameterSet factory_preset(uint8_t index);
+
+/// Finds a factory preset by its name; false if there is none.
+bool find_factory_preset(const char* name, ParameterSet& set);
+
+}  // namespace bifa

@@ -1,0 +1,41 @@
+"""Generates what follows from the tables of this folder; `--check` only says whether the tree is up to date.
+
+python schema/generate.py
+"""
+
+import sys
+from pathlib import Path
+
+import cpp_parameters
+import py_tables
+from tables import parameter_table
+
+ROOT = Path(__file__).parent.parent
+
+
+def generated() -> dict[Path, str]:
+    """Every generated file with its text."""
+    parameters = parameter_table()
+    return {
+        ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
+        ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters),
+        ROOT / "host/bifa/link/table.py": py_tables.module(parameters),
+    }
+
+
+def main() -> int:
+    stale = []
+    for path, text in generated().items():
+        if not path.exists() or path.read_text() != text:
+            stale.append(path.relative_to(ROOT))
+            if "--check" not in sys.argv:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text)
+    if "--check" in sys.argv and stale:
+        print("out of date:", *stale, "- run: python schema/generate.py", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
