@@ -1,0 +1,25 @@
+"""The bytes between host and Uno, wherever they flow: a serial port, or a virtual Uno in virtual time."""
+
+from typing import Protocol
+
+from bifa.errors import BifaError
+
+
+class PortGoneError(BifaError, ConnectionError):
+    """The port vanished, for instance because the cable was pulled."""
+
+
+class Transport(Protocol):
+    """A byte stream in both directions. Every method raises a ConnectionError when the port is gone."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`."""
+
+    def read(self, timeout_s: float) -> bytes:
+        """Whatever has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
+
+    def reset(self) -> None:
+        """Reset the Uno, as opening the port (DTR) does."""
+
+    def close(self) -> None:
+        """Let go of the port; a second call does nothing."""
