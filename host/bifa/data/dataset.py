@@ -1,0 +1,92 @@
+"""A data set in memory: what was known beforehand, and the trials."""
+
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .layout import EXPERIMENTS, SETTINGS
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One recording.
+
+    `columns` maps a column's name, its unit included, to an array of shape (samples,), in the order of the
+    file. `pressure_psi` and `rate_mm_s` are what was commanded. `gait` is keyed as in a gait file. `extra`
+    holds the settings named in `layout.SETTINGS` and whatever else the recorder noted.
+    """
+
+    file: str
+    experiment: str
+    columns: dict[str, np.ndarray]
+    actuator: str | None = None
+    pressure_psi: float | None = None
+    rate_mm_s: float | None = None
+    gait: dict[str, float] | None = None
+    repeat: int = 1
+    session_order: int | None = None
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Sample times, strictly increasing, shape (samples,)."""
+        return self.columns["time_s"]
+
+    @property
+    def rate_hz(self) -> float:
+        """Median sampling rate."""
+        return float(1.0 / np.median(np.diff(self.time_s)))
+
+    @property
+    def nominal_rate_hz(self) -> float:
+        """The rate that the format gives for this experiment."""
+        return EXPERIMENTS[self.experiment].rate_hz
+
+    @property
+    def condition(self) -> Hashable:
+        """Everything that was set; trials with equal conditions are repeats of each other."""
+        gait = None if self.gait is None else tuple(sorted(self.gait.items()))
+        settings = tuple((key, self.extra[key]) for key in SETTINGS if key in self.extra)
+        return (self.experiment, self.actuator, self.pressure_psi, self.rate_mm_s, gait, settings)
+
+    @property
+    def label(self) -> str:
+        """The condition in a few words, for tables and plots."""
+        parts = [self.experiment.replace("_", " ")]
+        if self.actuator:
+            parts.append(self.actuator)
+        if self.pressure_psi is not None:
+            parts.append(f"{self.pressure_psi:g} psi")
+        if self.rate_mm_s is not None:
+            parts.append(f"{self.rate_mm_s:g} mm/s")
+        if self.gait:
+            parts.append(f"period {self.gait['period_s']:g} s")
+        parts += [f"{key} {self.extra[key]}" for key in SETTINGS if key in self.extra]
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Trials and what the lab measured directly (`known`: model parameter -> value, SI unless suffixed)."""
+
+    path: Path | None
+    name: str
+    known: dict[str, float]
+    trials: tuple[Trial, ...]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def of(self, experiment: str, actuator: str | None = None) -> tuple[Trial, ...]:
+        """The trials of one experiment, of one actuator where given."""
+        return tuple(
+            trial for trial in self.trials if trial.experiment == experiment and actuator in (None, trial.actuator)
+        )
+
+    def repeats(self) -> Iterator[tuple[Trial, ...]]:
+        """Groups of trials that repeat one condition, in the order in which they first appear."""
+        groups: dict[Hashable, list[Trial]] = {}
+        for trial in self.trials:
+            groups.setdefault(trial.condition, []).append(trial)
+        yield from (tuple(group) for group in groups.values())

@@ -1,0 +1,148 @@
+"""Typed, exhaustive reading of a TOML table: every key is asked for, and what is left over is refused."""
+
+import itertools
+import math
+import re
+from typing import Any
+
+from .errors import DatasetError
+from .layout import TABLE_FILE
+
+
+class Source:
+    """The text of dataset.toml, kept to name lines. Lines are given only where they are certain."""
+
+    def __init__(self, text: str, trials: int):
+        self._lines = text.split("\n")
+        starts = [n for n, line in enumerate(self._lines, 1) if re.match(r"\s*\[\[\s*trial\s*\]\]", line)]
+        bounds = itertools.pairwise([*starts, len(self._lines) + 1])
+        self._trials = list(bounds) if len(starts) == trials else []
+
+    def line(self, trial: int | None, path: tuple[str, ...]) -> int | None:
+        """Line of the key `path` in trial number `trial` (from 1) or at the top level.
+
+        Where the key itself has no line of its own, that of the innermost table around it.
+        """
+        if trial is None:
+            first, end, section = 1, len(self._lines) + 1, ()
+        elif self._trials:
+            first, end, section = *self._trials[trial - 1], ("trial",)
+        else:
+            return None
+        wanted = (*section, *path)
+        best, depth = (None, 0) if trial is None else (first, 1)
+        for number in range(first, end):
+            line = self._lines[number - 1]
+            if header := re.match(r"\s*\[+\s*([^\]]+?)\s*\]", line):
+                found = section = _keys(header[1])
+            elif key := re.match(r"\s*([^=#]+?)\s*=", line):
+                found = (*section, *_keys(key[1]))
+            else:
+                continue
+            if len(found) > depth and found == wanted[: len(found)]:
+                best, depth = number, len(found)
+        return best
+
+
+def _keys(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+
+
+class Fields:
+    """One table, read key by key; `finish` refuses the keys that nobody asked for."""
+
+    def __init__(self, values: Any, source: Source, trial: int | None = None, table: str | None = None):
+        self._source, self._trial, self._table = source, trial, table
+        if not isinstance(values, dict):
+            raise self.error(None, f"must be a table, not {_kind(values)}")
+        self._values = dict(values)
+        self._asked: list[str] = []
+
+    def error(self, key: str | None, problem: str) -> DatasetError:
+        """The error for `key` of this table, its line found."""
+        path = tuple(part for part in (self._table, key) if part)
+        where = [".".join(path)] if path else []
+        if self._trial is not None:
+            where.insert(0, f"trial {self._trial}")
+        line = self._source.line(self._trial, path)
+        return DatasetError(problem, file=TABLE_FILE, line=line, column=", ".join(where) or None)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
+
+    def take(self, key: str) -> Any:
+        """The value of a required key, of any type."""
+        self._asked.append(key)
+        if key not in self._values:
+            raise self.error(key, "the key is missing")
+        return self._values.pop(key)
+
+    def text(self, key: str) -> str:
+        """A string that is not empty and has no control characters."""
+        value = self.take(key)
+        if not isinstance(value, str):
+            raise self.error(key, f"must be a string, not {_kind(value)}")
+        if not value.strip() or not value.isprintable():
+            raise self.error(key, "must be printable text that is not empty")
+        return value
+
+    def choice(self, key: str, allowed: tuple[str, ...]) -> str:
+        """One of the strings `allowed`."""
+        value = self.text(key)
+        if value not in allowed:
+            raise self.error(key, f"{value!r} is unknown; it must be one of {', '.join(allowed)}")
+        return value
+
+    def number(self, key: str, low: float = -math.inf, high: float = math.inf) -> float:
+        """A finite number in [low, high]."""
+        value = self.take(key)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, f"must be a number, not {_kind(value)}")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.error(key, f"must be a finite number, not {value}")
+        if not low <= number <= high:
+            raise self.error(key, f"{number:g} is outside {low:g} to {high:g}")
+        return number
+
+    def positive(self, key: str) -> float:
+        """A finite number above zero."""
+        value = self.number(key)
+        if value <= 0:
+            raise self.error(key, f"{value:g} must be above zero")
+        return value
+
+    def whole(self, key: str, low: int) -> int:
+        """A whole number of at least `low` that fits 32 bits."""
+        value = self.take(key)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.error(key, f"must be a whole number, not {_kind(value)}")
+        if not low <= value < 2**31:
+            raise self.error(key, f"{value} is outside {low} to {2**31 - 1}")
+        return value
+
+    def table(self, key: str) -> dict[str, Any]:
+        """A nested table, unread."""
+        value = self.take(key)
+        if not isinstance(value, dict):
+            raise self.error(key, f"must be a table, not {_kind(value)}")
+        return value
+
+    def remaining(self) -> list[str]:
+        """Keys that have not been asked for yet."""
+        return list(self._values)
+
+    def finish(self, also: tuple[str, ...] = ()) -> None:
+        """Refuse what is left; `also` names the optional keys that were absent, for the message."""
+        for key in self._values:
+            allowed = ", ".join(dict.fromkeys((*self._asked, *also)))
+            raise self.error(key, f"unknown key; those allowed here are {allowed}")
+
+
+def _kind(value: Any) -> str:
+    names = {bool: "true or false", int: "a whole number", float: "a number", str: "a string"}
+    names |= {list: "a list", dict: "a table"}
+    return names.get(type(value), "a date or time")

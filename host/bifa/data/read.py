@@ -1,0 +1,167 @@
+"""Reading a data set from its folder: strict, and nothing guessed."""
+
+import os
+import tomllib
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from .dataset import Dataset, Trial
+from .errors import DatasetError
+from .fields import Fields, Source
+from .layout import (
+    ACTUATORS,
+    DIRECTIONS,
+    EXPERIMENTS,
+    FORMAT,
+    GAIT_OPTIONAL_RANGES,
+    GAIT_RANGES,
+    PRESSURE_RANGE_PSI,
+    SETTINGS,
+    TABLE_FILE,
+)
+from .table import read_table
+
+_COMMON_OPTIONAL = ("session_order", "extra")
+
+
+def read_dataset(path: str | os.PathLike[str]) -> Dataset:
+    """Read the data set in folder `path` (format: docs/data-format.md).
+
+    Raises DatasetError, with file, line and column or key, for anything that breaks the format.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise DatasetError(f"{folder} is not a folder; a data set is a folder with {TABLE_FILE} and CSV files")
+    top, source = _read_toml(folder)
+    version = top.take("format")
+    if isinstance(version, bool) or version != FORMAT or not isinstance(version, int):
+        raise top.error("format", f"format {version!r} is not supported; this program reads format {FORMAT}")
+    name = top.text("name")
+    known = _known(top, source) if "known" in top else {}
+    provenance = top.table("provenance") if "provenance" in top else {}
+    listed = top.take("trial")
+    if not isinstance(listed, list) or not listed:
+        raise top.error("trial", "must be a list of [[trial]] tables with at least one")
+    top.finish(also=("known", "provenance"))
+    heads = [_trial_head(entry, source, number) for number, entry in enumerate(listed, start=1)]
+    paths = [_inside(folder, head, source, number) for number, head in enumerate(heads, start=1)]
+    _refuse_duplicates(heads, paths, source)
+    trials = [
+        Trial(**{**head, "columns": read_table(file, head["file"], EXPERIMENTS[head["experiment"]])})
+        for head, file in zip(heads, paths, strict=True)
+    ]
+    return Dataset(folder, name, known, tuple(trials), provenance)
+
+
+def _read_toml(folder: Path) -> tuple[Fields, Source]:
+    try:
+        raw = (folder / TABLE_FILE).read_bytes()
+    except OSError as error:
+        raise DatasetError(f"cannot be read ({error.strerror})", file=TABLE_FILE) from None
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise DatasetError(f"byte 0x{raw[error.start]:02x} is not UTF-8", file=TABLE_FILE, line=line) from None
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DatasetError(f"is not valid TOML: {error}", file=TABLE_FILE) from None
+    except (RecursionError, ValueError) as error:  # nested too deep; an integer of over 4300 digits
+        raise DatasetError(f"is not usable TOML: {error}", file=TABLE_FILE) from None
+    listed = values.get("trial")
+    source = Source(text, len(listed) if isinstance(listed, list) else 0)
+    return Fields(values, source), source
+
+
+def _known(top: Fields, source: Source) -> dict[str, float]:
+    fields = Fields(top.take("known"), source, table="known")
+    return {key: fields.number(key) for key in fields.remaining()}
+
+
+def _trial_head(entry: Any, source: Source, number: int) -> dict[str, Any]:
+    """The keyword arguments of Trial, without the columns."""
+    fields = Fields(entry, source, trial=number)
+    head: dict[str, Any] = {"file": fields.text("file")}
+    head["experiment"] = fields.choice("experiment", tuple(EXPERIMENTS))
+    layout = EXPERIMENTS[head["experiment"]]
+    keys = layout.required + tuple(key for key in layout.optional if key in fields)
+    extra: dict[str, Any] = {}
+    for key in keys:
+        (extra if key in SETTINGS else head)[key] = _setting(fields, key, source, number)
+    head["repeat"] = fields.whole("repeat", 1)
+    if "session_order" in fields:
+        head["session_order"] = fields.whole("session_order", 0)
+    noted = fields.table("extra") if "extra" in fields else {}
+    for key in noted:
+        if key in SETTINGS:
+            raise fields.error("extra", f"{key} is a key of the trial itself and does not belong into extra")
+    fields.finish(also=layout.optional + _COMMON_OPTIONAL)
+    return {**head, "extra": {**noted, **extra}}
+
+
+def _setting(fields: Fields, key: str, source: Source, number: int) -> Any:
+    if key == "actuator":
+        return fields.choice(key, ACTUATORS)
+    if key == "direction":
+        return fields.choice(key, DIRECTIONS)
+    if key == "pressure_psi":
+        return fields.number(key, *PRESSURE_RANGE_PSI)
+    if key == "inclination_deg":
+        return fields.number(key, -90.0, 90.0)
+    if key == "gait":
+        return _gait(Fields(fields.take(key), source, trial=number, table=key))
+    return fields.positive(key)  # rate_mm_s, load_cell_N_m
+
+
+def _gait(fields: Fields) -> dict[str, float]:
+    gait = {key: fields.number(key, *bounds) for key, bounds in GAIT_RANGES.items()}
+    for key, bounds in GAIT_OPTIONAL_RANGES.items():
+        if key in fields:
+            gait[key] = fields.number(key, *bounds)
+    fields.finish(also=tuple(GAIT_OPTIONAL_RANGES))
+    return gait
+
+
+def _inside(folder: Path, head: dict[str, Any], source: Source, number: int) -> Path:
+    """The path of a trial's file, certain to be a regular file within the folder."""
+    file = head["file"]
+    place = {"file": TABLE_FILE, "line": source.line(number, ("file",)), "column": f"trial {number}, file"}
+    if PurePosixPath(file).is_absolute() or PureWindowsPath(file).anchor or ".." in Path(file).parts:
+        raise DatasetError(f"{file!r} is outside the data set; name a file within the folder", **place)
+    if not file.endswith(".csv"):
+        raise DatasetError(f"{file!r} is not a .csv file", **place)
+    try:
+        resolved = (folder / file).resolve()
+        if not resolved.is_relative_to(folder.resolve()):
+            raise DatasetError(f"{file!r} is a link to a file outside the data set", **place)
+        if not resolved.is_file():
+            what = "is not a regular file" if resolved.exists() else "does not exist"
+            raise DatasetError(f"the file {file!r} {what}", **place)
+    except (OSError, RuntimeError) as error:  # too long a name, a loop of links
+        raise DatasetError(f"{file!r} cannot be opened: {error}", **place) from None
+    return resolved
+
+
+def _refuse_duplicates(heads: list[dict[str, Any]], paths: list[Path], source: Source) -> None:
+    files: dict[Path, int] = {}
+    repeats: dict[Any, int] = {}
+    for number, (head, path) in enumerate(zip(heads, paths, strict=True), start=1):
+        identity = (Trial(**head, columns={}).condition, head["repeat"])
+        earlier = files.setdefault(path, number)
+        if earlier != number:
+            raise DatasetError(
+                f"{head['file']!r} was listed before, in trial {earlier}",
+                file=TABLE_FILE,
+                line=source.line(number, ("file",)),
+                column=f"trial {number}, file",
+            )
+        earlier = repeats.setdefault(identity, number)
+        if earlier != number:
+            raise DatasetError(
+                f"repeat {head['repeat']} of the same experiment and settings was listed before, "
+                f"in trial {earlier}; number the repeats 1, 2, 3",
+                file=TABLE_FILE,
+                line=source.line(number, ("repeat",)),
+                column=f"trial {number}, repeat",
+            )

@@ -1,0 +1,152 @@
+"""One CSV file: read fast; where that fails, find the line and the column at fault."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from .errors import DatasetError
+from .layout import Layout, is_command
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMERIC_BYTES = b"0123456789+-.eE, \t\n"
+_BLANKS = " \t"
+
+
+def read_table(path: Path, file: str, layout: Layout) -> dict[str, np.ndarray]:
+    """Read the CSV file at `path` into arrays of shape (samples,), keyed by column in the file's order.
+
+    `file` is the name used in errors. Raises DatasetError naming file, line and column for anything that is
+    not exactly the format: nothing is skipped, filled or converted.
+    """
+    text = _decode(path, file)
+    lines = text.split("\n")
+    if lines[-1] == "":
+        lines.pop()  # the file ends with a newline
+    names = _header(lines, file, layout)
+    values = _parse(lines[1:], len(names))
+    if values is None:
+        values = _parse_slowly(lines, names, file)
+    columns = {name: np.ascontiguousarray(values[:, index]) for index, name in enumerate(names)}
+    _check_values(columns, file)
+    return columns
+
+
+def _decode(path: Path, file: str) -> str:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise DatasetError(f"cannot be read ({error.strerror})", file=file) from None
+    if not raw:
+        raise DatasetError("is empty; a header line and at least two rows are needed", file=file, line=1)
+    if raw.startswith(b"\xef\xbb\xbf"):
+        raise DatasetError("starts with a byte order mark; save it as plain UTF-8", file=file, line=1)
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise DatasetError(
+            f"byte 0x{raw[error.start]:02x} is not UTF-8; save the file as plain UTF-8 text",
+            file=file,
+            line=line,
+        ) from None
+    return text.replace("\r\n", "\n") if "\r" in text else text
+
+
+def _header(lines: list[str], file: str, layout: Layout) -> list[str]:
+    names = [name.strip(_BLANKS) for name in lines[0].split(",")]
+    expected = ", ".join(layout.all_columns)
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise DatasetError("the column appears twice in the header", file=file, line=1, column=name)
+        if name not in layout.all_columns:
+            problem = f"unknown column {name!r}; the columns of this experiment are {expected}"
+            raise DatasetError(problem, file=file, line=1, column=name or "(no name)")
+        seen.add(name)
+    for name in layout.columns:
+        if name not in seen:
+            raise DatasetError(
+                f"the column is missing from the header; the columns of this experiment are {expected}",
+                file=file,
+                line=1,
+                column=name,
+            )
+    if len(lines) < 3:
+        raise DatasetError(f"{len(lines) - 1} rows of data; at least two are needed", file=file, line=len(lines))
+    return names
+
+
+def _parse(rows: list[str], width: int) -> np.ndarray | None:
+    """Numbers of shape (rows, width) by NumPy's C reader, or None where it cannot have read every row."""
+    text = "\n".join(rows)
+    if not text.isascii() or text.encode("ascii").translate(None, _NUMERIC_BYTES):
+        return None
+    try:
+        values = np.loadtxt(rows, delimiter=",", comments=None, ndmin=2)
+    except ValueError:
+        return None
+    complete = values.shape == (len(rows), width) and np.isfinite(values).all()
+    return values if complete else None
+
+
+def _parse_slowly(lines: list[str], names: list[str], file: str) -> np.ndarray:
+    """Parse field by field, so that the first fault is named by line and column."""
+    rows = []
+    for number, text in enumerate(lines[1:], start=2):
+        if not text.strip(_BLANKS):
+            raise DatasetError("a blank line among the data", file=file, line=number)
+        fields = text.split(",")
+        if len(fields) != len(names):
+            raise DatasetError(
+                f"{len(fields)} fields where the header has {len(names)}",
+                file=file,
+                line=number,
+                column=names[len(fields)] if len(fields) < len(names) else f"{len(names) + 1}",
+            )
+        rows.append([_number(field, file, number, name) for field, name in zip(fields, names, strict=True)])
+    return np.array(rows)
+
+
+def _number(field: str, file: str, line: int, column: str) -> float:
+    stripped = field.strip(_BLANKS)
+    if not _NUMBER.fullmatch(stripped):
+        if not stripped:
+            problem = "the value is missing"
+        elif stripped.strip("+-").lower() in ("nan", "inf", "infinity"):
+            problem = f"{stripped} is not a measurement; every value must be a finite number"
+        else:
+            problem = f"{_shown(stripped)} is not a decimal number"
+        raise DatasetError(problem, file=file, line=line, column=column)
+    value = float(stripped)
+    if not np.isfinite(value):
+        raise DatasetError(f"{_shown(stripped)} is too large for a number", file=file, line=line, column=column)
+    return value
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
+    time_s = columns["time_s"]
+    back = np.flatnonzero(np.diff(time_s) <= 0)
+    if back.size:
+        row = int(back[0]) + 1
+        verb = "goes backwards" if time_s[row] < time_s[row - 1] else "stands still"
+        raise DatasetError(
+            f"time {verb}: {float(time_s[row])} after {float(time_s[row - 1])}",
+            file=file,
+            line=row + 2,
+            column="time_s",
+        )
+    for name, values in columns.items():
+        if is_command(name):
+            wrong = np.flatnonzero((values != 0) & (values != 1))
+            if wrong.size:
+                raise DatasetError(
+                    f"command {values[wrong[0]]:g} is neither 1 (positive) nor 0 (vacuum)",
+                    file=file,
+                    line=int(wrong[0]) + 2,
+                    column=name,
+                )

@@ -1,0 +1,189 @@
+"""Writing a data set: whole or trial by trial, never over another, never half."""
+
+import os
+import secrets
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from .dataset import Dataset, Trial
+from .errors import DatasetError
+from .layout import FORMAT, SETTINGS, TABLE_FILE
+from .read import read_dataset
+
+PARTIAL_SUFFIX = ".partial"
+
+
+def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
+    """Write `dataset` as a new folder, complete or not at all; returns the folder.
+
+    Values are written with the digits that read back to the same doubles. What was written is read again by
+    the strict reader before the folder gets its name, so a file that would be refused is never left behind.
+    Raises DatasetError where the folder exists or the data break the format.
+    """
+    target = Path(folder)
+    _refuse_existing(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    scratch = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    scratch.mkdir()
+    try:
+        for trial in dataset.trials:
+            _write_csv(scratch, trial)
+        _write_toml(scratch, dataset)
+        read_dataset(scratch)
+        _publish(scratch, target)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return target
+
+
+class DatasetWriter:
+    """A data set that grows trial by trial in `<folder>.partial`, and takes its name when it is finished.
+
+    After each `add` the partial folder is a complete data set on disk. A session that was interrupted goes
+    on with `resume=True`: `trials` then holds what was recorded before. Not for two writers at once.
+    """
+
+    def __init__(
+        self,
+        folder: str | os.PathLike[str],
+        name: str,
+        known: Mapping[str, float] | None = None,
+        provenance: Mapping[str, Any] | None = None,
+        resume: bool = False,
+    ):
+        self.folder = Path(folder)
+        self.partial = self.folder.with_name(self.folder.name + PARTIAL_SUFFIX)
+        _refuse_existing(self.folder)
+        head = Dataset(self.partial, name, dict(known or {}), (), dict(provenance or {}))
+        if self.partial.exists():
+            if not resume:
+                raise DatasetError(f"{self.partial} holds an interrupted session: resume it, or move it out of the way")
+            head = self._recorded(head)
+        else:
+            self.partial.mkdir(parents=True)
+        self._dataset = head
+
+    def _recorded(self, head: Dataset) -> Dataset:
+        if not (self.partial / TABLE_FILE).exists():
+            return head  # interrupted before the first trial was complete
+        earlier = read_dataset(self.partial)
+        for what, old, new in (("name", earlier.name, head.name), ("known", earlier.known, head.known)):
+            if old != new:
+                raise DatasetError(
+                    f"{self.partial} was begun with {what} = {old!r}, not {new!r}; "
+                    f"resume it with the same, or move it out of the way"
+                )
+        return earlier
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials that are safely on disk."""
+        return self._dataset.trials
+
+    def has(self, trial: Trial) -> bool:
+        """Whether this repeat of this condition is already recorded (the columns are not compared)."""
+        wanted = (trial.condition, trial.repeat)
+        return any((old.condition, old.repeat) == wanted for old in self.trials)
+
+    def add(self, trial: Trial) -> None:
+        """Record one more trial. On an error nothing of it stays."""
+        if self.has(trial) or any(old.file == trial.file for old in self.trials):
+            raise DatasetError(f"{trial.file}: this trial is already recorded in {self.partial}")
+        grown = Dataset(
+            self.partial,
+            self._dataset.name,
+            self._dataset.known,
+            (*self.trials, trial),
+            self._dataset.provenance,
+        )
+        alone = Dataset(None, grown.name, grown.known, (trial,), grown.provenance)
+        probe = self.partial / f".probe.{secrets.token_hex(4)}"
+        write_dataset(probe, alone)
+        try:
+            target = self.partial / trial.file
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(probe / trial.file, target)
+            _write_toml(self.partial, grown)
+        finally:
+            shutil.rmtree(probe, ignore_errors=True)
+        self._dataset = grown
+
+    def finish(self) -> Dataset:
+        """Give the data set its name; returns it as read back from disk."""
+        _refuse_existing(self.folder)
+        for stray in self.partial.glob(".probe.*"):
+            shutil.rmtree(stray)
+        read_dataset(self.partial)
+        _publish(self.partial, self.folder)
+        return read_dataset(self.folder)
+
+
+def _refuse_existing(folder: Path) -> None:
+    if folder.exists() or folder.is_symlink():
+        raise DatasetError(f"{folder} exists; a data set is never overwritten: choose another name")
+
+
+def _publish(scratch: Path, target: Path) -> None:
+    """Rename, which is atomic; a folder that appeared meanwhile makes it fail unless it is empty."""
+    _refuse_existing(target)
+    try:
+        os.rename(scratch, target)
+    except OSError as error:
+        raise DatasetError(f"{target} cannot be written ({error.strerror})") from None
+
+
+def _write_csv(folder: Path, trial: Trial) -> None:
+    path = folder / trial.file
+    if Path(trial.file).is_absolute() or ".." in Path(trial.file).parts:
+        raise DatasetError(f"{trial.file!r} is outside the data set; name a file within the folder")
+    lengths = {name: len(values) for name, values in trial.columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise DatasetError(f"columns of different lengths: {lengths}", file=trial.file)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    columns = [_texts(values) for values in trial.columns.values()]
+    rows = map(",".join, zip(*columns, strict=True))
+    _write_durably(path, ",".join(trial.columns) + "\n" + "\n".join(rows) + "\n")
+
+
+def _texts(values: Any) -> list[str]:
+    """Shortest decimal text that reads back to the same double; whole numbers without a fraction."""
+    return [text.removesuffix(".0") for text in map(repr, map(float, values))]
+
+
+def _write_toml(folder: Path, dataset: Dataset) -> None:
+    content: dict[str, Any] = {"format": FORMAT, "name": dataset.name}
+    if dataset.provenance:
+        content["provenance"] = dict(dataset.provenance)
+    content["known"] = dataset.known
+    content["trial"] = [_head(trial) for trial in dataset.trials]
+    try:
+        text = tomli_w.dumps(content)
+    except TypeError as error:
+        raise DatasetError(f"cannot be written as TOML: {error}", file=TABLE_FILE) from None
+    _write_durably(folder / TABLE_FILE, text)
+
+
+def _head(trial: Trial) -> dict[str, Any]:
+    fields = ("file", "experiment", "actuator", "pressure_psi", "rate_mm_s", "gait", "repeat", "session_order")
+    head = {name: getattr(trial, name) for name in fields if getattr(trial, name) is not None}
+    head |= {key: trial.extra[key] for key in SETTINGS if key in trial.extra}
+    noted = {key: value for key, value in trial.extra.items() if key not in SETTINGS}
+    return head | ({"extra": noted} if noted else {})
+
+
+def _write_durably(path: Path, text: str) -> None:
+    """Write beside the place and rename, so that a power cut leaves the old file or the new one."""
+    scratch = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        with scratch.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(scratch, path)
+    except OSError as error:
+        scratch.unlink(missing_ok=True)
+        raise DatasetError(f"{path} cannot be written ({error.strerror})") from None

@@ -1,0 +1,11 @@
+import pytest
+
+from bifa.data import write_dataset
+
+from .data_sets import make_dataset
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A data set on disk with every experiment, twice."""
+    return write_dataset(tmp_path / "bench", make_dataset())

@@ -1,0 +1,59 @@
+"""Small data sets to read, to break and to write."""
+
+import numpy as np
+
+from bifa.data import EXPERIMENTS, Dataset, Trial
+
+GAIT = {
+    "period_s": 5.7,
+    "psi12_deg": 270.0,
+    "psi13_deg": 90.0,
+    "duty_body": 0.5,
+    "duty_head": 0.5,
+    "duty_tail": 0.5,
+}
+SETTINGS = {
+    "static_loading": {"actuator": "large", "pressure_psi": 0.0, "rate_mm_s": 2.0},
+    "step_response": {"actuator": "small", "pressure_psi": 8.5},
+    "anchor_pull": {"pressure_psi": 8.5, "rate_mm_s": 20.0},
+    "locomotion": {"gait": GAIT},
+}
+
+
+def make_trial(experiment: str = "locomotion", repeat: int = 1, samples: int = 40, seed: int = 0, **changes):
+    """A trial whose columns are noise on a slow movement, its commands 0 and 1."""
+    rng = np.random.default_rng([seed, repeat])
+    layout = EXPERIMENTS[experiment]
+    columns = {}
+    for name in layout.columns:
+        if name == "time_s":
+            columns[name] = np.arange(samples) / layout.rate_hz
+        elif name.startswith("command"):
+            columns[name] = np.repeat([0.0, 1.0], [samples // 2, samples - samples // 2])
+        else:
+            columns[name] = np.round(np.linspace(0.0, 12.0, samples) + 0.01 * rng.normal(size=samples), 4)
+    settings = {"file": f"{experiment}_{repeat}.csv", "repeat": repeat, **SETTINGS[experiment], **changes}
+    return Trial(experiment=experiment, columns=columns, **settings)
+
+
+def make_dataset(repeats: int = 2) -> Dataset:
+    """Every experiment, repeated."""
+    trials = [make_trial(name, repeat) for name in EXPERIMENTS for repeat in range(1, repeats + 1)]
+    return Dataset(None, "made for a test", {"head_mass_kg": 0.175}, tuple(trials), {"made_by": "a test"})
+
+
+def assert_same(left: Dataset, right: Dataset) -> None:
+    """Equal to the last bit, the folder's path aside."""
+    assert (left.name, left.known, dict(left.provenance)) == (right.name, right.known, dict(right.provenance))
+    assert len(left.trials) == len(right.trials)
+    for a, b in zip(left.trials, right.trials, strict=True):
+        assert (a.file, a.condition, a.repeat, a.session_order, a.extra) == (
+            b.file,
+            b.condition,
+            b.repeat,
+            b.session_order,
+            b.extra,
+        )
+        assert list(a.columns) == list(b.columns)
+        for name in a.columns:
+            np.testing.assert_array_equal(a.columns[name], b.columns[name])

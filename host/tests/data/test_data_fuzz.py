@@ -1,0 +1,82 @@
+"""Random damage: the reader either refuses with a place, or has read exactly what the file says."""
+
+import csv
+import random
+
+import numpy as np
+import pytest
+
+from bifa.data import DatasetError, read_dataset
+
+TOKENS = [b",", b"\n", b"\r", b"\r\n", b"nan", b"inf", b"1e999", b"-", b"e", b".", b" ", b"\t", b"\0"]
+TOKENS += [b"\xff", b"\xef\xbb\xbf", b'"', b"#", b"_", b"0x1", b"time_s", b"1", b"[", b"]", b"=", b"'", b"{"]
+TOKENS += [b"[[trial]]\n", b"9" * 400, "½".encode(), "\u00a0".encode(), "\u2028".encode(), b"\x0b", b"\x1c"]
+
+
+def damage(raw: bytes, rng: random.Random) -> bytes:
+    for _ in range(rng.randint(1, 4)):
+        at, end = sorted(rng.randrange(len(raw) + 1) for _ in range(2))
+        kind = rng.randrange(5)
+        if kind == 0:
+            raw = raw[:at] + rng.choice(TOKENS) + raw[at:]
+        elif kind == 1:
+            raw = raw[:at] + rng.choice(TOKENS) + raw[at + rng.randint(1, 6) :]
+        elif kind == 2:
+            raw = raw[:at] + raw[at + rng.randint(1, 20) :]
+        elif kind == 3:
+            raw = raw[:at] + bytes([rng.randrange(256)]) + raw[at + 1 :]
+        else:
+            raw = raw[:at] + raw[at : min(end, at + 60)] * 2 + raw[at:]
+    return raw
+
+
+def assert_read_exactly(dataset) -> None:
+    """Compare with Python's own csv and float, field by field."""
+    for trial in dataset.trials:
+        with (dataset.path / trial.file).open(newline="", encoding="utf-8") as file:
+            header, *rows = csv.reader(file, quoting=csv.QUOTE_NONE)
+        assert [name.strip() for name in header] == list(trial.columns)
+        expected = np.array([[float(field) for field in row] for row in rows])
+        np.testing.assert_array_equal(np.column_stack(list(trial.columns.values())), expected)
+        assert np.isfinite(expected).all()
+        assert (np.diff(trial.time_s) > 0).all()
+
+
+def attempt(folder):
+    try:
+        return read_dataset(folder), None
+    except DatasetError as error:
+        return None, error
+
+
+def fuzz(folder, target: str, seed: int, rounds: int) -> tuple[int, int]:
+    rng = random.Random(seed)
+    path = folder / target
+    whole = path.read_bytes()
+    refused = accepted = 0
+    for _ in range(rounds):
+        path.write_bytes(damage(whole, rng))
+        dataset, error = attempt(folder)
+        if error is None:
+            assert_read_exactly(dataset)
+            accepted += 1
+        else:
+            assert error.file
+            assert error.problem
+            assert error.line or not error.file.endswith(".csv")
+            refused += 1
+    return refused, accepted
+
+
+@pytest.mark.parametrize("target", ["locomotion_1.csv", "static_loading_2.csv", "dataset.toml"])
+def test_damaged_files(folder, target):
+    refused, accepted = fuzz(folder, target, seed=1, rounds=400)
+    assert refused > 100
+    assert accepted > 0
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("target", ["locomotion_1.csv", "step_response_1.csv", "dataset.toml"])
+def test_damaged_files_at_length(folder, target, seed):
+    fuzz(folder, target, seed=100 + seed, rounds=20000)

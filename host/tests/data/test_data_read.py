@@ -1,0 +1,304 @@
+"""What the reader accepts, and the place and reason that it names for what it refuses."""
+
+import os
+import re
+
+import numpy as np
+import pytest
+
+from bifa.data import DatasetError, read_dataset
+
+from .data_sets import assert_same, make_dataset
+
+WALK = "locomotion_1.csv"
+
+
+def test_reads_what_was_written(folder):
+    assert_same(read_dataset(folder), make_dataset())
+
+
+def test_the_example_of_the_format_page(tmp_path):
+    (tmp_path / "dataset.toml").write_text(
+        """
+format = 1
+name = "bench, 2026-11-21"
+[known]
+head_mass_kg = 0.175
+supply_negative_psi = -13.0
+[[trial]]
+file = "static_large_0psi_1.csv"
+experiment = "static_loading"
+actuator = "large"
+pressure_psi = 0
+rate_mm_s = 2.0
+repeat = 1
+session_order = 17
+[[trial]]
+file = "walk_1.csv"
+experiment = "locomotion"
+gait = { period_s = 5.7, psi12_deg = 270.0, psi13_deg = 90, duty_body = 0.5, duty_head = 0.5, duty_tail = 0.5 }
+repeat = 1
+"""
+    )
+    (tmp_path / "static_large_0psi_1.csv").write_bytes(
+        b"time_s, displacement_mm, force_N, pressure_psi\r\n0,0,1e-1,0\r\n 0.02 ,.5,+2.,-0.01\r\n"
+    )
+    header = (
+        "displacement_tail_mm,time_s,command_body,command_head,command_tail,"
+        "displacement_head_mm,pressure_body_psi,pressure_head_psi,pressure_tail_psi"
+    )
+    (tmp_path / "walk_1.csv").write_text(f"{header}\n0,0,0,1,0,0,0,0,0\n1,0.01,0,1,0,0,0,0,0")
+    static, walk = read_dataset(tmp_path).trials
+    assert static.session_order == 17
+    assert static.pressure_psi == 0.0
+    np.testing.assert_array_equal(static.columns["force_N"], [0.1, 2.0])
+    assert walk.gait["psi12_deg"] == 270.0
+    np.testing.assert_array_equal(walk.columns["displacement_tail_mm"], [0, 1])
+    assert walk.rate_hz == pytest.approx(100)
+
+
+def test_repeats_are_grouped_by_condition(folder):
+    groups = list(read_dataset(folder).repeats())
+    assert [[trial.repeat for trial in group] for group in groups] == [[1, 2]] * 4
+    assert [len({trial.condition for trial in group}) for group in groups] == [1] * 4
+
+
+def edit_row(line, column, text):
+    """Replace one field of the walk's file."""
+
+    def apply(folder):
+        lines = (folder / WALK).read_text().split("\n")
+        fields = lines[line - 1].split(",")
+        fields[column] = text
+        lines[line - 1] = ",".join(fields)
+        (folder / WALK).write_text("\n".join(lines))
+
+    return apply
+
+
+def edit_lines(change):
+    def apply(folder):
+        lines = (folder / WALK).read_text().split("\n")
+        change(lines)
+        (folder / WALK).write_text("\n".join(lines))
+
+    return apply
+
+
+def write_walk(raw):
+    return lambda folder: (folder / WALK).write_bytes(raw)
+
+
+HEADER = (
+    b"time_s,command_body,command_head,command_tail,displacement_head_mm,"
+    b"pressure_body_psi,pressure_head_psi,pressure_tail_psi\n"
+)
+
+MALFORMED_CSV = {
+    "missing column": (
+        edit_row(1, 4, "displacement_tail_mm"),
+        1,
+        "displacement_head_mm",
+        "missing from the header",
+    ),
+    "extra column": (edit_row(1, 4, "displacement_head_mm,volts"), 1, "volts", "unknown column 'volts'"),
+    "bad unit": (edit_row(1, 5, "pressure_body_bar"), 1, "pressure_body_bar", "unknown column"),
+    "column twice": (edit_row(1, 5, "time_s"), 1, "time_s", "twice"),
+    "no header": (lambda folder: edit_lines(lambda lines: lines.pop(0))(folder), 1, "0", "unknown column"),
+    "empty name": (edit_row(1, 5, ""), 1, "(no name)", "unknown column ''"),
+    "NaN": (edit_row(7, 4, "nan"), 7, "displacement_head_mm", "nan is not a measurement"),
+    "infinity": (edit_row(7, 4, "-inf"), 7, "displacement_head_mm", "finite"),
+    "too large": (edit_row(7, 4, "1e999"), 7, "displacement_head_mm", "too large"),
+    "word": (edit_row(9, 5, "abc"), 9, "pressure_body_psi", "'abc' is not a decimal number"),
+    "hexadecimal": (edit_row(9, 5, "0x10"), 9, "pressure_body_psi", "'0x10'"),
+    "underscore": (edit_row(9, 5, "1_0"), 9, "pressure_body_psi", "'1_0'"),
+    "decimal comma": (edit_row(9, 5, "1,5"), 9, "9", "9 fields where the header has 8"),
+    "quotes": (edit_row(9, 5, '"1"'), 9, "pressure_body_psi", "not a decimal"),
+    "foreign digits": (edit_row(9, 5, "١٢"), 9, "pressure_body_psi", "not a decimal"),
+    "empty field": (edit_row(9, 7, ""), 9, "pressure_tail_psi", "missing"),
+    "short row": (edit_lines(lambda lines: lines.__setitem__(4, "0.03,0,0")), 5, "command_tail", "3 fields"),
+    "long row": (edit_lines(lambda lines: lines.__setitem__(4, lines[4] + ",1")), 5, "9", "9 fields"),
+    "blank line": (edit_lines(lambda lines: lines.insert(3, "")), 4, None, "blank line"),
+    "blank at the end": (edit_lines(lambda lines: lines.append("")), 42, None, "blank line"),
+    "comment": (edit_lines(lambda lines: lines.insert(3, "# pause")), 4, "command_body", "1 fields"),
+    "time backwards": (edit_row(8, 0, "0.01"), 8, "time_s", "goes backwards: 0.01 after 0.05"),
+    "time stands": (edit_row(8, 0, "0.05"), 8, "time_s", "stands still"),
+    "half a command": (edit_row(6, 2, "0.5"), 6, "command_head", "0.5 is neither"),
+    "empty file": (write_walk(b""), 1, None, "is empty"),
+    "header only": (write_walk(HEADER), 1, None, "0 rows"),
+    "one row": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n"), 2, None, "1 rows"),
+    "UTF-16": (lambda f: (f / WALK).write_text((f / WALK).read_text(), "utf-16"), 1, None, "not UTF-8"),
+    "byte order mark": (
+        lambda f: (f / WALK).write_text((f / WALK).read_text(), "utf-8-sig"),
+        1,
+        None,
+        "byte order",
+    ),
+    "Latin 1": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\xb5,0,0,0\n"), 3, None, "0xb5 is not UTF-8"),
+    "NUL": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\0,0,0,0\n"), 3, "displacement_head_mm", "not a"),
+    "semicolons": (write_walk(HEADER.replace(b",", b";")), 1, None, "unknown column"),
+}
+
+
+@pytest.mark.parametrize("kind", MALFORMED_CSV)
+def test_malformed_csv_is_refused_with_its_place(folder, kind):
+    damage, line, column, words = MALFORMED_CSV[kind]
+    damage(folder)
+    with pytest.raises(DatasetError, match=re.escape(words)) as caught:
+        read_dataset(folder)
+    error = caught.value
+    assert (error.file, error.line) == (WALK, line)
+    if column is not None:
+        assert error.column == column
+        assert f"column {column}" in str(error)
+    assert str(error).startswith(f"{WALK}, line {line}")
+
+
+def replace(old, new, count=1):
+    """Replace text of dataset.toml."""
+
+    def apply(folder):
+        path = folder / "dataset.toml"
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, count))
+
+    return apply
+
+
+MALFORMED_TOML = {
+    "not TOML": (replace("format = 1", "format = = 1"), None, "not valid TOML"),
+    "no format": (replace("format = 1\n", ""), "format", "missing"),
+    "newer format": (replace("format = 1", "format = 2"), "format", "format 2 is not supported"),
+    "format as float": (replace("format = 1", "format = 1.0"), "format", "not supported"),
+    "format as truth": (replace("format = 1", "format = true"), "format", "not supported"),
+    "name a number": (replace('name = "made for a test"', "name = 3"), "name", "must be a string"),
+    "name empty": (replace('name = "made for a test"', 'name = ""'), "name", "not empty"),
+    "unknown key at the top": (replace("format = 1", "format = 1\nunits = 'SI'"), "units", "unknown key"),
+    "known a word": (
+        replace("head_mass_kg = 0.175", "head_mass_kg = '175 g'"),
+        "known.head_mass_kg",
+        "a number",
+    ),
+    "known NaN": (replace("head_mass_kg = 0.175", "head_mass_kg = nan"), "known.head_mass_kg", "finite"),
+    "unknown experiment": (
+        replace("static_loading", "tensile", 99),
+        "trial 1, experiment",
+        "'tensile' is unknown",
+    ),
+    "unknown key": (replace("repeat = 2", "repeat = 2\nspeed = 1"), "trial 2, speed", "unknown key"),
+    "misspelt actuator": (replace('"large"', '"big"'), "trial 1, actuator", "large, small"),
+    "misplaced actuator": (
+        replace('"anchor_pull"', '"anchor_pull"\nactuator = "small"'),
+        "trial 5, actuator",
+        "unknown key",
+    ),
+    "missing actuator": (replace('actuator = "large"\n', ""), "trial 1, actuator", "missing"),
+    "missing pressure": (replace("pressure_psi = 0.0\n", ""), "trial 1, pressure_psi", "missing"),
+    "pressure out of range": (replace("pressure_psi = 0.0", "pressure_psi = 85"), "trial 1, pressure_psi", "85"),
+    "pressure a word": (replace("pressure_psi = 0.0", "pressure_psi = '0'"), "trial 1, pressure_psi", "a number"),
+    "pressure a truth": (replace("pressure_psi = 0.0", "pressure_psi = true"), "trial 1, pressure_psi", "number"),
+    "pressure too long": (
+        replace("pressure_psi = 0.0", "pressure_psi = 1" + "0" * 400),
+        "trial 1, pressure_psi",
+        "finite",
+    ),
+    "rate zero": (replace("rate_mm_s = 2.0", "rate_mm_s = 0"), "trial 1, rate_mm_s", "above zero"),
+    "repeat zero": (replace("repeat = 1", "repeat = 0"), "trial 1, repeat", "0 is outside"),
+    "repeat a fraction": (replace("repeat = 1", "repeat = 1.0"), "trial 1, repeat", "whole number"),
+    "repeat twice": (replace("repeat = 2", "repeat = 1"), "trial 2, repeat", "listed before, in trial 1"),
+    "file twice": (
+        replace("static_loading_2.csv", "static_loading_1.csv"),
+        "trial 2, file",
+        "listed before",
+    ),
+    "file missing": (replace("locomotion_2.csv", "locomotion_9.csv"), "trial 8, file", "does not exist"),
+    "file not CSV": (replace("locomotion_2.csv", "dataset.toml"), "trial 8, file", "not a .csv"),
+    "file above": (replace("locomotion_2.csv", "../bench/locomotion_2.csv"), "trial 8, file", "outside"),
+    "file absolute": (replace("locomotion_2.csv", "/etc/locomotion_2.csv"), "trial 8, file", "outside"),
+    "file on a drive": (replace("locomotion_2.csv", "C:/locomotion_2.csv"), "trial 8, file", "outside"),
+    "file too long": (replace("locomotion_2.csv", "a" * 5000 + ".csv"), "trial 8, file", "cannot be opened"),
+    "file with NUL": (replace("locomotion_2.csv", "a\\u0000.csv"), "trial 8, file", "printable"),
+    "gait missing": (replace("[trial.gait]", "[trial.step]"), "trial 7, gait", "missing"),
+    "gait a word": (replace("period_s = 5.7", "period_s = 'slow'"), "trial 7, gait.period_s", "a number"),
+    "gait out of range": (replace("duty_body = 0.5", "duty_body = 50"), "trial 7, gait.duty_body", "0 to 1"),
+    "gait incomplete": (replace("duty_tail = 0.5\n", ""), "trial 7, gait.duty_tail", "missing"),
+    "gait unknown": (replace("duty_tail = 0.5\n", "duty_tail = 0.5\nduty = 1\n"), "trial 7, gait.duty", "unknown"),
+    "provenance a word": (replace("[provenance]\n", ""), "made_by", "unknown key"),
+}
+
+
+@pytest.mark.parametrize("kind", MALFORMED_TOML)
+def test_malformed_table_is_refused_with_its_place(folder, kind):
+    damage, column, words = MALFORMED_TOML[kind]
+    damage(folder)
+    with pytest.raises(DatasetError, match=re.escape(words)) as caught:
+        read_dataset(folder)
+    error = caught.value
+    assert error.file == "dataset.toml"
+    assert error.column == column
+    if "missing" not in words and column is not None:
+        named = (folder / "dataset.toml").read_text().split("\n")[error.line - 1]
+        assert column.rpartition(".")[2].rpartition(" ")[2] in named
+    if column is None:
+        assert "line 1" in str(error)
+
+
+@pytest.mark.parametrize("key", ["known", "provenance"])
+def test_a_list_in_place_of_a_table(tmp_path, key):
+    (tmp_path / "dataset.toml").write_text(f'format = 1\nname = "x"\n{key} = []\n')
+    with pytest.raises(DatasetError, match=f"line 3, {key}: must be a table, not a list"):
+        read_dataset(tmp_path)
+
+
+def test_no_trials(tmp_path):
+    (tmp_path / "dataset.toml").write_text('format = 1\nname = "x"\ntrial = []\n')
+    with pytest.raises(DatasetError, match="at least one"):
+        read_dataset(tmp_path)
+
+
+def test_inline_trials_are_named_by_number_where_no_line_is_certain(tmp_path):
+    (tmp_path / "dataset.toml").write_text('format = 1\nname = "x"\ntrial = [{ file = 1 }]\n')
+    with pytest.raises(DatasetError, match="trial 1, file: must be a string") as caught:
+        read_dataset(tmp_path)
+    assert caught.value.line is None
+
+
+def test_table_in_the_wrong_encoding(folder):
+    (folder / "dataset.toml").write_bytes(b'format = 1\nname = "\xff"\n')
+    with pytest.raises(DatasetError, match="line 2: byte 0xff is not UTF-8"):
+        read_dataset(folder)
+
+
+def test_no_table_and_no_folder(tmp_path):
+    with pytest.raises(DatasetError, match=r"dataset\.toml: cannot be read"):
+        read_dataset(tmp_path)
+    with pytest.raises(DatasetError, match="is not a folder"):
+        read_dataset(tmp_path / "nowhere")
+
+
+def test_links_may_not_leave_the_folder(folder, tmp_path):
+    outside = tmp_path / "outside.csv"
+    (folder / WALK).rename(outside)
+    (folder / WALK).symlink_to(outside)
+    with pytest.raises(DatasetError, match="link to a file outside"):
+        read_dataset(folder)
+    (folder / WALK).unlink()
+    (folder / WALK).symlink_to(WALK)
+    with pytest.raises(DatasetError, match=WALK):
+        read_dataset(folder)
+    (folder / WALK).unlink()
+    outside.rename(folder / "kept.csv")
+    (folder / WALK).symlink_to("kept.csv")
+    assert_same(read_dataset(folder), make_dataset())
+
+
+def test_a_folder_or_a_pipe_is_not_opened(folder):
+    (folder / WALK).unlink()
+    (folder / WALK).mkdir()
+    with pytest.raises(DatasetError, match="not a regular file"):
+        read_dataset(folder)
+    (folder / WALK).rmdir()
+    os.mkfifo(folder / WALK)
+    with pytest.raises(DatasetError, match="not a regular file"):
+        read_dataset(folder)
