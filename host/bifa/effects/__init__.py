@@ -1,0 +1,46 @@
+"""The library: what a real robot may do that the paper's model does not. One effect a file; adding one adds a file."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
+
+from bifa.effects.effect import Effect, EffectError, EffectParameter
+
+__all__ = ["Effect", "EffectError", "EffectParameter", "complete", "library", "modules"]
+
+_NOT_AN_EFFECT = "effect"
+
+
+@cache
+def modules() -> Mapping[str, object]:
+    """Each effect's module by the effect's name, in alphabetical order."""
+    names = sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name != _NOT_AN_EFFECT)
+    return MappingProxyType({name: importlib.import_module(f"{__name__}.{name}") for name in names})
+
+
+@cache
+def library() -> Mapping[str, Effect]:
+    """Every effect by name."""
+    return MappingProxyType({name: module.EFFECT for name, module in modules().items()})
+
+
+def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:
+    """An effect's parameters in full: those left out take their typical value. EffectError names the range."""
+    if name not in library():
+        raise EffectError(f"{name!r} is no effect of the library; it has {', '.join(library())}")
+    known = {parameter.name: parameter for parameter in library()[name].parameters}
+    unknown = [key for key in values if key not in known]
+    if unknown:
+        raise EffectError(f"{name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
+    full = {key: values.get(key, parameter.typical) for key, parameter in known.items()}
+    for key, value in full.items():
+        lower, upper, unit = known[key].lower, known[key].upper, known[key].unit
+        number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or not lower <= value <= upper:
+            raise EffectError(f"{name}.{key} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
+    return {key: float(value) for key, value in full.items()}

@@ -1,0 +1,25 @@
+"""The robot of the paper: parameters, stiffness, model files, gaits and the CPG (sections III and V.A)."""
+
+from bifa.robot.gait import BASELINE, Gait, GaitError, load_gait, save_gait
+from bifa.robot.model import Covariance, Model
+from bifa.robot.model_file import ModelFileError, load_model, nominal, save_model
+from bifa.robot.parameters import BASE_PARAMETERS, Parameter, ParameterError
+from bifa.robot.stiffness import StiffnessCurve
+
+__all__ = [
+    "BASELINE",
+    "BASE_PARAMETERS",
+    "Covariance",
+    "Gait",
+    "GaitError",
+    "Model",
+    "ModelFileError",
+    "Parameter",
+    "ParameterError",
+    "StiffnessCurve",
+    "load_gait",
+    "load_model",
+    "nominal",
+    "save_gait",
+    "save_model",
+]

@@ -1,0 +1,54 @@
+"""What every effect's file declares: an `EFFECT`, and functions named after the hooks where it acts.
+
+The hooks, their arguments and what they return are listed in `bifa.simulate.hooks`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bifa.errors import BifaError
+
+
+class EffectError(BifaError):
+    """An effect's name, parameter or value is wrong; the text gives the name and the range."""
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One number of an effect. `typical` is the size at which the effect is plainly visible on the paper's robot.
+
+    A `size` parameter is 0 when the effect is absent; the others only shape it.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    typical: float
+    meaning: str
+    size: bool = False
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical cause that the paper's model lacks.
+
+    `enters`: the equation and the place in it; `experiments`: where it can be seen at all;
+    `confusable_with`: effects whose signature is alike; `states`: numbers remembered for each actuator.
+    """
+
+    name: str
+    summary: str
+    equation: str
+    source: str
+    enters: str
+    experiments: tuple[str, ...]
+    confusable_with: tuple[str, ...]
+    parameters: tuple[EffectParameter, ...]
+    states: int = 0
+
+    @property
+    def sizes(self) -> tuple[EffectParameter, ...]:
+        """The parameters that are 0 when the effect is absent."""
+        return tuple(parameter for parameter in self.parameters if parameter.size)

@@ -1,0 +1,93 @@
+"""The calibrated model: base parameters, the two stiffness curves, active effects and their uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bifa import effects as library
+from bifa.robot.parameters import BASE_PARAMETERS, Parameter, ParameterError, check_bounds
+from bifa.robot.stiffness import StiffnessCurve
+
+GRAVITY_M_S2 = 9.80665
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Of some of the model's values: `matrix[i, j]` belongs to `names[i]`, `names[j]`."""
+
+    names: tuple[str, ...]
+    matrix: np.ndarray = field(repr=False)
+
+    def __post_init__(self):
+        matrix = np.asarray(self.matrix, dtype=float)
+        n = len(self.names)
+        if matrix.shape != (n, n) or not np.all(np.isfinite(matrix)) or not np.allclose(matrix, matrix.T):
+            raise ParameterError(f"the covariance of {n} parameters must be a symmetric {n} x {n} matrix of numbers")
+        object.__setattr__(self, "matrix", matrix)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A robot. Immutable: `with_values` and `with_effects` give changed copies, checked against the bounds.
+
+    `effects` maps an active effect's name to its parameters, e.g. {"hysteresis": {"force_N": 4.0, ...}}.
+    """
+
+    name: str
+    parameters: Mapping[str, Parameter]
+    body_stiffness: StiffnessCurve
+    small_stiffness: StiffnessCurve
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    covariance: Covariance | None = None
+    provenance: str = ""
+
+    def __post_init__(self):
+        missing = [name for name in BASE_PARAMETERS if name not in self.parameters]
+        unknown = [name for name in self.parameters if name not in BASE_PARAMETERS]
+        if missing or unknown:
+            what = f"lacks {', '.join(missing)}" if missing else f"has unknown parameters {', '.join(unknown)}"
+            raise ParameterError(f"model {self.name!r} {what}; known are {', '.join(BASE_PARAMETERS)}")
+        for parameter in self.parameters.values():
+            check_bounds(parameter.name, parameter.value, parameter.lower, parameter.upper, parameter.unit)
+        object.__setattr__(self, "effects", {name: library.complete(name, v) for name, v in self.effects.items()})
+        if self.covariance is not None:
+            for name in self.covariance.names:
+                self[name]
+
+    def __getitem__(self, name: str) -> float:
+        """A value by its name: `mu_k`, or `hysteresis.force_N` for an active effect's."""
+        if name in self.parameters:
+            return self.parameters[name].value
+        effect, _, parameter = name.partition(".")
+        try:
+            return self.effects[effect][parameter]
+        except KeyError:
+            raise ParameterError(f"model {self.name!r} has no parameter {name!r}") from None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every value by name, those of active effects as `effect.parameter`."""
+        base = {name: parameter.value for name, parameter in self.parameters.items()}
+        return base | {f"{e}.{p}": value for e, values in self.effects.items() for p, value in values.items()}
+
+    def with_values(self, values: Mapping[str, float], covariance: Covariance | None = None) -> Model:
+        """A copy with some values changed; naming an effect's parameter makes the effect active."""
+        parameters = dict(self.parameters)
+        effects = {name: dict(v) for name, v in self.effects.items()}
+        for name, value in values.items():
+            if name in parameters:
+                parameters[name] = parameters[name].with_value(value, sd=parameters[name].sd)
+            elif "." in name:
+                effect, _, parameter = name.partition(".")
+                effects.setdefault(effect, {})[parameter] = value
+            else:
+                raise ParameterError(f"{name!r} is no parameter; known are {', '.join(BASE_PARAMETERS)}")
+        return replace(self, parameters=parameters, effects=effects, covariance=covariance or self.covariance)
+
+    def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Model:
+        """A copy with exactly these effects active; parameters left out take their typical values."""
+        kept = self.covariance
+        return replace(self, effects=effects, covariance=kept if effects.keys() == self.effects.keys() else None)

@@ -1,0 +1,130 @@
+"""Model files: TOML, format 1, read strictly."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from bifa.errors import BifaError
+from bifa.robot.model import Covariance, Model
+from bifa.robot.parameters import BASE_PARAMETERS
+from bifa.robot.stiffness import StiffnessCurve
+
+FORMAT = 1
+
+
+class ModelFileError(BifaError):
+    """A model file is not usable; the text gives file, name and range."""
+
+
+def nominal() -> Model:
+    """The set that reproduces the paper's figures, shipped with the package."""
+    return _parse(resources.files("bifa.robot").joinpath("nominal.toml").read_text("utf-8"), "nominal.toml")
+
+
+def load_model(path: str | Path) -> Model:
+    """Read a model file. ModelFileError for another format, unknown or missing names, values out of range."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelFileError(f"cannot read the model {path}: {error}") from None
+    return _parse(text, str(path))
+
+
+def save_model(path: str | Path, model: Model) -> None:
+    """Write a model file that `load_model` reads back to the same numbers."""
+    document: dict = {"format": FORMAT, "name": model.name}
+    if model.provenance:
+        document["provenance"] = model.provenance
+    document["parameters"] = {name: _entry(parameter) for name, parameter in model.parameters.items()}
+    document["stiffness"] = {"body": _curve(model.body_stiffness), "small": _curve(model.small_stiffness)}
+    if model.effects:
+        document["effects"] = {name: dict(values) for name, values in model.effects.items()}
+    if model.covariance is not None:
+        covariance = model.covariance
+        document["covariance"] = {"names": list(covariance.names), "matrix": covariance.matrix.tolist()}
+    Path(path).write_bytes(tomli_w.dumps(document).encode())
+
+
+def _entry(parameter) -> dict:
+    entry = {"value": parameter.value, "unit": parameter.unit, "source": parameter.source}
+    return entry if parameter.sd is None else entry | {"sd": parameter.sd}
+
+
+def _curve(curve: StiffnessCurve) -> dict:
+    return {"lower_m": curve.lower_m, "upper_m": curve.upper_m, "coefficients": list(curve.coefficients)}
+
+
+def _parse(text: str, where: str) -> Model:
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ModelFileError(f"{where} is not TOML: {error}") from None
+    if document.get("format") != FORMAT:
+        raise ModelFileError(f"{where}: format {document.get('format')!r}; this version reads format {FORMAT}")
+    try:
+        return _build(document)
+    except BifaError as error:
+        raise ModelFileError(f"{where}: {error}") from None
+
+
+def _build(document: dict) -> Model:
+    _only(document, "the file", {"format", "name", "parameters", "stiffness"}, {"provenance", "effects", "covariance"})
+    _only(document["stiffness"], "stiffness", {"body", "small"})
+    entries = document["parameters"]
+    _only(entries, "parameters", set(BASE_PARAMETERS))
+    covariance = document.get("covariance")
+    if covariance is not None:
+        _only(covariance, "covariance", {"names", "matrix"})
+        try:
+            covariance = Covariance(tuple(covariance["names"]), np.array(covariance["matrix"], dtype=float))
+        except (TypeError, ValueError):
+            raise ModelFileError("covariance.matrix must be rows of numbers, as many as names") from None
+    effects = document.get("effects", {})
+    if not all(isinstance(values, dict) for values in effects.values()):
+        raise ModelFileError("effects must be tables of parameters, such as [effects.hysteresis]")
+    return Model(
+        name=str(document["name"]),
+        parameters={name: _parameter(name, entries[name]) for name in BASE_PARAMETERS},
+        body_stiffness=_read_curve("body", document["stiffness"]["body"]),
+        small_stiffness=_read_curve("small", document["stiffness"]["small"]),
+        effects=effects,
+        covariance=covariance,
+        provenance=str(document.get("provenance", "")),
+    )
+
+
+def _parameter(name: str, entry: dict):
+    base = BASE_PARAMETERS[name]
+    _only(entry, f"parameters.{name}", {"value"}, {"unit", "source", "sd"})
+    if entry.get("unit", base.unit) != base.unit:
+        raise ModelFileError(f"parameters.{name} is in {base.unit!r}, not {entry['unit']!r}")
+    sd = entry.get("sd")
+    if sd is not None and not (isinstance(sd, (int, float)) and np.isfinite(sd) and sd >= 0):
+        raise ModelFileError(f"parameters.{name}.sd must be a number not below 0")
+    return base.with_value(entry["value"], sd=sd, source=str(entry.get("source", base.source)))
+
+
+def _read_curve(name: str, entry: dict) -> StiffnessCurve:
+    _only(entry, f"stiffness.{name}", {"lower_m", "upper_m", "coefficients"})
+    try:
+        coefficients = tuple(float(value) for value in entry["coefficients"])
+        curve = StiffnessCurve(coefficients, float(entry["lower_m"]), float(entry["upper_m"]))
+    except (TypeError, ValueError):
+        raise ModelFileError(f"stiffness.{name} must hold numbers") from None
+    curve.equilibria_m  # noqa: B018 - a curve that is not bistable is refused here, with its reason
+    return curve
+
+
+def _only(table: dict, where: str, required: set[str], optional: set[str] = frozenset()) -> None:
+    if not isinstance(table, dict):
+        raise ModelFileError(f"{where} must be a table")
+    unknown = sorted(set(table) - required - optional)
+    missing = sorted(required - set(table))
+    if unknown or missing:
+        what = f"does not know {', '.join(unknown)}" if unknown else f"lacks {', '.join(missing)}"
+        raise ModelFileError(f"{where} {what}; it has {', '.join(sorted(required | optional))}")

@@ -1,0 +1,78 @@
+"""The model's named values: unit, bounds and source of each (paper, sections III and IV).
+
+The paper prints no table of identified parameters. Where the source says "found to reproduce", the value was
+searched so that everything the paper does report in numbers comes out (docs/model.md, `bifa paper`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from bifa.errors import BifaError
+
+
+class ParameterError(BifaError):
+    """A parameter's name, bounds or value is wrong; the text gives the name and the range."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One value of the model in SI units (pressures in psi, as everywhere in the paper).
+
+    `lower` and `upper` bound what can be computed and fitted, `plausible` what a sane robot would show,
+    `sd` is the standard deviation from a fit (None: not fitted).
+    """
+
+    name: str
+    value: float
+    unit: str
+    lower: float
+    upper: float
+    plausible: tuple[float, float]
+    meaning: str
+    source: str
+    sd: float | None = None
+
+    def with_value(self, value: float, sd: float | None = None, source: str | None = None) -> Parameter:
+        """The same parameter with another value; ParameterError when it is outside the bounds."""
+        check_bounds(self.name, value, self.lower, self.upper, self.unit)
+        return replace(self, value=float(value), sd=sd, source=self.source if source is None else source)
+
+
+def check_bounds(name: str, value: float, lower: float, upper: float, unit: str = "") -> None:
+    """Raise ParameterError naming the range unless `value` is a finite number within it."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not math.isfinite(value) or not lower <= value <= upper:
+        raise ParameterError(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
+
+
+_SEARCHED = "found to reproduce the paper's reported speeds and forces"
+
+
+def _row(name, value, unit, lower, upper, plausible, meaning, source):
+    return name, Parameter(name, value, unit, lower, upper, plausible, meaning, source)
+
+
+BASE_PARAMETERS: dict[str, Parameter] = dict(
+    [
+        _row("head_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_h (4)", "paper: 350 g, a half each"),
+        _row("tail_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_t (4)", "paper: 350 g, a half each"),
+        _row("body_damping_Ns_m", 130.0, "N s/m", 10.0, 1000.0, (60.0, 260.0), "b_b (1)", _SEARCHED),
+        _row("body_area_N_psi", 9.0, "N/psi", 2.0, 25.0, (7.0, 12.0), "a of the body (2)", _SEARCHED),
+        _row("body_alpha_n_per_s", 2.0, "1/s", 0.1, 20.0, (1.2, 3.5), "alpha_n of the body (3)", _SEARCHED),
+        _row("body_alpha_s_per_s", 0.575, "1/s", 0.05, 10.0, (0.35, 1.0), "alpha_s of the body (3)", _SEARCHED),
+        _row("small_mass_kg", 0.015, "kg", 0.002, 0.2, (0.007, 0.03), "m of a small actuator (1)", _SEARCHED),
+        _row("small_damping_Ns_m", 15.0, "N s/m", 1.0, 200.0, (7.0, 30.0), "b, small (1)", _SEARCHED),
+        _row("small_area_N_psi", 3.2021838525, "N/psi", 0.5, 10.0, (2.4, 4.3), "a, small (2)", _SEARCHED),
+        _row("small_alpha_n_per_s", 2.3, "1/s", 0.1, 20.0, (1.4, 4.0), "alpha_n, small (3)", _SEARCHED),
+        _row("small_alpha_s_per_s", 0.8, "1/s", 0.05, 10.0, (0.45, 1.4), "alpha_s, small (3)", _SEARCHED),
+        _row("wall_offset_m", 0.0278019066198, "m", 0.015, 0.034, (0.0262, 0.0291), "x_w (8)", _SEARCHED),
+        _row("wall_stiffness_N_m", 8000.0, "N/m", 300.0, 1e5, (3000.0, 2e4), "k_w (8)", _SEARCHED),
+        _row("wall_damping_Ns_m", 20.0, "N s/m", 0.0, 500.0, (0.0, 80.0), "b_w (8)", _SEARCHED),
+        _row("mu_s", 0.45, "", 0.02, 2.0, (0.3, 0.65), "static friction (5)", _SEARCHED),
+        _row("mu_k", 0.38, "", 0.02, 2.0, (0.25, 0.55), "kinetic friction (5)", _SEARCHED),
+        _row("supply_positive_psi", 8.5, "psi", 0.0, 14.0, (7.5, 9.5), "positive supply", "paper, section V.B"),
+        _row("supply_negative_psi", -13.0, "psi", -14.7, 0.0, (-14.0, -12.0), "vacuum", "paper, section V.B"),
+    ]
+)

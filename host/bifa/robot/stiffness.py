@@ -1,0 +1,99 @@
+"""K(x) of the bistable spring: a 15th-degree polynomial, and what holds outside the range it was fitted on.
+
+In metres such a polynomial has a Vandermonde condition of 3e24, in the normalised coordinate
+z = 2 (x - lower)/(upper - lower) - 1 of 2e5: so the coefficients are those of z.
+The robot leaves the range of a static test (-5.3 mm under vacuum, 57.9 mm at 8.5 psi, against stable states at
+0.2 and 53.6 mm), where a polynomial is worth nothing: beyond `lower` and `upper` the curve goes on straight, with
+the slope that it has there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import brentq
+
+from bifa.robot.parameters import ParameterError
+
+DEGREE = 15
+_SCAN_POINTS = 4001
+
+
+@dataclass(frozen=True)
+class StiffnessCurve:
+    """K(x) in N over x in m; `coefficients` ascend in powers of z, at most 16 of them."""
+
+    coefficients: tuple[float, ...]
+    lower_m: float
+    upper_m: float
+
+    def __post_init__(self):
+        numbers = [*self.coefficients, self.lower_m, self.upper_m]
+        if not 2 <= len(self.coefficients) <= DEGREE + 1 or not np.all(np.isfinite(numbers)):
+            raise ParameterError(f"a stiffness curve has 2 to {DEGREE + 1} finite coefficients")
+        if not self.lower_m < self.upper_m:
+            raise ParameterError(
+                f"a stiffness curve needs lower_m < upper_m, not {self.lower_m:g} and {self.upper_m:g}"
+            )
+
+    def force(self, x_m):
+        """K(x) in N, elementwise, with the straight continuation."""
+        x = np.asarray(x_m, dtype=float)
+        inside = np.clip(x, self.lower_m, self.upper_m)
+        return self._polynomial(self._z(inside)) + self.slope(inside) * (x - inside)
+
+    def slope(self, x_m):
+        """dK/dx in N/m, elementwise."""
+        inside = np.clip(np.asarray(x_m, dtype=float), self.lower_m, self.upper_m)
+        return self._polynomial.deriv()(self._z(inside)) * 2.0 / (self.upper_m - self.lower_m)
+
+    @cached_property
+    def equilibria_m(self) -> tuple[float, float, float]:
+        """Contracted stable, unstable (x_th of eq. (3)) and extended stable point.
+
+        The outer zeros of K that rise, and the falling one between them. ParameterError if K is not bistable.
+        """
+        x = np.linspace(self.lower_m, self.upper_m, _SCAN_POINTS)
+        force = self.force(x)
+        crossings = np.flatnonzero((force[:-1] < 0) != (force[1:] < 0))
+        roots = [(brentq(lambda s: float(self.force(s)), x[i], x[i + 1], xtol=1e-14), force[i] < 0) for i in crossings]
+        rising = [root for root, up in roots if up]
+        falling = [root for root, up in roots if not up]
+        between = [root for root in falling if rising and rising[0] < root < rising[-1]]
+        if len(rising) < 2 or not between:
+            raise ParameterError(
+                "the stiffness curve is not bistable: it needs a stable, an unstable and a stable point"
+            )
+        return rising[0], between[len(between) // 2], rising[-1]
+
+    @property
+    def contracted_m(self) -> float:
+        return self.equilibria_m[0]
+
+    @property
+    def unstable_m(self) -> float:
+        return self.equilibria_m[1]
+
+    @property
+    def extended_m(self) -> float:
+        return self.equilibria_m[2]
+
+    @property
+    def stroke_m(self) -> float:
+        """Travel between the stable states."""
+        return self.extended_m - self.contracted_m
+
+    @property
+    def peaks(self) -> tuple[float, float]:
+        """Greatest resistance in N while extending (positive) and contracting (negative)."""
+        force = self.force(np.linspace(self.contracted_m, self.extended_m, _SCAN_POINTS))
+        return float(force.max()), float(force.min())
+
+    @cached_property
+    def _polynomial(self) -> np.polynomial.Polynomial:
+        return np.polynomial.Polynomial(self.coefficients)
+
+    def _z(self, x):
+        return 2.0 * (x - self.lower_m) / (self.upper_m - self.lower_m) - 1.0
