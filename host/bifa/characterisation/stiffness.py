@@ -1,0 +1,222 @@
+"""The stiffness curve K of eq. (1) from a static test: a 15th-degree polynomial (paper, IV.A.1).
+
+The paper fits NumPy's polynomial to the data at 0 psi. Two things need more care than it tells:
+
+* in metres the Vandermonde matrix of degree 15 has a condition of 3e24, so the curve is held in Chebyshev
+  polynomials of the normalised coordinate z = 2 (x - lower) / (upper - lower) - 1;
+* the model uses K outside the range that the testing machine covered (under vacuum the actuator folds by some 5 mm
+  more than contracted). There the fit alone runs off, so the continuation gets a broad prior on its curvature and may
+  not turn downwards; equilibria seen in step responses then pin it down (`StiffnessFit.with_equilibria`).
+
+The fit is a Gaussian posterior, so it carries the uncertainty of every point of the curve with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.optimize import LinearConstraint, minimize
+
+from .errors import TooLittleData
+
+DEGREE = 15
+CONTINUATION = 0.14  # of the static range, on either side: where equilibria under vacuum and pressure lie
+_PRIOR_POINTS = 6  # on either side
+_MIN_POINTS = 4 * (DEGREE + 1)
+
+
+@dataclass(frozen=True)
+class StiffnessFit:
+    """A posterior over stiffness curves.
+
+    lower_m, upper_m: where the polynomial holds; beyond them the model continues in a straight line.
+    covered_m: the displacements that the testing machine covered.
+    coefficients: Chebyshev coefficients in z [N], shape (16,).
+    information: the inverse of their covariance [1/N^2], shape (16, 16).
+    residual_N: RMS of the data about the curve, hysteresis included.
+    """
+
+    lower_m: float
+    upper_m: float
+    covered_m: tuple[float, float]
+    coefficients: np.ndarray
+    information: np.ndarray
+    residual_N: float
+
+    def force(self, x: np.ndarray) -> np.ndarray:
+        """K(x) [N] at displacements x [m], between lower_m and upper_m."""
+        return self._rows(x) @ self.coefficients
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """K'(x) [N/m]."""
+        return self._rows(x, derivative=1) @ self.coefficients
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of the coefficients [N^2], shape (16, 16)."""
+        return np.linalg.pinv(self.information, hermitian=True)
+
+    def force_sd(self, x: np.ndarray) -> np.ndarray:
+        """Standard deviation of K(x) [N]."""
+        rows = self._rows(x)
+        return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, self.covariance, rows), 0.0))
+
+    def mean_force_sd(self, x: np.ndarray) -> float:
+        """Standard deviation of the mean of K over the points x [N]."""
+        row = self._rows(x).mean(axis=0)
+        return float(np.sqrt(max(row @ self.covariance @ row, 0.0)))
+
+    def monomial(self) -> np.ndarray:
+        """Coefficients of 1, z, z^2 ... [N], shape (16,): the form that a model file holds."""
+        return chebyshev.cheb2poly(self.coefficients)
+
+    def unstable_m(self) -> float:
+        """The unstable equilibrium, eq. (3)'s threshold: where K falls through 0 between the stable states."""
+        x = np.linspace(*self.covered_m, 2001)
+        force = self.force(x)
+        falling = np.flatnonzero((force[:-1] > 0) & (force[1:] <= 0))
+        if not len(falling):
+            raise TooLittleData("the curve does not fall through 0 between its ends: the actuator is not bistable")
+        i = falling[0]
+        return float(x[i] + (x[i + 1] - x[i]) * force[i] / (force[i] - force[i + 1]))
+
+    def with_equilibria(self, x: Sequence[float], force_N: Sequence[float], sd_N: Sequence[float]) -> StiffnessFit:
+        """The posterior after seeing that the actuator rests at x [m] under a pressure force [N] known to sd [N]."""
+        rows = self._rows(np.asarray(x)) / np.asarray(sd_N)[:, None]
+        information = self.information + rows.T @ rows
+        target = self.information @ self.coefficients + rows.T @ (np.asarray(force_N) / np.asarray(sd_N))
+        coefficients = _solve_monotone(information, target, self._outside_slopes())
+        return StiffnessFit(
+            self.lower_m, self.upper_m, self.covered_m, coefficients, information, self.residual_N
+        )
+
+    def shapes(self) -> np.ndarray:
+        """Ways in which the curve may still change, each by one standard deviation, the least certain one first.
+
+        Shape (16, 16): row j holds Chebyshev coefficients [N]. Any curve is `coefficients + z @ shapes()`, and the data
+        so far say that z has zero mean and unit covariance: the coordinate for a joint refinement.
+        """
+        values, vectors = np.linalg.eigh(self.covariance)
+        shapes = (vectors * np.sqrt(np.maximum(values, 0.0))).T[::-1]
+        # A sign for each, so that the coordinates do not depend on the linear algebra library.
+        signs = np.sign(shapes[np.arange(len(shapes)), np.argmax(np.abs(shapes), axis=1)])
+        return shapes * signs[:, None]
+
+    def _rows(self, x: np.ndarray, derivative: int = 0) -> np.ndarray:
+        return _rows(x, self.lower_m, self.upper_m, derivative)
+
+    def _outside_slopes(self) -> np.ndarray:
+        return self._rows(_outside(self.lower_m, self.upper_m, self.covered_m), derivative=1)
+
+
+def fit_stiffness(
+    displacement_m: np.ndarray,
+    force_N: np.ndarray,
+    loading: np.ndarray,
+    *,
+    reach_m: tuple[float, float] | None = None,
+) -> StiffnessFit:
+    """Fit K to static data at 0 psi, loading and unloading weighted alike wherever they lie, so that the curve runs
+    through the middle of the hysteresis.
+
+    displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
+    reach_m: the least and greatest displacement that the curve will be asked for, if known.
+
+    Raises TooLittleData if there are too few points or they cover next to nothing.
+    """
+    x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
+    if len(x) < _MIN_POINTS:
+        raise TooLittleData(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
+    covered = (float(x.min()), float(x.max()))
+    width = covered[1] - covered[0]
+    if width < 1e-3:
+        raise TooLittleData(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be had from it")
+    lower, upper = covered[0] - CONTINUATION * width, covered[1] + CONTINUATION * width
+    if reach_m is not None:
+        lower, upper = min(lower, reach_m[0] - 0.01 * width), max(upper, reach_m[1] + 0.01 * width)
+
+    rows, weight = _rows(x, lower, upper), _even_weights(x, np.asarray(loading, bool))
+    scaled = rows * np.sqrt(weight)[:, None]
+    first = np.linalg.lstsq(scaled, force * np.sqrt(weight), rcond=None)[0]
+    residual = force - rows @ first
+    variance = float(np.average(residual**2, weights=weight)) * _correlation_length(residual)
+
+    outside = _outside(lower, upper, covered)
+    # Over the continuation's width the force may bend by twice the greatest force seen inside.
+    bend = 4.0 * np.abs(force).max() / max(covered[0] - lower, upper - covered[1]) ** 2
+    prior = _rows(outside, lower, upper, derivative=2) / bend
+    information = scaled.T @ scaled / max(variance, 1e-12) + prior.T @ prior
+    target = scaled.T @ (force * np.sqrt(weight)) / max(variance, 1e-12)
+    coefficients = _solve_monotone(information, target, _rows(outside, lower, upper, derivative=1))
+    final = force - rows @ coefficients
+    return StiffnessFit(
+        lower, upper, covered, coefficients, information, float(np.sqrt(np.average(final**2, weights=weight)))
+    )
+
+
+def _rows(x: np.ndarray, lower: float, upper: float, derivative: int = 0) -> np.ndarray:
+    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16)."""
+    to_z = 2.0 / (upper - lower)
+    z = (np.atleast_1d(x) - lower) * to_z - 1.0
+    if not derivative:
+        return chebyshev.chebvander(z, DEGREE)
+    differentiated = chebyshev.chebder(np.eye(DEGREE + 1), m=derivative)
+    return chebyshev.chebvander(z, DEGREE - derivative) @ differentiated * to_z**derivative
+
+
+def _outside(lower: float, upper: float, covered: tuple[float, float]) -> np.ndarray:
+    return np.concatenate(
+        [np.linspace(lower, covered[0], _PRIOR_POINTS), np.linspace(covered[1], upper, _PRIOR_POINTS)]
+    )
+
+
+def _even_weights(x: np.ndarray, loading: np.ndarray, bins: int = 100) -> np.ndarray:
+    """Weights of mean 1 with which each branch counts alike at every displacement that both cover."""
+    place = np.minimum(((x - x.min()) / np.ptp(x) * bins).astype(int), bins - 1)
+    up = np.bincount(place[loading], minlength=bins)
+    down = np.bincount(place[~loading], minlength=bins)
+    both = (up > 0) & (down > 0)
+    total = up + down
+    share = np.where(both, total / 2.0, total)
+    weight = np.where(loading, share[place] / np.maximum(up[place], 1), share[place] / np.maximum(down[place], 1))
+    return weight / weight.mean()
+
+
+def _correlation_length(residual: np.ndarray, longest: int = 200) -> float:
+    """By how much serial correlation inflates the variance of an average: 1 for white noise (Geyer's initial
+    positive sequence: sum the autocorrelation until it first falls to 0)."""
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return 1.0
+    total = 1.0
+    for lag in range(1, min(longest, len(centred) // 4)):
+        correlation = float(centred[:-lag] @ centred[lag:]) / power
+        if correlation <= 0.0:
+            break
+        total += 2.0 * correlation
+    return total
+
+
+def _solve_monotone(information: np.ndarray, target: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Minimise c'Ac/2 - b'c subject to slopes @ c >= 0: the continuation may not turn back."""
+    free = np.linalg.solve(information, target)
+    if (slopes @ free >= 0.0).all():
+        return free
+    root = np.linalg.cholesky(information)  # whitened, the problem is round
+    inverse = np.linalg.inv(root.T)
+    centre = root.T @ free
+    turned = slopes @ inverse
+    scale = np.abs(turned).max()
+    solution = minimize(
+        lambda y: 0.5 * np.sum((y - centre) ** 2),
+        centre,
+        jac=lambda y: y - centre,
+        constraints=LinearConstraint(turned / scale, 0.0, np.inf),
+        method="SLSQP",
+        options={"maxiter": 200, "ftol": 1e-12},
+    )
+    return inverse @ solution.x
