@@ -1,0 +1,64 @@
+"""`bifa check`: what is in a data set, pictures of it, and what looks wrong."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Offer the command `check`."""
+
+    @app.command(epilog="Examples:  bifa check bench-2026-11-21   |   bifa check bench-2026-11-21 --plots pictures")
+    def check(
+        dataset: Annotated[Path, typer.Argument(help="The data set's folder.", show_default=False)],
+        plots: Annotated[Path | None, typer.Option(help="Folder for the pictures; DATASET-plots if left out.")] = None,
+        no_plots: Annotated[bool, typer.Option("--no-plots", help="Draw nothing.")] = False,
+        strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 where anything is found.")] = False,
+    ) -> None:
+        """Say what is in a data set, plot it, and point out what looks wrong.
+
+        A malformed data set ends with status 2 and names file, line and column. What is well-formed but
+        doubtful (a clipped sensor, a clock that jumps, missing repeats) is listed as a warning, status 0.
+        """
+        from rich.console import Console
+
+        from bifa.data import read_dataset
+        from bifa.data.check import check_dataset
+        from bifa.data.plots import plot_dataset
+
+        console = Console()
+        with console.status("reading"):
+            content = read_dataset(dataset)
+            findings = check_dataset(content)
+        console.print(_contents(content))
+        for finding in findings:
+            console.print(f"[yellow]warning[/yellow] \\[{finding.kind}] ", end="")
+            console.print(str(finding), markup=False, highlight=False)
+        if not findings:
+            console.print("Nothing looks wrong.")
+        if not no_plots:
+            target = plots or dataset.resolve().with_name(dataset.resolve().name + "-plots")
+            with console.status("drawing"):
+                written = plot_dataset(content, target)
+            console.print(f"{len(written)} pictures in {target}", highlight=False)
+        if strict and findings:
+            raise typer.Exit(1)
+
+
+def _contents(dataset):
+    from rich.table import Table
+
+    title = f"{dataset.name}: {len(dataset.trials)} trials"
+    table = Table(title=title, title_justify="left", caption_justify="left")
+    for heading in ("experiment and settings", "repeats", "samples", "rate [Hz]", "duration [s]"):
+        table.add_column(heading, justify="left" if heading.startswith("exp") else "right")
+    for group in dataset.repeats():
+        samples = [len(trial.time_s) for trial in group]
+        rates = [trial.rate_hz for trial in group]
+        seconds = sum(float(trial.time_s[-1] - trial.time_s[0]) for trial in group)
+        repeats = ", ".join(str(trial.repeat) for trial in group)
+        table.add_row(group[0].label, repeats, f"{sum(samples)}", f"{sum(rates) / len(rates):.1f}", f"{seconds:.1f}")
+    known = ", ".join(f"{name} = {value:g}" for name, value in dataset.known.items()) or "nothing"
+    table.caption = f"known beforehand: {known}"
+    return table

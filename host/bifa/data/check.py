@@ -1,0 +1,204 @@
+"""What looks wrong in a data set that is well-formed: findings to look at before anything is fitted."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .dataset import Dataset, Trial
+from .layout import EXPERIMENTS, is_command
+
+SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
+ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, where 10-90 % of the supply spans 30 psi
+REPEATS_WANTED = 3  # as in the paper's section IV
+MOTION_MM = 1.0  # less than this is no experiment of this robot (strokes of 30 and 54 mm)
+FLAT_SAMPLES = 8  # equal extremes in a row, in a channel that otherwise never repeats a value
+SPIKE_MM = 5.0  # there and back within two samples; a snap-through goes there only
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing to look at. `file` is None where it concerns the whole data set; `line` is that of the CSV file."""
+
+    kind: str
+    text: str
+    file: str | None = None
+    line: int | None = None
+    column: str | None = None
+
+    def __str__(self) -> str:
+        place = [self.file, f"line {self.line}" if self.line else None, self.column]
+        where = ", ".join(part for part in place if part)
+        return f"{where}: {self.text}" if where else self.text
+
+
+def check_dataset(dataset: Dataset) -> list[Finding]:
+    """Every finding, those of single trials first, in the order of the data set."""
+    findings = [found for trial in dataset.trials for check in TRIAL_CHECKS for found in check(trial)]
+    return findings + [found for check in DATASET_CHECKS for found in check(dataset)]
+
+
+def _line(row: int) -> int:
+    return int(row) + 2
+
+
+def _saturated_pressure(trial: Trial) -> Iterator[Finding]:
+    for name, values in trial.columns.items():
+        if not name.startswith("pressure"):
+            continue
+        low, high = ADC_LIMITS_PSI
+        rows = np.flatnonzero((values <= low) | (values >= high))
+        if rows.size:
+            text = f"{rows.size} samples at the ADC's limit of {high:g} psi: saturated, or the sensor is broken"
+            yield Finding("saturated", text, trial.file, _line(rows[0]), name)
+            continue
+        rows = np.flatnonzero(np.abs(values) > SENSOR_SPAN_PSI)
+        if rows.size:
+            worst = values[rows][np.argmax(np.abs(values[rows]))]
+            text = f"{rows.size} samples beyond the sensor's +-{SENSOR_SPAN_PSI:g} psi, up to {worst:.2f}"
+            yield Finding("clipped", text, trial.file, _line(rows[0]), name)
+
+
+def _clipped_instrument(trial: Trial) -> Iterator[Finding]:
+    """A flat top in displacement or force: the same extreme value again and again, where noise repeats nothing."""
+    for name, values in trial.columns.items():
+        if not name.startswith(("displacement", "force")):
+            continue
+        same = np.diff(values) == 0
+        for extreme in (values.max(), values.min()):
+            flat = same & (values[1:] == extreme)
+            row, length = _longest_run(flat)
+            elsewhere = np.mean(same[~flat]) if (~flat).any() else 1.0
+            if length >= FLAT_SAMPLES and elsewhere < 0.05:
+                text = f"{length + 1} samples in a row read exactly {extreme:g}: the sensor is clipped"
+                yield Finding("clipped", text, trial.file, _line(row), name)
+
+
+def _longest_run(flags: np.ndarray) -> tuple[int, int]:
+    """First index and length of the longest run of true; (0, 0) where there is none."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    starts, ends = edges[::2], edges[1::2]
+    if not starts.size:
+        return 0, 0
+    longest = int(np.argmax(ends - starts))
+    return int(starts[longest]), int(ends[longest] - starts[longest])
+
+
+def _stuck_channel(trial: Trial) -> Iterator[Finding]:
+    for name, values in trial.columns.items():
+        if name != "time_s" and not is_command(name) and np.ptp(values) == 0:
+            yield Finding("stuck", f"every sample reads {values[0]:g}: not connected?", trial.file, column=name)
+
+
+def _spikes(trial: Trial) -> Iterator[Finding]:
+    for name, values in trial.columns.items():
+        if not name.startswith("displacement"):
+            continue
+        step = np.diff(values)
+        there, back = step[:-1], step[1:]
+        rows = np.flatnonzero((there * back < 0) & (np.minimum(np.abs(there), np.abs(back)) > SPIKE_MM)) + 1
+        if rows.size:
+            text = f"{rows.size} single samples jump by over {SPIKE_MM:g} mm and back: lost markers?"
+            yield Finding("spike", text, trial.file, _line(rows[0]), name)
+
+
+def _clock(trial: Trial) -> Iterator[Finding]:
+    step = np.diff(trial.time_s)
+    nominal = 1.0 / trial.nominal_rate_hz
+    median = float(np.median(step))
+    if abs(median / nominal - 1) > 0.05:
+        text = f"sampled at {1 / median:.1f} Hz where the format says {trial.nominal_rate_hz:g} Hz"
+        yield Finding("rate", text, trial.file, column="time_s")
+    rows = np.flatnonzero(step > 1.5 * median)
+    if rows.size:
+        missing = int(np.round(step[rows] / median - 1).sum())
+        text = f"the clock jumps {rows.size} times, by up to {step[rows].max():.3f} s; about {missing} samples missing"
+        yield Finding("clock jump", text, trial.file, _line(rows[0] + 1), "time_s")
+    rows = np.flatnonzero(step < 0.5 * median)
+    if rows.size:
+        text = f"{rows.size} samples follow within half a sampling period, the closest after {step[rows].min():.6f} s"
+        yield Finding("clock jump", text, trial.file, _line(rows[0] + 1), "time_s")
+
+
+def _no_motion(trial: Trial) -> Iterator[Finding]:
+    for name, values in trial.columns.items():
+        if name.startswith("displacement") and np.ptp(values) < MOTION_MM:
+            text = f"moves by {np.ptp(values):.3f} mm only: nothing happened in this trial"
+            yield Finding("no motion", text, trial.file, column=name)
+
+
+def _no_command(trial: Trial) -> Iterator[Finding]:
+    for name, values in trial.columns.items():
+        if is_command(name) and np.ptp(values) == 0:
+            yield Finding("no command", f"stays {values[0]:g} throughout", trial.file, column=name)
+
+
+def _start(trial: Trial) -> Iterator[Finding]:
+    """Trials begin contracted (displacement 0); a step response begins under vacuum."""
+    for name, values in trial.columns.items():
+        if name.startswith("displacement") and abs(values[0]) > 2.0 + 0.1 * np.ptp(values):
+            text = f"begins at {values[0]:.2f} mm: displacement is 0 at the contracted state"
+            yield Finding("start", text, trial.file, 2, name)
+    if trial.experiment == "step_response" and trial.columns["command"][0] != 0:
+        yield Finding("start", "begins under pressure, not under vacuum", trial.file, 2, "command")
+
+
+def _commanded_pressure(trial: Trial) -> Iterator[Finding]:
+    if trial.experiment not in ("static_loading", "anchor_pull") or trial.pressure_psi is None:
+        return
+    measured = float(np.mean(trial.columns["pressure_psi"]))
+    if abs(measured - trial.pressure_psi) > max(1.0, 0.15 * abs(trial.pressure_psi)):
+        text = f"{measured:.2f} psi on average where {trial.pressure_psi:g} psi was commanded"
+        yield Finding("pressure", text, trial.file, column="pressure_psi")
+
+
+def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
+    for group in dataset.repeats():
+        numbers = sorted(trial.repeat for trial in group)
+        absent = sorted(set(range(1, max(*numbers, REPEATS_WANTED) + 1)) - set(numbers))
+        if absent:
+            why = "the noise floor cannot be had from it" if len(group) == 1 else "the noise floor is less certain"
+            text = f"{group[0].label}: repeat {', '.join(map(str, absent))} is missing; {why}"
+            yield Finding("missing repeats", text)
+
+
+def _missing_experiments(dataset: Dataset) -> Iterator[Finding]:
+    present = {trial.experiment for trial in dataset.trials}
+    for experiment in EXPERIMENTS:
+        if experiment not in present:
+            yield Finding("missing experiment", f"no trial of {experiment}")
+    for actuator in ("large", "small"):
+        statics = dataset.of("static_loading", actuator)
+        if statics and not any(abs(trial.pressure_psi) < 0.5 for trial in statics):
+            text = f"no static loading of the {actuator} actuator at 0 psi: its stiffness curve K rests on the area"
+            yield Finding("missing experiment", text)
+
+
+def _session_order(dataset: Dataset) -> Iterator[Finding]:
+    orders = [trial.session_order for trial in dataset.trials]
+    known = [order for order in orders if order is not None]
+    if known and len(known) < len(orders):
+        text = f"{len(orders) - len(known)} of {len(orders)} trials have no session_order"
+        yield Finding("session order", f"{text}: a drift over the day is seen in part only")
+    twice = sorted(order for order, count in Counter(known).items() if count > 1)
+    if twice:
+        yield Finding("session order", f"session_order {', '.join(map(str, twice))} is given to several trials")
+
+
+TRIAL_CHECKS: tuple[Callable[[Trial], Iterator[Finding]], ...] = (
+    _saturated_pressure,
+    _clipped_instrument,
+    _stuck_channel,
+    _spikes,
+    _clock,
+    _no_motion,
+    _no_command,
+    _start,
+    _commanded_pressure,
+)
+DATASET_CHECKS: tuple[Callable[[Dataset], Iterator[Finding]], ...] = (
+    _missing_repeats,
+    _missing_experiments,
+    _session_order,
+)

@@ -1,0 +1,122 @@
+"""The findings of `bifa check`: each fault is found where it was put, and a sound data set has none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.data import EXPERIMENTS, Dataset, write_dataset
+from bifa.data.check import check_dataset
+
+from .data_sets import make_dataset, make_trial
+
+
+def sound() -> Dataset:
+    """Three repeats of every experiment, pressures as commanded."""
+    trials = []
+    for trial in make_dataset(repeats=3).trials:
+        columns = dict(trial.columns)
+        for name in columns:
+            if name.startswith("pressure"):
+                columns[name] = (trial.pressure_psi or 0.0) + 0.01 * np.sin(np.arange(len(trial.time_s)))
+        trials.append(replace(trial, columns=columns, session_order=len(trials)))
+    return replace(make_dataset(), trials=tuple(trials))
+
+
+def damaged(file: str, **columns) -> list:
+    """The findings after some columns of one file were changed by a function of the values."""
+    dataset = sound()
+    trials = [
+        replace(t, columns={**t.columns, **{name: f(t.columns[name].copy()) for name, f in columns.items()}})
+        if t.file == file
+        else t
+        for t in dataset.trials
+    ]
+    return check_dataset(replace(dataset, trials=tuple(trials)))
+
+
+def put(start, stop, value):
+    def change(values):
+        values[start:stop] = value
+        return values
+
+    return change
+
+
+def test_a_sound_data_set_has_no_findings():
+    assert check_dataset(sound()) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "column", "change", "kind", "line"),
+    [
+        ("locomotion_2.csv", "pressure_body_psi", put(7, 9, 18.8), "saturated", 9),
+        ("locomotion_2.csv", "pressure_tail_psi", put(7, 9, -15.3), "clipped", 9),
+        ("locomotion_1.csv", "displacement_head_mm", lambda x: np.minimum(x, x[25]), "clipped", 27),
+        ("static_loading_3.csv", "force_N", lambda x: np.maximum(x, x[12]), "clipped", 2),
+        ("step_response_1.csv", "displacement_mm", put(30, 31, 99.0), "spike", 32),
+        ("step_response_1.csv", "displacement_mm", lambda x: x / 50, "no motion", None),
+        ("step_response_2.csv", "displacement_mm", lambda x: x + 20.0, "start", 2),
+        ("step_response_2.csv", "command", lambda x: 1 - x, "start", 2),
+        ("locomotion_3.csv", "command_tail", put(0, 40, 1.0), "no command", None),
+        ("anchor_pull_1.csv", "force_N", put(0, 40, 0.25), "stuck", None),
+        ("anchor_pull_2.csv", "pressure_psi", lambda x: x - 3.0, "pressure", None),
+        ("locomotion_2.csv", "time_s", lambda x: x + 0.055 * (np.arange(40) >= 10), "clock jump", 12),
+        ("locomotion_2.csv", "time_s", lambda x: x - 0.008 * (np.arange(40) >= 10), "clock jump", 12),
+        ("static_loading_1.csv", "time_s", lambda x: x * 1.3, "rate", None),
+    ],
+)
+def test_a_fault_is_found_where_it_is(file, column, change, kind, line):
+    (found,) = damaged(file, **{column: change})
+    assert (found.kind, found.file, found.column, found.line) == (kind, file, column, line)
+
+
+def test_a_snap_through_is_no_spike_and_a_coarse_sensor_is_not_clipped():
+    assert damaged("step_response_1.csv", displacement_mm=lambda x: x + 40.0 * (np.arange(40) > 20)) == []
+    assert damaged("static_loading_1.csv", displacement_mm=lambda x: np.round(x)) == []
+
+
+def test_missing_repeats_and_experiments():
+    dataset = sound()
+    kept = [t for t in dataset.trials if t.experiment != "anchor_pull" and t.file != "locomotion_2.csv"]
+    kept = [t for t in kept if t.file not in ("step_response_2.csv", "step_response_3.csv")]
+    kept = [replace(t, pressure_psi=3.0) if t.experiment == "static_loading" else t for t in kept]
+    kept = [
+        replace(t, columns={**t.columns, "pressure_psi": t.columns["pressure_psi"] + 3.0})
+        if t.experiment == "static_loading"
+        else t
+        for t in kept
+    ]
+    texts = [str(found) for found in check_dataset(replace(dataset, trials=tuple(kept)))]
+    assert len(texts) == 4
+    assert "step response, small, 8.5 psi: repeat 2, 3 is missing; the noise floor cannot be had" in texts[0]
+    assert "repeat 2 is missing; the noise floor is less certain" in texts[1]
+    assert "no trial of anchor_pull" in texts[2]
+    assert "no static loading of the large actuator at 0 psi" in texts[3]
+
+
+def test_session_order_given_in_part_or_twice():
+    dataset = sound()
+    trials = [replace(t, session_order=[None, 4, 4][i % 3]) for i, t in enumerate(dataset.trials)]
+    texts = [str(found) for found in check_dataset(replace(dataset, trials=tuple(trials)))]
+    assert "4 of 12 trials have no session_order" in texts[0]
+    assert "session_order 4 is given to several trials" in texts[1]
+
+
+def test_the_command_lists_plots_and_warns(tmp_path):
+    folder = write_dataset(tmp_path / "set", sound())
+    result = CliRunner().invoke(app, ["check", str(folder)])
+    assert result.exit_code == 0, result.output
+    assert "12 trials" in result.output
+    assert "Nothing looks wrong" in result.output
+    pictures = sorted((tmp_path / "set-plots").glob("*.png"))
+    assert len(pictures) == len(EXPERIMENTS)
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
+
+    lonely = write_dataset(tmp_path / "lonely", Dataset(None, "one", {}, (make_trial(),)))
+    result = CliRunner().invoke(app, ["check", str(lonely), "--no-plots", "--strict"])
+    assert result.exit_code == 1
+    assert "[missing repeats]" in result.output
+    assert not (tmp_path / "lonely-plots").exists()
