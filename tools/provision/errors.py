@@ -1,0 +1,5 @@
+"""What can go wrong while provisioning, said as a sentence that names the remedy."""
+
+
+class ProvisionError(Exception):
+    """Shown as one line, without a traceback; exit status 1."""

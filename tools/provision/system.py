@@ -1,0 +1,43 @@
+"""What the distribution provides: AVR tools on PATH, the Arduino core, and which versions they are."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from provision.errors import ProvisionError
+
+ARDUINO_CORE = Path("/usr/share/arduino/hardware/arduino/avr")
+AVR_TOOLS = ("ar", "as", "c++filt", "g++", "gcc", "gcc-ar", "gcc-ranlib", "ld", "nm", "objcopy", "objdump", "size")
+
+
+def avr_tools() -> dict[str, Path]:
+    """Return name -> program of the AVR tool chain, or say which Debian package lacks."""
+    return {f"avr-{name}": program(f"avr-{name}", "gcc-avr binutils-avr avr-libc") for name in AVR_TOOLS}
+
+
+def program(name: str, debian_packages: str) -> Path:
+    """Return where `name` is, or raise ProvisionError naming the packages that bring it."""
+    found = shutil.which(name)
+    if not found:
+        raise ProvisionError(f"{name} is not on PATH; install it: sudo apt-get install {debian_packages}")
+    return Path(found).resolve() if Path(found).is_symlink() else Path(found)
+
+
+def arduino_core(root: Path = ARDUINO_CORE) -> dict[str, Path]:
+    """Return the parts of the Arduino AVR core (cores, libraries, variants)."""
+    parts = {name: root / name for name in ("cores", "libraries", "variants")}
+    for part in parts.values():
+        if not part.is_dir():
+            raise ProvisionError(f"{part} is missing; install it: sudo apt-get install arduino-core-avr")
+    return parts
+
+
+def debian_version(package: str) -> str:
+    """Return the installed version of a Debian package, `unknown` where dpkg does not know it."""
+    try:
+        query = subprocess.run(
+            ["dpkg-query", "--show", "--showformat=${Version}", package], capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return query.stdout.strip()
