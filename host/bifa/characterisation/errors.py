@@ -3,5 +3,5 @@
 from bifa.errors import BifaError
 
 
-class TooLittleData(BifaError):
+class TooLittleDataError(BifaError):
     """A parameter cannot be had from this data set; the text says which, and which experiment gives it."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 
@@ -19,32 +18,23 @@ class Estimate:
     upper: float
     confidence: float = 0.9
 
-    def widened(self, sd: float) -> Estimate:
-        """The same value with a further independent uncertainty."""
-        total = float(np.hypot(self.sd, sd))
-        if not np.isfinite(total):
-            return self
-        half = (self.upper - self.value) * total / self.sd if self.sd > 0 else _normal_width(self.confidence) * total
-        return Estimate(self.value, total, self.value - half, self.value + half, self.confidence)
-
     def covers(self, truth: float) -> bool:
         return self.lower <= truth <= self.upper
 
 
-def _normal_width(confidence: float) -> float:
-    return float(normal.ppf(0.5 + confidence / 2))
+def weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float = 0.0, confidence: float = 0.9) -> Estimate:
+    """The mean of repeated measurements whose variances go as 1/weights, with an interval from their scatter.
 
-
-def weighted_mean(values: np.ndarray, weights: np.ndarray, confidence: float = 0.9) -> Estimate:
-    """The mean of repeated measurements whose variances go as 1/weights, with Student's interval from their scatter.
-
-    A single measurement has an infinite interval: nothing says how well it repeats.
+    `common_sd`: what shifts all of them alike and therefore does not show in the scatter. The degrees of freedom are
+    Welch's and Satterthwaite's. A single measurement has an infinite interval: nothing says how well it repeats.
     """
     values, weights = np.asarray(values, float), np.asarray(weights, float)
     mean = float(np.average(values, weights=weights))
     n = len(values)
     if n < 2:
         return Estimate(mean, np.inf, -np.inf, np.inf, confidence)
-    sd = float(np.sqrt(np.sum(weights * (values - mean) ** 2) / (n - 1) / weights.sum()))
-    half = float(student.ppf(0.5 + confidence / 2, n - 1)) * sd
+    scatter = float(np.sqrt(np.sum(weights * (values - mean) ** 2) / (n - 1) / weights.sum()))
+    sd = float(np.hypot(scatter, common_sd))
+    freedom = (n - 1) * (sd / scatter) ** 4 if scatter > 0 else np.inf
+    half = float(student.ppf(0.5 + confidence / 2, freedom)) * sd
     return Estimate(mean, sd, mean - half, mean + half, confidence)

@@ -8,7 +8,7 @@ import numpy as np
 
 from bifa.data import Dataset, Trial
 
-from .errors import TooLittleData
+from .errors import TooLittleDataError
 from .estimate import Estimate, weighted_mean
 from .motion import imposed_motion
 from .stiffness import StiffnessFit, fit_stiffness
@@ -37,12 +37,12 @@ def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | N
 
     reach_m: the least and greatest displacement that other experiments reach.
 
-    Raises TooLittleData without a trial at 0 psi.
+    Raises TooLittleDataError without a trial at 0 psi.
     """
     trials = dataset.of("static_loading", actuator)
     unloaded = [trial for trial in trials if abs(trial.pressure_psi) < UNPRESSURISED_PSI]
     if not unloaded:
-        raise TooLittleData(
+        raise TooLittleDataError(
             f"the stiffness curve of the {actuator} actuator cannot be had: there is no static_loading of it at 0 psi; "
             f"run `bifa experiment static_loading --actuator {actuator}`"
         )
@@ -68,11 +68,11 @@ def _area(stiffness: StiffnessFit, trials: list[Trial]) -> Estimate:
         x, force, _ = _branches(trial)
         areas.append(np.mean(stiffness.force(x) - force) / trial.pressure_psi)
         weights.append(trial.pressure_psi**2)
-    scatter = weighted_mean(np.array(areas), np.array(weights))
     # What is not known of K's mean shifts every trial alike, so the scatter between them does not show it.
     x = np.linspace(*stiffness.covered_m, 50)
-    mean_pressure = np.average([t.pressure_psi for t in trials], weights=weights)
-    return scatter.widened(stiffness.mean_force_sd(x) / abs(mean_pressure))
+    mean_pressure = np.average([trial.pressure_psi for trial in trials], weights=weights)
+    common_sd = stiffness.mean_force_sd(x) / abs(mean_pressure)
+    return weighted_mean(np.array(areas), np.array(weights), common_sd)
 
 
 def _residual_rms(stiffness: StiffnessFit, area: float, trial: Trial) -> float:

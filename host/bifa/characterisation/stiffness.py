@@ -20,10 +20,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import LinearConstraint, minimize
 
-from .errors import TooLittleData
+from .errors import TooLittleDataError
 
 DEGREE = 15
-CONTINUATION = 0.14  # of the static range, on either side: where equilibria under vacuum and pressure lie
+CONTINUATION = 0.13  # of the static range, on either side, at most: beyond it the curve goes on straight
 _PRIOR_POINTS = 6  # on either side
 _MIN_POINTS = 4 * (DEGREE + 1)
 
@@ -47,7 +47,7 @@ class StiffnessFit:
     residual_N: float
 
     def force(self, x: np.ndarray) -> np.ndarray:
-        """K(x) [N] at displacements x [m], between lower_m and upper_m."""
+        """K(x) [N] at displacements x [m]."""
         return self._rows(x) @ self.coefficients
 
     def slope(self, x: np.ndarray) -> np.ndarray:
@@ -79,7 +79,7 @@ class StiffnessFit:
         force = self.force(x)
         falling = np.flatnonzero((force[:-1] > 0) & (force[1:] <= 0))
         if not len(falling):
-            raise TooLittleData("the curve does not fall through 0 between its ends: the actuator is not bistable")
+            raise TooLittleDataError("the curve does not fall through 0 between its ends: the actuator is not bistable")
         i = falling[0]
         return float(x[i] + (x[i + 1] - x[i]) * force[i] / (force[i] - force[i + 1]))
 
@@ -89,9 +89,7 @@ class StiffnessFit:
         information = self.information + rows.T @ rows
         target = self.information @ self.coefficients + rows.T @ (np.asarray(force_N) / np.asarray(sd_N))
         coefficients = _solve_monotone(information, target, self._outside_slopes())
-        return StiffnessFit(
-            self.lower_m, self.upper_m, self.covered_m, coefficients, information, self.residual_N
-        )
+        return StiffnessFit(self.lower_m, self.upper_m, self.covered_m, coefficients, information, self.residual_N)
 
     def shapes(self) -> np.ndarray:
         """Ways in which the curve may still change, each by one standard deviation, the least certain one first.
@@ -125,31 +123,31 @@ def fit_stiffness(
     displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
     reach_m: the least and greatest displacement that the curve will be asked for, if known.
 
-    Raises TooLittleData if there are too few points or they cover next to nothing.
+    Raises TooLittleDataError if there are too few points or they cover next to nothing.
     """
     x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
     if len(x) < _MIN_POINTS:
-        raise TooLittleData(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
+        raise TooLittleDataError(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
     covered = (float(x.min()), float(x.max()))
     width = covered[1] - covered[0]
     if width < 1e-3:
-        raise TooLittleData(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be had from it")
+        raise TooLittleDataError(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be had from it")
     lower, upper = covered[0] - CONTINUATION * width, covered[1] + CONTINUATION * width
     if reach_m is not None:
-        lower, upper = min(lower, reach_m[0] - 0.01 * width), max(upper, reach_m[1] + 0.01 * width)
+        lower = max(lower, min(reach_m[0], covered[0]) - 0.01 * width)
+        upper = min(upper, max(reach_m[1], covered[1]) + 0.01 * width)
 
-    rows, weight = _rows(x, lower, upper), _even_weights(x, np.asarray(loading, bool))
+    loading = np.asarray(loading, bool)
+    rows, weight = _rows(x, lower, upper), _even_weights(x, loading)
     scaled = rows * np.sqrt(weight)[:, None]
-    first = np.linalg.lstsq(scaled, force * np.sqrt(weight), rcond=None)[0]
-    residual = force - rows @ first
-    variance = float(np.average(residual**2, weights=weight)) * _correlation_length(residual)
+    variance = max(_noise_variance(rows, force, loading), 1e-12)
 
     outside = _outside(lower, upper, covered)
-    # Over the continuation's width the force may bend by twice the greatest force seen inside.
-    bend = 4.0 * np.abs(force).max() / max(covered[0] - lower, upper - covered[1]) ** 2
+    # Over the continuation's width the force may bend by several times the greatest force seen inside.
+    bend = 10.0 * np.abs(force).max() / max(covered[0] - lower, upper - covered[1]) ** 2
     prior = _rows(outside, lower, upper, derivative=2) / bend
-    information = scaled.T @ scaled / max(variance, 1e-12) + prior.T @ prior
-    target = scaled.T @ (force * np.sqrt(weight)) / max(variance, 1e-12)
+    information = scaled.T @ scaled / variance + prior.T @ prior
+    target = scaled.T @ (force * np.sqrt(weight)) / variance
     coefficients = _solve_monotone(information, target, _rows(outside, lower, upper, derivative=1))
     final = force - rows @ coefficients
     return StiffnessFit(
@@ -158,11 +156,17 @@ def fit_stiffness(
 
 
 def _rows(x: np.ndarray, lower: float, upper: float, derivative: int = 0) -> np.ndarray:
-    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16)."""
+    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16); straight beyond the
+    ends, as the model continues them."""
     to_z = 2.0 / (upper - lower)
-    z = (np.atleast_1d(x) - lower) * to_z - 1.0
-    if not derivative:
-        return chebyshev.chebvander(z, DEGREE)
+    x = np.atleast_1d(np.asarray(x, float))
+    inside = np.clip(x, lower, upper)
+    z = (inside - lower) * to_z - 1.0
+    slopes = chebyshev.chebvander(z, DEGREE - 1) @ chebyshev.chebder(np.eye(DEGREE + 1)) * to_z
+    if derivative == 0:
+        return chebyshev.chebvander(z, DEGREE) + slopes * (x - inside)[:, None]
+    if derivative == 1:
+        return slopes
     differentiated = chebyshev.chebder(np.eye(DEGREE + 1), m=derivative)
     return chebyshev.chebvander(z, DEGREE - derivative) @ differentiated * to_z**derivative
 
@@ -183,6 +187,19 @@ def _even_weights(x: np.ndarray, loading: np.ndarray, bins: int = 100) -> np.nda
     share = np.where(both, total / 2.0, total)
     weight = np.where(loading, share[place] / np.maximum(up[place], 1), share[place] / np.maximum(down[place], 1))
     return weight / weight.mean()
+
+
+def _noise_variance(rows: np.ndarray, force: np.ndarray, loading: np.ndarray) -> float:
+    """Variance of one sample, inflated by serial correlation. Each branch is compared with a curve of its own: the
+    distance between the branches is hysteresis, not noise."""
+    variance = 0.0
+    for branch in (loading, ~loading):
+        if branch.sum() > 2 * (DEGREE + 1):
+            own = np.linalg.lstsq(rows[branch], force[branch], rcond=None)[0]
+            residual = force[branch] - rows[branch] @ own
+            share = branch.mean() * branch.sum() / (branch.sum() - DEGREE - 1)
+            variance += share * float(np.mean(residual**2)) * _correlation_length(residual)
+    return variance
 
 
 def _correlation_length(residual: np.ndarray, longest: int = 200) -> float:
