@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compile the two C parts beside their packages: `python -m virtual_robot.build`.
+
+`uno` needs libsimavr (Debian: libsimavr-dev libelf-dev); `plant` needs only a C compiler, so data sets can be
+generated where libsimavr is missing. Nothing is rebuilt when the objects are newer than their sources.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import sysconfig
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from cffi import FFI
+
+HERE = Path(__file__).resolve().parent
+
+
+@dataclass(frozen=True)
+class Part:
+    """One C part: the header that is its whole interface, and what it is linked with."""
+
+    name: str
+    header: str
+    libraries: tuple[str, ...]
+    include: tuple[str, ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        return HERE / self.name / "src"
+
+    @property
+    def built(self) -> Path:
+        return HERE / self.name / f"_{self.name}{sysconfig.get_config_var('EXT_SUFFIX')}"
+
+    def sources(self) -> list[Path]:
+        return sorted(self.folder.glob("*.c"))
+
+    def is_fresh(self) -> bool:
+        inputs = [*self.folder.iterdir(), Path(__file__)]
+        return self.built.exists() and self.built.stat().st_mtime > max(p.stat().st_mtime for p in inputs)
+
+
+PARTS = (
+    Part("plant", "plant.h", ("m",)),
+    Part("uno", "uno.h", ("simavr", "elf", "util"), ("/usr/include/simavr",)),
+)
+
+
+def declarations(header: Path) -> str:
+    """The header as cffi reads it: no comments, no preprocessor lines."""
+    text = re.sub(r"//[^\n]*", "", header.read_text())
+    return "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("#"))
+
+
+def compile_part(part: Part) -> None:
+    ffi = FFI()
+    ffi.cdef(declarations(part.folder / part.header))
+    ffi.set_source(
+        f"virtual_robot.{part.name}._{part.name}",
+        f'#include "{part.header}"',
+        sources=[str(p) for p in part.sources()],
+        include_dirs=[str(part.folder), *part.include],
+        libraries=list(part.libraries),
+        extra_compile_args=["-O2", "-std=gnu11", "-Wall", "-Wextra", "-Wno-missing-field-initializers"],
+    )
+    with tempfile.TemporaryDirectory() as scratch:
+        built = Path(ffi.compile(tmpdir=scratch, verbose=False))
+        new = part.built.with_suffix(".new")
+        new.write_bytes(built.read_bytes())
+        new.replace(part.built)  # at once: a running process keeps the object it has loaded
+
+
+def main(names: list[str]) -> int:
+    for part in PARTS:
+        if names and part.name not in names:
+            continue
+        if not part.is_fresh():
+            print(f"compiling virtual_robot/{part.name}", flush=True)
+            compile_part(part)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What can go wrong on the virtual bench, each saying what to do."""
+
+
+class VirtualRobotError(Exception):
+    """The root of every error that the virtual bench expects."""
+
+
+class NotBuilt(VirtualRobotError):
+    """A C part has not been compiled."""
+
+    def __init__(self, part: str) -> None:
+        super().__init__(
+            f"the virtual robot's {part} is not compiled: run `python -m virtual_robot.build`"
+            + (" (needs libsimavr-dev and libelf-dev)" if part == "uno" else " (needs a C compiler)")
+        )
+
+
+class NoFirmware(VirtualRobotError):
+    """There is no image to run."""
+
+    def __init__(self, path: object, why: str = "not found") -> None:
+        super().__init__(f"firmware image {path}: {why}; build it with `pio run -e uno`")
+
+
+class PortClosed(ConnectionError):
+    """The simulated serial port is no longer there (closed, or the board has no power)."""
