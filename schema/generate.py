@@ -6,9 +6,10 @@ python schema/generate.py
 import sys
 from pathlib import Path
 
+import cpp_commands
 import cpp_parameters
 import py_tables
-from tables import parameter_table
+from tables import WIRE_BYTES, command_table, parameter_table, table_hash
 
 ROOT = Path(__file__).parent.parent
 
@@ -16,10 +17,17 @@ ROOT = Path(__file__).parent.parent
 def generated() -> dict[Path, str]:
     """Every generated file with its text."""
     parameters = parameter_table()
+    commands = command_table()
+    set_size = sum(WIRE_BYTES[p.wire] for p in parameters.parameters)
+    agreed = table_hash(parameters, commands)
     return {
         ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
         ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters),
-        ROOT / "host/bifa/link/table.py": py_tables.module(parameters),
+        ROOT / "lib/commands/command_table.h": cpp_commands.command_header(commands),
+        ROOT / "lib/commands/command_table.cpp": cpp_commands.command_source(commands),
+        ROOT / "lib/link/message_table.h": cpp_commands.message_header(commands, set_size, agreed),
+        ROOT / "lib/link/message_table.cpp": cpp_commands.message_source(commands, set_size),
+        ROOT / "host/bifa/link/table.py": py_tables.module(parameters, commands, agreed),
     }
 
 

@@ -1,11 +1,15 @@
 """Reads the tables of this folder and checks that they make sense."""
 
+import hashlib
+import json
+import re
 import tomllib
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
+NAME_BYTES = 12
 WIRE_BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4}
 
 
@@ -41,6 +45,49 @@ class ParameterTable:
     presets: tuple[Preset, ...]
 
 
+@dataclass(frozen=True)
+class Field:
+    """One field of a message: `wire` is u8, u16, u32, i16, name or set; `count` > 1 for an array."""
+
+    name: str
+    wire: str
+    count: int
+
+
+@dataclass(frozen=True)
+class Message:
+    """What travels in one frame; `fields` follow the number of the message and its sequence number."""
+
+    name: str
+    number: int
+    kind: str
+    fields: tuple[Field, ...]
+    help: str
+
+    def size(self, set_size: int) -> int:
+        """Bytes of all fields."""
+        widths = {**WIRE_BYTES, "name": NAME_BYTES, "set": set_size}
+        return sum(widths[f.wire] * f.count for f in self.fields)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command; `usage` is its form on the console, `message` that in a frame; either may be None."""
+
+    name: str
+    usage: str | None
+    message: Message | None
+    help: str
+
+
+@dataclass(frozen=True)
+class CommandTable:
+    protocol_version: int
+    commands: tuple[Command, ...]
+    reports: tuple[Message, ...]
+    results: tuple[tuple[str, str], ...]
+
+
 def _load(name: str) -> dict:
     return tomllib.loads((FOLDER / name).read_text(), parse_float=Decimal)
 
@@ -66,9 +113,9 @@ def parameter_table() -> ParameterTable:
         if not 1 <= parameter.since <= raw["storage_format"]:
             raise ValueError(f"{parameter.name}: since must be a storage format")
         parameters.append(parameter)
-    widths = [WIRE_BYTES[p.wire] for p in parameters]
-    if widths != sorted(widths, reverse=True):
-        raise ValueError("wide parameters come first, so that the struct has no holes on any machine")
+    formats = [p.since for p in parameters]
+    if formats != sorted(formats):
+        raise ValueError("new parameters go at the end, so that an older record is the beginning of a new one")
     presets = [
         Preset(
             row["name"],
@@ -78,3 +125,43 @@ def parameter_table() -> ParameterTable:
         for row in raw["preset"]
     ]
     return ParameterTable(raw["storage_format"], tuple(parameters), tuple(presets))
+
+
+def _message(row: dict) -> Message:
+    fields = []
+    for text in row.get("fields", []):
+        match = re.fullmatch(r"(\w+): (u8|u16|u32|i16|name|set)(?:\[(\d+)\])?", text)
+        if not match:
+            raise ValueError(f"{row['name']}: cannot read the field {text!r}")
+        fields.append(Field(match[1], match[2], int(match[3] or 1)))
+    if row["kind"] not in ("open", "session", "stream"):
+        raise ValueError(f"{row['name']}: unknown kind {row['kind']}")
+    return Message(row["name"], row["message"], row["kind"], tuple(fields), row["help"])
+
+
+def command_table() -> CommandTable:
+    """Commands, reports and results of commands.toml."""
+    raw = _load("commands.toml")
+    commands = tuple(
+        Command(row["name"], row.get("usage"), _message(row) if "message" in row else None, row["help"])
+        for row in raw["command"]
+    )
+    reports = tuple(_message(row) for row in raw["report"])
+    messages = [c.message for c in commands if c.message] + list(reports)
+    if len({m.number for m in messages}) != len(messages):
+        raise ValueError("two messages have the same number")
+    results = tuple((row["name"], row["text"]) for row in raw["result"])
+    return CommandTable(raw["protocol_version"], commands, reports, results)
+
+
+def table_hash(parameters: ParameterTable, commands: CommandTable) -> int:
+    """32 bits that change whenever anything changes that the two ends must agree on."""
+    agreed = {
+        "parameters": [[p.name, p.wire, p.decimals, p.minimum, p.maximum] for p in parameters.parameters],
+        "messages": [
+            [m.name, m.number, m.kind, [[f.name, f.wire, f.count] for f in m.fields]]
+            for m in [*(c.message for c in commands.commands if c.message), *commands.reports]
+        ],
+        "results": [name for name, _ in commands.results],
+    }
+    return int.from_bytes(hashlib.sha256(json.dumps(agreed).encode()).digest()[:4], "little")

@@ -1,0 +1,54 @@
+// The first to see a byte from the host, in the receive interrupt: tells frames from text, acts on stops, queues the
+// rest.
+//
+// Text and frames share the port; a frame stands between 0x00 bytes. A frame ends at its delimiter, at its greatest
+// length or after 20 ms of silence, so that a stray 0x00 cannot hide a `!` for long. In the queue every frame stands
+// between exactly one 0x00 and another, whatever came over the line.
+#pragma once
+
+#include "message_table.h"
+
+namespace bifa {
+
+/// Greatest length of a frame to the Uno between its delimiters: number, sequence, fields, two checks, one for COBS.
+const uint8_t kLongestFrame = 1 + 2 + kLongestInward + 4;
+
+class Receiver {
+ public:
+  /// Takes one byte; to be called in the receive interrupt. True: stop at once.
+  bool push(uint8_t byte);
+
+  /// Counts the silence; call it once a millisecond.
+  void tick() {
+    if (silence_ms_ <= kSilenceMs) ++silence_ms_;
+  }
+
+  /// Takes the next byte out of the queue; false if it is empty.
+  bool pop(uint8_t& byte);
+
+  /// Whether bytes were lost for want of room. Then nothing more is queued until the queue is empty and recover() called.
+  bool overrun() const { return overrun_; }
+  /// Starts to queue again (with interrupts off); returns whether the next byte belongs to a frame.
+  bool recover();
+
+  /// How many bytes were lost so far, up to 65535.
+  uint16_t lost() const { return lost_; }
+
+ private:
+  static const uint8_t kSilenceMs = 20;
+  static const uint8_t kQueueBytes = 128;
+
+  void put(uint8_t byte);
+
+  volatile uint8_t head_ = 0;
+  volatile uint8_t tail_ = 0;
+  volatile bool overrun_ = false;
+  volatile uint8_t silence_ms_ = 0;
+  volatile uint16_t lost_ = 0;
+  bool in_frame_ = false;
+  uint8_t frame_length_ = 0;
+  uint8_t stop_matched_ = 0;  ///< how many bytes of the frame are those of the stop message; 0xFF: it is another
+  uint8_t queue_[kQueueBytes];
+};
+
+}  // namespace bifa

@@ -1,0 +1,51 @@
+// One record in EEPROM: a preset or the settings, with everything needed to doubt it.
+#pragma once
+
+#include "eeprom.h"
+#include "parameters.h"
+
+namespace bifa {
+
+const uint8_t kNameSize = 12;   ///< longest name; shorter ones are padded with zeros
+const uint8_t kSlotBytes = 48;  ///< distance of two records
+const uint8_t kSlotCount = kEepromBytes / kSlotBytes;
+const uint8_t kRecordValid = 0xA5;  ///< the mark of a complete record, written last
+const uint8_t kRecordVoid = 0x00;
+
+const char kSettingsName[kNameSize + 1] = "#settings";  ///< not a name that anybody can give
+/// Sequence numbers above this are no honest ones: the cells wear out long before.
+const uint32_t kSequenceLimit = 0xFFFFFF00UL;
+
+/// A record as its bytes lie in EEPROM, in the present format. In an older format the payload ends earlier.
+struct Record {
+  uint8_t mark;
+  uint8_t format;
+  uint32_t sequence;  ///< the greatest is the newest
+  char name[kNameSize];
+  uint8_t payload[sizeof(ParameterSet)];
+  uint16_t check;  ///< CRC-16 of everything between mark and check
+} __attribute__((packed));
+static_assert(sizeof(Record) <= kSlotBytes, "a record fits its slot");
+
+inline uint16_t slot_address(uint8_t slot) { return static_cast<uint16_t>(slot) * kSlotBytes; }
+
+/// Whether `name` may be given to a preset: 1 to 12 of a-z, 0-9, _ and -, zero-padded.
+bool is_name(const char* name);
+
+/// The sequence number in a slot, whatever else it holds.
+uint32_t sequence_of(Eeprom& eeprom, uint8_t slot);
+
+/// Bytes of a parameter set in a storage format.
+uint8_t payload_size(uint8_t format);
+
+/// Reads a slot into `record`, brought to the present format: fields that the old one lacks take their defaults.
+/// False, unless mark, format, CRC, name and sequence are good.
+bool read_record(Eeprom& eeprom, uint8_t slot, Record& record);
+
+/// Puts format, mark and CRC into a record whose sequence, name and payload are set.
+void seal(Record& record);
+
+/// Whether a slot holds a record of a later format than this firmware knows: left alone.
+bool is_from_the_future(Eeprom& eeprom, uint8_t slot);
+
+}  // namespace bifa

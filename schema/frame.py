@@ -1,0 +1,21 @@
+"""The form of a frame, as far as the generator needs it: two checks and COBS (docs/protocol.md)."""
+
+import binascii
+
+OPEN_SEED = 0xFFFFFFFF
+
+
+def _reflected_crc16(data: bytes, crc: int) -> int:
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
+    return crc
+
+
+def frame(message: bytes, seed: int) -> bytes:
+    """COBS of the message and its two checks, without the delimiters; `message` is shorter than 250 bytes."""
+    first = binascii.crc_hqx(message, seed & 0xFFFF)
+    second = _reflected_crc16(message, seed >> 16)
+    body = message + first.to_bytes(2, "little") + second.to_bytes(2, "little")
+    return b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0"))
