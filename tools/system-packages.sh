@@ -15,7 +15,12 @@ need() { # need DEBIAN-PACKAGE TEST...
 
 python=${PYTHON:-python3}
 python_headers() { test -f "$("$python" -c 'import sysconfig; print(sysconfig.get_path("include"))')/Python.h"; }
-libfuzzer() { echo 'int main(){}' | clang++ -x c++ -fsanitize=address,undefined -o /dev/null -; }
+libfuzzer() {
+    echo '#include <stddef.h>
+        #include <stdint.h>
+        extern "C" int LLVMFuzzerTestOneInput(const uint8_t*, size_t) { return 0; }' |
+        clang++ -x c++ -fsanitize=fuzzer,address,undefined -o /dev/null -
+}
 
 for group in "$@"; do
     case $group in
@@ -40,9 +45,11 @@ for group in "$@"; do
         need clang-format command -v clang-format
         need cppcheck command -v cppcheck
         ;;
-    fuzz)
+    fuzz) # Debian's names carry the version of clang
+        major=$(clang++ -dumpversion 2>/dev/null | cut -d. -f1)
+        major=${major:-$(apt-cache depends clang 2>/dev/null | sed -n 's/.*Depends: clang-\([0-9]*\)$/\1/p')}
         need clang command -v clang++
-        need libclang-rt-14-dev libfuzzer
+        need "libclang-rt-$major-dev" libfuzzer
         ;;
     *)
         echo "error: $0 knows no group '$group' (build, avr, lint, fuzz)" >&2

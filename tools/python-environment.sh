@@ -1,0 +1,31 @@
+#!/bin/sh
+# Creates .venv with the locked, hashed packages and this project's own two, editable.
+set -eu
+cd "$(dirname "$0")/.."
+
+suits() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; }
+
+if ! suits .venv/bin/python; then
+    for python in "${PYTHON:-python3}" python3.14 python3.13 python3.12 python3.11 none; do
+        suits "$python" && break
+    done
+    if [ "$python" = none ]; then
+        echo "error: Python 3.11 or newer is needed; name it: make PYTHON=/path/to/python3" >&2
+        exit 1
+    fi
+    echo "Creating .venv with $("$python" --version)"
+    "$python" -m venv --clear .venv
+fi
+
+log=build/pip.txt
+mkdir -p build
+pip() {
+    .venv/bin/python -m pip --disable-pip-version-check install --quiet "$@" >"$log" 2>&1 || {
+        cat "$log" >&2
+        echo "error: pip could not install the Python packages; is PyPI or a mirror of it reachable?" >&2
+        exit 1
+    }
+}
+echo "Installing Python packages from host/requirements.lock"
+pip --require-hashes --no-deps --requirement host/requirements.lock
+pip --no-deps --no-build-isolation --editable host --editable host/virtual_robot
