@@ -79,4 +79,4 @@ def test_damaged_files(folder, target):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("target", ["locomotion_1.csv", "step_response_1.csv", "dataset.toml"])
 def test_damaged_files_at_length(folder, target, seed):
-    fuzz(folder, target, seed=100 + seed, rounds=20000)
+    fuzz(folder, target, seed=100 + seed, rounds=5000)
