@@ -12,7 +12,7 @@ name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -59,12 +59,12 @@ class Parameter:
 class Effect:
     """Something real that the base model leaves out.
 
-    `parameters[0]` is the effect's size: the effect vanishes where it equals `absent` (0 unless said
-    otherwise). `parameters` have local names (`force_N`); in `theta` they appear as `hysteresis.force_N`.
-    Their `value` is a typical magnitude. `starts` are sizes from which fits begin; empty means 0.3, 1 and 3
-    times the typical one (and the same with the other sign, where the bounds allow it). `enters` names the
-    term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it can
-    show at all (empty: all).
+    The first `sizes` of `parameters` size the effect: it vanishes where all of them equal `absent` (0
+    unless said otherwise); the others only shape it. They have local names (`force_N`); in `theta` they
+    appear as `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits begin at the typical
+    sizes times each of `start_factors` (and with the other sign, where the bounds allow it). `enters` names
+    the term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it
+    can show at all (empty: all).
     """
 
     name: str
@@ -74,16 +74,17 @@ class Effect:
     confusable_with: tuple[str, ...] = ()
     equation: str = ""
     source: str = ""
-    starts: tuple[float, ...] = ()
+    sizes: int = 1
     absent: float = 0.0
+    start_factors: tuple[float, ...] = (0.1, 0.4, 1.2)
 
     def full_name(self, parameter: Parameter) -> str:
         return f"{self.name}.{parameter.name}"
 
     @property
-    def size_name(self) -> str:
-        """The full name of the parameter that sizes the effect."""
-        return self.full_name(self.parameters[0])
+    def size_names(self) -> tuple[str, ...]:
+        """The full names of the parameters that size the effect."""
+        return tuple(self.full_name(p) for p in self.parameters[: self.sizes])
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,7 @@ class System(Protocol):
         return ()
 
     def matters(self, parameter: str, trial: Trial) -> bool:
-        """False if this parameter of the base model cannot change this trial: saves a simulation per derivative."""
+        """False if this base parameter cannot change this trial: saves a simulation per derivative."""
         return True
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
@@ -203,39 +204,3 @@ class System(Protocol):
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
         return ()
-
-
-@dataclass(frozen=True)
-class Vector:
-    """An order of named parameters, base first, then those of the active effects: between mapping and array."""
-
-    parameters: tuple[Parameter, ...]
-    effects: tuple[str, ...] = ()
-    names: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "names", tuple(p.name for p in self.parameters))
-
-    @classmethod
-    def of(cls, system: System, effects: Sequence[str] = ()) -> Vector:
-        """The base parameters of `system` and those of `effects`, the latter under their full names."""
-        parameters = list(system.parameters)
-        for name in effects:
-            effect = system.effects[name]
-            parameters += [replace(p, name=effect.full_name(p)) for p in effect.parameters]
-        return cls(tuple(parameters), tuple(effects))
-
-    def start(self) -> np.ndarray:
-        return np.array([p.value for p in self.parameters])
-
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
-
-    def scales(self) -> np.ndarray:
-        return np.array([p.step_scale for p in self.parameters])
-
-    def theta(self, values: np.ndarray) -> dict[str, float]:
-        return dict(zip(self.names, map(float, values), strict=True))
-
-    def values(self, theta: Theta) -> np.ndarray:
-        return np.array([theta[name] for name in self.names])

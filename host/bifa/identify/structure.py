@@ -1,0 +1,121 @@
+"""What is fitted: the base model, some effects of the library, and curves learnt at some sites, as one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from bifa.identify.system import Correction, CorrectionSite, Parameter, System, Theta
+
+_KNOTS = 9
+_TABLE_POINTS = 65
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The base model of a system plus `effects` plus corrections at `sites`; the order of the fitted vector
+    is base, effects, corrections."""
+
+    system: System
+    effects: tuple[str, ...] = ()
+    sites: tuple[str, ...] = ()
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        found = list(self.system.parameters)
+        for name in self.effects:
+            effect = self.system.effects[name]
+            found += [replace(p, name=effect.full_name(p)) for p in effect.parameters]
+        for name in self.sites:
+            found += _knot_parameters(self.system.correction_sites[name])
+        return tuple(found)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def base_size(self) -> int:
+        return len(self.system.parameters)
+
+    def start(self) -> np.ndarray:
+        """Start of the base, effects absent (their size at its null, other parameters typical), corrections zero."""
+        values = self.theta(np.array([p.value for p in self.parameters]))
+        for name in self.effects:
+            effect = self.system.effects[name]
+            values |= dict.fromkeys(effect.size_names, effect.absent)
+        return self.values(values)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
+
+    def scales(self) -> np.ndarray:
+        return np.array([p.step_scale for p in self.parameters])
+
+    def theta(self, values: np.ndarray) -> dict[str, float]:
+        return dict(zip(self.names, map(float, values), strict=True))
+
+    def values(self, theta: Theta) -> np.ndarray:
+        """The vector for `theta`; what it lacks stands at the start."""
+        if not self.names:
+            return np.zeros(0)
+        return np.array([theta.get(p.name, p.value) for p in self.parameters])
+
+    def corrections(self, theta: Theta) -> tuple[Correction, ...]:
+        """The learnt curves, knots interpolated by a natural cubic spline onto a uniform table."""
+        return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
+
+    def prior_precision(self) -> np.ndarray:
+        """Prior on the curves, shape (P, P): knots within 10 scales of zero, and bending against 3 scales a knot."""
+        precision = np.zeros((len(self.names),) * 2)
+        bend = np.diff(np.eye(_KNOTS), 2, axis=0)
+        for name in self.sites:
+            site = self.system.correction_sites[name]
+            block = (np.eye(_KNOTS) / 10**2 + bend.T @ bend / 3**2) / site.scale**2
+            for row in range(_rows(site)):
+                at = self.names.index(_knot_name(site, row, 0))
+                precision[at : at + _KNOTS, at : at + _KNOTS] = block
+        return precision
+
+    def moves(self, index: int, trial) -> bool:
+        """Whether parameter `index` can change a trial at all."""
+        if index < self.base_size:
+            return self.system.matters(self.names[index], trial)
+        owner = self.names[index].split(".")
+        experiments = (
+            self.system.correction_sites[owner[1]].experiments
+            if owner[0] == "correction"
+            else self.system.effects[owner[0]].experiments
+        )
+        return not experiments or trial.experiment in experiments
+
+
+def _rows(site: CorrectionSite) -> int:
+    return 2 if site.by_direction else 1
+
+
+def _knot_name(site: CorrectionSite, row: int, knot: int) -> str:
+    return f"correction.{site.name}.{row}_{knot}"
+
+
+def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
+    far = 50 * site.scale
+    return [
+        Parameter(_knot_name(site, row, knot), site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
+        for row in range(_rows(site))
+        for knot in range(_KNOTS)
+    ]
+
+
+def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
+    at = np.linspace(0, 1, _TABLE_POINTS)
+    knots = np.linspace(0, 1, _KNOTS)
+    rows = [
+        CubicSpline(knots, [theta[_knot_name(site, row, k)] for k in range(_KNOTS)], bc_type="natural")(at)
+        for row in range(_rows(site))
+    ]
+    return Correction(site.name, np.array(rows))
