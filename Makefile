@@ -74,7 +74,7 @@ format: $(stamps)/python $(stamps)/lint
 # --- Set-up: each step leaves a stamp, so that a second run is instant ---
 
 .PHONY: setup
-setup: $(stamps)/firmware $(stamps)/virtual_uno
+setup: virtual_robot $(stamps)/firmware
 
 $(stamps)/system: tools/system-packages.sh
 	@mkdir -p $(@D)
@@ -90,9 +90,9 @@ $(stamps)/python: $(stamps)/system tools/python-environment.sh host/requirements
 	@tools/python-environment.sh
 	touch $@
 
-$(stamps)/virtual_uno: $(stamps)/python $(wildcard host/virtual_robot/build.py host/virtual_robot/uno/*.[ch] host/virtual_robot/uno/build*.py)
-	@cd host && ../$(bin)/python -m virtual_robot.build
-	touch ../$@
+.PHONY: virtual_robot
+virtual_robot: $(stamps)/python
+	@cd host && ../$(bin)/python -m virtual_robot.build  # knows itself what is up to date
 
 $(stamps)/platformio: $(stamps)/python platformio.ini tools/system-packages.sh $(wildcard tools/provision/*.py tools/stand_ins/* tools/stand_ins/*/* tools/stand_ins/*/*/*)
 	@PYTHONPATH=tools $(bin)/python -m provision

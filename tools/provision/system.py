@@ -23,9 +23,9 @@ def program(name: str, debian_packages: str) -> Path:
     return Path(found).resolve() if Path(found).is_symlink() else Path(found)
 
 
-def arduino_core(root: Path = ARDUINO_CORE) -> dict[str, Path]:
+def arduino_core() -> dict[str, Path]:
     """Return the parts of the Arduino AVR core (cores, libraries, variants)."""
-    parts = {name: root / name for name in ("cores", "libraries", "variants")}
+    parts = {name: ARDUINO_CORE / name for name in ("cores", "libraries", "variants")}
     for part in parts.values():
         if not part.is_dir():
             raise ProvisionError(f"{part} is missing; install it: sudo apt-get install arduino-core-avr")

@@ -1,0 +1,51 @@
+"""Makes tools/ importable, and offers a machine that has the tools which the stand-ins are made of."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(PROJECT / "tools"))
+
+
+@pytest.fixture
+def project() -> Path:
+    return PROJECT
+
+
+@pytest.fixture
+def programs(tmp_path, monkeypatch) -> Path:
+    """A folder with an empty program for every tool of the AVR tool chain, alone on PATH."""
+    from provision.system import AVR_TOOLS
+
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    for name in (*(f"avr-{tool}" for tool in AVR_TOOLS), "avrdude", "simavr"):
+        (folder / name).write_text("#!/bin/sh\n")
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
+    return folder
+
+
+@pytest.fixture
+def arduino_core(tmp_path, monkeypatch) -> Path:
+    """A folder laid out as Debian's arduino-core-avr."""
+    from provision import system
+
+    root = tmp_path / "arduino"
+    for name in ("cores", "libraries", "variants"):
+        (root / name).mkdir(parents=True)
+    monkeypatch.setattr(system, "ARDUINO_CORE", root)
+    return root
+
+
+@pytest.fixture
+def core_dir(tmp_path) -> Path:
+    """An empty PlatformIO core directory, but for Unity's sources, which need a download otherwise."""
+    folder = tmp_path / "project" / ".platformio"
+    sources = folder / "sources" / "unity" / "src"
+    sources.mkdir(parents=True)
+    for name in ("unity.c", "unity.h", "unity_internals.h"):
+        (sources / name).write_text("")
+    return folder

@@ -1,0 +1,109 @@
+"""Source packages are fetched with a configuration of our own, made from the machine's archives."""
+
+import io
+import tarfile
+
+import pytest
+from provision import debian_source, unity
+from provision.debian_source import fetch_source, source_entries
+from provision.errors import ProvisionError
+
+DEB822 = """\
+# the archive
+Types: deb
+URIs: http://archive.example/debian
+Suites: stable stable-updates
+Components: main
+Signed-By: /usr/share/keyrings/archive.gpg
+
+Types: deb-src
+URIs: http://sources.example/debian
+Suites: stable
+Components: main
+
+Enabled: no
+Types: deb
+URIs: http://disabled.example/debian
+Suites: stable
+Components: main
+"""
+
+
+@pytest.fixture
+def apt(tmp_path):
+    folder = tmp_path / "apt"
+    (folder / "sources.list.d").mkdir(parents=True)
+    return folder
+
+
+def test_deb822_entries_become_source_entries(apt):
+    (apt / "sources.list.d" / "debian.sources").write_text(DEB822)
+    option = "[signed-by=/usr/share/keyrings/archive.gpg]"
+    assert source_entries(apt).splitlines() == [
+        f"deb-src {option} http://archive.example/debian stable main",
+        f"deb-src {option} http://archive.example/debian stable-updates main",
+    ]
+
+
+def test_one_line_entries_become_source_entries(apt):
+    (apt / "sources.list").write_text(
+        "# deb http://comment.example/ stable main\n"
+        "deb [arch=amd64] http://archive.example/debian stable main contrib\n"
+        "deb-src http://sources.example/debian stable main\n"
+    )
+    assert source_entries(apt) == "deb-src [arch=amd64] http://archive.example/debian stable main contrib\n"
+
+
+def test_a_disabled_file_is_left_alone(apt):
+    (apt / "sources.list.d" / "other.list.disabled").write_text("deb http://other.example/ stable main\n")
+    assert source_entries(apt) == ""
+
+
+def test_no_archive_at_all_is_said(apt, tmp_path):
+    with pytest.raises(ProvisionError, match="names no Debian archive"):
+        fetch_source("cjson", tmp_path / "scratch", apt)
+
+
+def test_apt_gets_only_private_folders_and_its_complaint_is_passed_on(apt, tmp_path, monkeypatch):
+    (apt / "sources.list").write_text("deb http://archive.example/debian stable main\n")
+    fake = tmp_path / "apt-get"
+    fake.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/calls\necho "E: no such archive" >&2\nexit 100\n')
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    scratch = tmp_path / "scratch"
+    with pytest.raises(ProvisionError, match="could not fetch the source package cjson: E: no such archive"):
+        fetch_source("cjson", scratch, apt)
+    call = (tmp_path / "calls").read_text()
+    for option in ("Dir::Etc::SourceList", "Dir::State::Lists", "Dir::Cache"):
+        assert f"{option}={scratch}" in call
+    assert "Dir::Etc::SourceParts=-" in call
+
+
+def test_a_machine_without_apt_is_told_so(apt, tmp_path, monkeypatch):
+    (apt / "sources.list").write_text("deb http://archive.example/debian stable main\n")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ProvisionError, match="apt-get is not on PATH"):
+        debian_source.fetch_source("cjson", tmp_path / "scratch", apt)
+
+
+def archive(path, names, text="x"):
+    with tarfile.open(path, "w:gz") as tar:
+        for name in names:
+            member = tarfile.TarInfo(name)
+            member.size = len(text)
+            tar.addfile(member, io.BytesIO(text.encode()))
+    return path
+
+
+def test_unity_is_taken_out_of_its_carrier_and_reads_platformios_configuration(tmp_path):
+    names = [f"cJSON-1.7.15/tests/unity/src/{name}" for name in unity.FILES]
+    carrier = archive(tmp_path / "cjson.orig.tar.gz", [*names, "cJSON-1.7.15/cJSON.c"], unity.CARRIERS_CONFIGURATION)
+    unity.extract([carrier], tmp_path / "src")
+    assert sorted(path.name for path in (tmp_path / "src").iterdir()) == sorted(unity.FILES)
+    assert "UNITY_INCLUDE_CONFIG_H" in (tmp_path / "src" / "unity_internals.h").read_text()
+
+
+def test_a_carrier_without_unity_is_named(tmp_path):
+    carrier = archive(tmp_path / "cjson.orig.tar.gz", ["cJSON-2/cJSON.c"])
+    with pytest.raises(ProvisionError, match=r"cjson no longer carries Unity \(unity.c, unity.h, unity_internals.h\)"):
+        unity.extract([carrier], tmp_path / "src")

@@ -1,0 +1,75 @@
+"""With the stand-ins, PlatformIO's plain commands need no network, also after a full clean."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PIO = Path(sys.executable).with_name("pio")
+FIRMWARE = """
+#include <Arduino.h>
+#include <Adafruit_MCP4725.h>
+Adafruit_MCP4725 dac;
+void setup() { dac.begin(); }
+void loop() { dac.setVoltage(268, false); }
+"""
+SUITE = """
+#include <unity.h>
+#include "suite.h"
+static void arithmetic() { TEST_ASSERT_EQUAL_INT(%d, 1 + 1); }
+static void run() { RUN_TEST(arithmetic); }
+RUN_SUITE(run)
+"""
+
+
+@pytest.fixture
+def small_project(tmp_path, project):
+    """A project with this one's platformio.ini and stand-ins, a tiny firmware and a tiny suite."""
+    if not (project / ".platformio" / "stand_ins.ini").is_file():
+        pytest.skip("PlatformIO's registry is used on this machine, so there are no stand-ins to test")
+    for folder in ("firmware", "lib", "test/test_tiny"):
+        (tmp_path / folder).mkdir(parents=True)
+    shutil.copy(project / "platformio.ini", tmp_path)
+    shutil.copy(project / "test" / "suite.h", tmp_path / "test")
+    (tmp_path / ".platformio").symlink_to(project / ".platformio")
+    (tmp_path / "firmware" / "main.cpp").write_text(FIRMWARE)
+    (tmp_path / "test" / "test_tiny" / "test_main.cpp").write_text(SUITE % 2)
+    return tmp_path
+
+
+def pio(project: Path, *words: str) -> subprocess.CompletedProcess:
+    """Run PlatformIO with every proxy a closed door, so that any use of the network fails at once."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PLATFORMIO_")}
+    environment |= dict.fromkeys(("HTTP_PROXY", "HTTPS_PROXY", "http_proxy", "https_proxy"), "http://127.0.0.1:9")
+    return subprocess.run([PIO, *words], cwd=project, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_image_builds_and_builds_again_after_a_full_clean(small_project):
+    image = small_project / ".pio" / "build" / "uno" / "firmware.elf"
+    for _ in range(2):
+        built = pio(small_project, "run", "-e", "uno")
+        assert built.returncode == 0, built.stderr
+        assert image.is_file()
+        assert image.with_suffix(".hex").is_file()
+        assert pio(small_project, "run", "-e", "uno", "-t", "fullclean").returncode == 0
+        assert not image.is_file()
+
+
+@pytest.mark.parametrize("environment", ["native", "simavr"])
+def test_a_suite_passes_and_can_fail(small_project, environment):
+    passed = pio(small_project, "test", "-e", environment)
+    assert passed.returncode == 0, passed.stdout + passed.stderr
+    assert "1 test cases: 1 succeeded" in passed.stdout + passed.stderr
+    (small_project / "test" / "test_tiny" / "test_main.cpp").write_text(SUITE % 3)
+    failed = pio(small_project, "test", "-e", environment)
+    assert failed.returncode == 1
+    assert "Expected 3 Was 2" in failed.stdout + failed.stderr
+
+
+def test_an_upload_without_a_port_fails_with_a_sentence(small_project):
+    done = pio(small_project, "run", "-e", "uno", "-t", "upload")
+    assert done.returncode == 1
+    assert "upload_port" in done.stderr

@@ -1,0 +1,83 @@
+"""tools/system-packages.sh: what is missing is installed where that is allowed, and named in one line where not."""
+
+import shutil
+import subprocess
+
+import pytest
+
+NEEDED = ("sh", "cut", "sed", "env", "dirname")
+
+
+@pytest.fixture
+def machine(tmp_path, project):
+    """A machine with a shell, apt-get and nothing else; `run(*groups)` runs the script on it."""
+    bin_folder = tmp_path / "bin"
+    bin_folder.mkdir()
+    for name in NEEDED:
+        (bin_folder / name).symlink_to(shutil.which(name))
+
+    def program(name: str, script: str) -> None:
+        (bin_folder / name).write_text(f"#!/bin/sh\n{script}\n")
+        (bin_folder / name).chmod(0o755)
+
+    program("apt-get", f'echo "$@" >> {tmp_path}/apt')
+
+    def run(*groups: str) -> subprocess.CompletedProcess:
+        script = project / "tools" / "system-packages.sh"
+        environment = {"PATH": str(bin_folder)}
+        return subprocess.run(["sh", script, *groups], env=environment, capture_output=True, text=True, check=False)
+
+    run.program = program
+    run.apt_calls = lambda: (tmp_path / "apt").read_text() if (tmp_path / "apt").exists() else ""
+    return run
+
+
+def test_root_has_the_missing_packages_installed(machine):
+    machine.program("id", "echo 0")
+    done = machine("lint")
+    assert done.returncode == 0
+    assert done.stdout == "Installing Debian packages: clang-format cppcheck\n"
+    assert "install --yes --no-install-recommends clang-format cppcheck" in machine.apt_calls()
+
+
+def test_somebody_else_is_told_the_packages_in_one_line(machine):
+    machine.program("id", "echo 1000")
+    done = machine("avr")
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "only root may install them: sudo apt-get install gcc-avr binutils-avr" in done.stderr
+    assert machine.apt_calls() == ""
+
+
+def test_sudo_without_a_password_is_used(machine):
+    machine.program("id", "echo 1000")
+    machine.program("sudo", 'case $1 in -n) exit 0;; *) "$@";; esac')
+    assert machine("lint").returncode == 0
+    assert "install" in machine.apt_calls()
+
+
+def test_sudo_that_asks_for_a_password_is_not(machine):
+    machine.program("id", "echo 1000")
+    machine.program("sudo", "exit 1")
+    assert machine("lint").returncode == 1
+    assert machine.apt_calls() == ""
+
+
+def test_what_is_there_is_left_alone(machine):
+    machine.program("clang-format", "")
+    machine.program("cppcheck", "")
+    done = machine("lint")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert machine.apt_calls() == ""
+
+
+def test_a_failing_apt_is_reported(machine):
+    machine.program("id", "echo 0")
+    machine.program("apt-get", "exit 100")
+    done = machine("lint")
+    assert done.returncode == 1
+    assert "error: apt-get could not install: clang-format cppcheck" in done.stderr
+
+
+def test_an_unknown_group_is_refused(machine):
+    assert machine("everything").returncode == 2
