@@ -1,6 +1,7 @@
 """With the stand-ins, PlatformIO's plain commands need no network, also after a full clean."""
 
 import os
+import pty
 import shutil
 import subprocess
 import sys
@@ -69,7 +70,23 @@ def test_a_suite_passes_and_can_fail(small_project, environment):
     assert "Expected 3 Was 2" in failed.stdout + failed.stderr
 
 
-def test_an_upload_without_a_port_fails_with_a_sentence(small_project):
-    done = pio(small_project, "run", "-e", "uno", "-t", "upload")
-    assert done.returncode == 1
-    assert "upload_port" in done.stderr
+def test_an_upload_hands_the_image_and_the_port_to_avrdude(small_project, tmp_path):
+    core = small_project / ".platformio"
+    shared = core.resolve()
+    core.unlink()
+    shutil.copytree(shared, core, symlinks=True)
+    avrdude = core / "packages" / "tool-avrdude" / "bin" / "avrdude"
+    avrdude.unlink()
+    avrdude.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/call\n')
+    avrdude.chmod(0o755)
+    host_end, board_end = pty.openpty()
+    try:
+        port = os.ttyname(board_end)
+        done = pio(small_project, "run", "-e", "uno", "-t", "upload", "--upload-port", port)
+    finally:
+        os.close(host_end)
+        os.close(board_end)
+    assert done.returncode == 0, done.stderr
+    call = (tmp_path / "call").read_text()
+    assert call.startswith(f"-p atmega328p -c arduino -D -b 115200 -P {port} -U flash:w:")
+    assert "firmware.hex:i" in call

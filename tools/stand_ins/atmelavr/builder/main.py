@@ -51,14 +51,13 @@ env.Append(
 
 
 def prepare_upload(target, source, env):
-    """Find the port, reset the board into its bootloader, and tell avrdude where it is."""
+    """Find the port and tell avrdude, which resets the board into its bootloader through DTR."""
     upload = env.BoardConfig().get("upload", {})
     if env.subst("$UPLOAD_SPEED"):
         env.Append(UPLOADERFLAGS=["-b", "$UPLOAD_SPEED"])
     if upload.get("require_upload_port", False):
         env.AutodetectUploadPort()
         env.Append(UPLOADERFLAGS=["-P", "$UPLOAD_PORT"])
-        env.FlushSerialBuffer("$UPLOAD_PORT")
 
 
 if "nobuild" in COMMAND_LINE_TARGETS:
