@@ -20,7 +20,7 @@ fi
 log=build/pip.txt
 mkdir -p build
 pip() {
-    .venv/bin/python -m pip --disable-pip-version-check install --quiet "$@" >"$log" 2>&1 || {
+    .venv/bin/python -m pip --disable-pip-version-check install --quiet --no-compile "$@" >"$log" 2>&1 || {
         cat "$log" >&2
         echo "error: pip could not install the Python packages; is PyPI or a mirror of it reachable?" >&2
         exit 1
