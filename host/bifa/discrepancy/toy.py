@@ -29,9 +29,9 @@ from bifa.identify.system import (
 
 SAMPLE_S = 0.01
 STEPS_PER_SAMPLE = 8
-RIPPLE_PITCH_M = 0.02
+RIPPLE_PITCH_M = 0.06
 WOBBLE_SD = 0.02
-SENSOR_SD_MM = 0.05
+SENSOR_SD_MM = 0.2
 
 _BASE = (
     Parameter("mass_kg", "kg", 1.0, 0.2, 5.0, plausible=(0.8, 1.25), scale=0.1),
@@ -134,7 +134,6 @@ class ToySystem(System):
             "velocity": velocity,
             "direction of motion": np.sign(velocity),
             "force": trial.payload,
-            "time": trial.time_s,
         }
 
     def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:

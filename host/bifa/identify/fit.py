@@ -88,7 +88,7 @@ def evaluate_on(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     start = problem.start(fitted.solution.point.values)
     if not any(problem.nuisances):
         empty = np.zeros((0, 0))
-        solution = Solution(start, cost_of(problem, start), True, 0, (), empty)
+        solution = Solution(start, cost_of(problem, start), True, 0, (), empty, [])
     else:
         solution = solve(problem, start, free=(), max_iterations=4)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)

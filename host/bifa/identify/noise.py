@@ -40,6 +40,11 @@ class ChannelNoise:
     samples_per_piece: float
     repeats: int
 
+    @property
+    def per_piece(self) -> float:
+        """Standard deviation that a mean over n samples has, times sqrt(n)."""
+        return self.sd * self.samples_per_piece**0.5
+
 
 @dataclass(frozen=True)
 class NoiseFloor:
@@ -53,6 +58,15 @@ class NoiseFloor:
         if noise.jitter_s == 0:
             return np.full(trial.time_s.shape, noise.sd)
         return np.sqrt(noise.sd**2 + _shift_variance(trial, channel, noise.jitter_s, noise.sd))
+
+    def lowered_by(self, other: NoiseFloor) -> NoiseFloor:
+        """The lower of two floors for each channel: both are upper bounds, since a model that does not fit
+        adds its own differences to those between runs."""
+        return NoiseFloor({k: min(n, other.channels[k], key=lambda c: c.per_piece) for k, n in self.channels.items()})
+
+    def share_of(self, other: NoiseFloor) -> float:
+        """The smallest ratio of this floor to `other` among the channels."""
+        return min(n.per_piece / other.channels[k].per_piece for k, n in self.channels.items())
 
     def samples_per_piece(self, trial: Trial, channel: str) -> float:
         return self.channels[trial.experiment, channel].samples_per_piece

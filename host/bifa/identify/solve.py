@@ -9,8 +9,10 @@ import numpy as np
 
 from bifa.identify.problem import Point, Problem
 
+Jacobians = list[tuple[np.ndarray, np.ndarray]]  # of each trial: by the free parameters, by its nuisances
 _ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
 _RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
+_NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 
 
@@ -25,6 +27,7 @@ class Solution:
     iterations: int
     free: tuple[int, ...]
     normal: np.ndarray
+    jacobians: Jacobians
 
 
 @dataclass
@@ -45,9 +48,13 @@ def solve(
     *,
     free: Sequence[int] | None = None,
     max_iterations: int = 20,
-    enough: float = _ENOUGH,
+    jacobians: Jacobians | None = None,
 ) -> Solution:
-    """Minimise the cost from `start` over the parameters `free` (indices; default all) and all nuisances."""
+    """Minimise the cost from `start` over the parameters `free` (indices; default all) and all nuisances.
+
+    With `jacobians` given (of `free`, from somewhere near) they are kept throughout: cheap steps, no
+    derivatives.
+    """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
     lower, upper, scale = _limits(problem, free)
     x = np.clip(_pack(start, free), lower, upper)
@@ -56,15 +63,17 @@ def solve(
     cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
     damping, converged, iteration = _LAMBDA_START, False, 0
     steps = problem.first_steps()
-    jacobians = problem.jacobians(point, free, steps)
-    fresh = True
+    keep = jacobians is not None
+    if jacobians is None:
+        jacobians = problem.jacobians(point, free, steps)
+    fresh = not keep
     while iteration < max_iterations:
         iteration += 1
         system = _linearise(problem, point, free, residuals, jacobians)
         accepted = False
         while damping < _LAMBDA_MOST:
             step, promise = _step(system, x, lower, upper, scale, damping)
-            if promise < max(enough, _RELATIVE * cost):
+            if promise < max(_ENOUGH, _RELATIVE * cost):
                 break
             trial_point = _unpack(point, free, x + step)
             trial_residuals = problem.residuals(trial_point)
@@ -75,25 +84,27 @@ def solve(
                 damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
                 break
             damping = max(damping, 1e-6) * 8
-            if not fresh:
+            if not fresh and not keep:
                 break
         if accepted:
             gain = cost - trial_cost
             x, point, residuals, cost = x + step, trial_point, trial_residuals, trial_cost
-            if fresh and 0.9 < ratio < 1.1:
+            if keep or (fresh and 0.9 < ratio < 1.1):
                 fresh = False
                 continue
-            if gain < max(enough, _RELATIVE * cost) and fresh:
+            if gain < max(_ENOUGH, _RELATIVE * cost) and fresh:
                 converged = True
                 break
         elif fresh:
-            converged = promise < max(enough, _RELATIVE * cost)
+            converged = promise < max(_ENOUGH, _RELATIVE * cost)
+            break
+        if keep:
             break
         steps = problem.tuned_steps(steps, free, jacobians)
         jacobians = problem.jacobians(point, free, steps)
         fresh = True
     system = _linearise(problem, point, free, residuals, jacobians)
-    return Solution(point, cost, converged, iteration, free, _eliminate(system.normal, len(free)))
+    return Solution(point, cost, converged, iteration, free, _eliminate(system.normal, len(free)), jacobians)
 
 
 def _limits(problem: Problem, free: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -101,8 +112,8 @@ def _limits(problem: Problem, free: tuple[int, ...]) -> tuple[np.ndarray, np.nda
     scale = problem.structure.scales()
     nuisances = [p for ps in problem.nuisances for p in ps]
     return (
-        np.concatenate([lower[list(free)], [p.lower for p in nuisances]]),
-        np.concatenate([upper[list(free)], [p.upper for p in nuisances]]),
+        np.concatenate([lower[list(free)], [max(p.lower, p.value - _NUISANCE_SDS * p.step_scale) for p in nuisances]]),
+        np.concatenate([upper[list(free)], [min(p.upper, p.value + _NUISANCE_SDS * p.step_scale) for p in nuisances]]),
         np.concatenate([scale[list(free)], [p.step_scale for p in nuisances]]),
     )
 
@@ -149,20 +160,21 @@ def _step(system, x, lower, upper, scale, damping) -> tuple[np.ndarray, float]:
     """A damped step within the bounds and the decrease of the quadratic model that it promises."""
     diagonal = np.diag(system.normal)
     ridge = damping * np.maximum(diagonal, 1e-6 / scale**2) + 1e-9 / scale**2
-    blocked = np.zeros(len(x), bool)
+    stopped = np.zeros(len(x), bool)
     step = np.zeros(len(x))
-    for _ in range(5):
-        active = ~blocked
+    for _ in range(8):  # those that would cross a bound stop there, the others are solved again
+        active = ~stopped
         if not active.any():
-            return np.zeros(len(x)), 0.0
-        step = np.zeros(len(x))
+            break
         units = scale[active]
         matrix = (system.normal[np.ix_(active, active)] + np.diag(ridge[active])) * np.outer(units, units)
-        step[active] = units * np.linalg.lstsq(matrix, -system.gradient[active] * units, rcond=1e-14)[0]
-        at_lower, at_upper = (x <= lower) & (step < 0), (x >= upper) & (step > 0)
-        if not (active & (at_lower | at_upper)).any():
+        push = -system.gradient[active] - system.normal[np.ix_(active, stopped)] @ step[stopped]
+        step[active] = units * np.linalg.lstsq(matrix, push * units, rcond=1e-14)[0]
+        crossing = active & ((x + step < lower) | (x + step > upper))
+        if not crossing.any():
             break
-        blocked |= at_lower | at_upper
+        step[crossing] = np.clip(x + step, lower, upper)[crossing] - x[crossing]
+        stopped |= crossing
     step = np.clip(x + step, lower, upper) - x
     promise = -(system.gradient @ step + 0.5 * step @ system.normal @ step)
     return step, float(promise)

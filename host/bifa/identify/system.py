@@ -182,7 +182,7 @@ class System(Protocol):
     def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
         """Named quantities, shape (n,) each, on which a residual may depend: "displacement", "direction of
         motion", "velocity", "command", "time since the last switch", "position in the pipe" ..."""
-        return {"time": trial.time_s}
+        return {}
 
     def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
         """What varies from run to run in this trial: fitted for each trial, with a Gaussian prior of mean

@@ -1,0 +1,123 @@
+"""One explanation tried: the base model plus a set of effects, fitted with the same effort as every other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bifa.discrepancy.split import Split
+from bifa.identify.fit import Fit, best_of, evaluate_on, starting_point
+from bifa.identify.noise import NoiseFloor
+from bifa.identify.problem import Point, Problem
+from bifa.identify.solve import solve
+from bifa.identify.structure import Structure
+from bifa.identify.system import Parameter
+from bifa.identify.uncertainty import effective_samples
+
+_PROFILE_STEPS = 3
+_REFIT_ITERATIONS = 14
+_IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """`fitted` on the trials to fit, judged on those to select as well; `checked` on the latter."""
+
+    fitted: Fit
+    checked: Fit
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return self.fitted.structure.effects
+
+    @cached_property
+    def pieces(self) -> float:
+        """Independent pieces of information in the trials that it is judged on."""
+        return effective_samples(self.fitted) + effective_samples(self.checked)
+
+    @cached_property
+    def cost(self) -> float:
+        """Minus log-likelihood of all known trials, plus what implausible parameters and extra ones cost."""
+        system = self.fitted.structure.system
+        extra = sum(len(system.effects[name].parameters) for name in self.effects)
+        return (
+            self.fitted.cost
+            + self.checked.cost
+            + implausibility(self.fitted)
+            + 0.5 * extra * np.log(max(self.pieces, 2.0))
+        )
+
+
+def implausibility(fitted: Fit) -> float:
+    """What it costs an explanation to need parameters that no sane system has."""
+    total = 0.0
+    for parameter in fitted.structure.parameters:
+        if parameter.plausible is not None:
+            total += _IMPLAUSIBLE_COST * _outside(parameter, fitted.theta[parameter.name]) ** 2
+    return total
+
+
+def _outside(parameter: Parameter, value: float) -> float:
+    """How far beyond the plausible range, in half ranges."""
+    lower, upper = parameter.plausible
+    return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
+
+
+def judge(fitted: Fit, split: Split) -> Candidate:
+    return Candidate(fitted, evaluate_on(fitted, split.select))
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How a parent explanation and one more effect do at fixed sizes of that effect, the rest refitted in a
+    few cheap steps. `points` are starts for the full refit, best first."""
+
+    effect: str
+    problem: Problem
+    cost: float
+    points: tuple[Point, ...]
+
+
+def profile(parent: Fit, effect: str, split: Split, floor: NoiseFloor) -> Profile:
+    """The amplitude profile of `effect` on top of `parent`."""
+    structure = Structure(parent.structure.system, (*parent.structure.effects, effect))
+    problem = Problem(structure, split.fit, floor)
+    rest = tuple(range(len(parent.structure.names)))
+    found = []
+    for values in _sizes(parent, structure, effect):
+        start = Point(values, parent.solution.point.nuisances)
+        solution = solve(problem, start, free=rest, max_iterations=_PROFILE_STEPS, jacobians=parent.solution.jacobians)
+        found.append((solution.cost, solution.point))
+    found.sort(key=lambda pair: pair[0])
+    return Profile(effect, problem, found[0][0], tuple(point for _, point in found))
+
+
+def refit(profiled: Profile, *, starts: int = 2) -> Fit:
+    """Release everything from the best points of a profile."""
+    solutions = [solve(profiled.problem, point, max_iterations=_REFIT_ITERATIONS) for point in profiled.points[:starts]]
+    return best_of(profiled.problem, solutions)
+
+
+def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
+    """Starting vectors: the parent's values, the effect at a grid of sizes of either sign."""
+    described = structure.system.effects[effect]
+    base = starting_point(parent, structure)
+    at = [structure.names.index(name) for name in described.size_names]
+    vectors = []
+    for factor in described.start_factors:
+        for signs in _signs(described.parameters[: described.sizes]):
+            vector = base.copy()
+            for index, parameter, sign in zip(at, described.parameters, signs, strict=False):
+                size = described.absent + sign * factor * (parameter.value - described.absent)
+                vector[index] = np.clip(size, parameter.lower, parameter.upper)
+            vectors.append(vector)
+    return vectors
+
+
+def _signs(sizes: Sequence[Parameter]) -> list[tuple[float, ...]]:
+    both_ways = all(p.lower < 0 < p.upper for p in sizes)
+    positive = (1.0,) * len(sizes)
+    return [positive, tuple(-s for s in positive)] if both_ways else [positive]

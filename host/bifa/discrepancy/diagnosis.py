@@ -1,0 +1,157 @@
+"""From trials to a verdict: fit, detect, trace, decide, correct, and say what to measure next."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bifa.discrepancy.candidate import Candidate
+from bifa.discrepancy.correct import Corrected, holds, learn_correction
+from bifa.discrepancy.decide import Choice, Named, choose, dispersion_of
+from bifa.discrepancy.drift import find_drift
+from bifa.discrepancy.errors import Error, Floor, error_of, floor_of
+from bifa.discrepancy.next_experiment import NextExperiment, next_experiment
+from bifa.discrepancy.remainder import Remainder, find_remainder
+from bifa.discrepancy.search import Search, search
+from bifa.discrepancy.signature import Signature, describe
+from bifa.discrepancy.split import Split, split_trials
+from bifa.errors import BifaError
+from bifa.identify.fit import Fit, evaluate_on, fit, refit_on, spread_starts
+from bifa.identify.noise import estimate_noise
+from bifa.identify.structure import Structure
+from bifa.identify.system import System
+
+_CHANCE = 0.005  # probability by chance below which a remainder counts as structure
+_NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
+_NEGLIGIBLE_SHARE = 0.03  # of what the base model left
+
+
+class TooLittleDataError(BifaError):
+    """There is nothing to fit, or nothing to judge a fit by."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The engine's answer. `verdict` is "none", "identified" or "unexplained"; `final` is the explanation
+    fitted to all known trials (the base model for "none", with the learnt curve if there is one that
+    holds)."""
+
+    verdict: str
+    effects: tuple[Named, ...]
+    base: Fit
+    final: Fit
+    before: Error
+    after: Error
+    floor: Floor
+    remainder_before: Remainder
+    remainder_after: Remainder
+    signature: Signature
+    correction: Corrected | None
+    next: NextExperiment
+    search: Search
+    choice: Choice
+    split: Split
+    drifts: tuple[str, ...]
+    seconds: float
+
+
+def diagnose(
+    system: System, *, seed: int = 0, starts: int = 1, progress: Callable[[str], None] = lambda _: None
+) -> Diagnosis:
+    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed."""
+    began = time.monotonic()
+    split = split_trials(system.trials)
+    if not split.fit or not split.select:
+        raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
+    progress("fitting the base model")
+    base = _fit_base(system, split, seed, starts)
+    base_known = refit_on(base, split.known)
+    remainder = _remainder(base_known, seed)
+
+    def enough(candidate: Candidate) -> bool:
+        return _explained(_remainder(refit_on(candidate.fitted, split.known), seed), remainder)
+
+    found = search(base, split, base.problem.floor, enough=enough, progress=progress)
+    choice = choose(found)
+    base_known = refit_on(found.base.fitted, split.known)
+    remainder = _remainder(base_known, seed)
+    explained = refit_on(choice.candidate.fitted, split.known)
+    left = _remainder(explained, seed)
+    drifts = find_drift(explained, seed=seed)
+    verdict = _verdict(choice, left, remainder, drifts)
+    correction, final = None, explained
+    if verdict == "unexplained":
+        progress("learning a correction")
+        correction = _correction(found.base, choice.candidate, base_known, split)
+        final = correction.fitted if correction else explained
+    signature = describe(
+        explained if verdict == "unexplained" else base_known,
+        left if verdict == "unexplained" else remainder,
+        drifts,
+    )
+    return Diagnosis(
+        verdict,
+        choice.effects if verdict == "identified" else (),
+        base_known,
+        final,
+        error_of(base_known, split.final),
+        error_of(final, split.final),
+        floor_of(explained, split.final),
+        remainder,
+        left,
+        signature,
+        correction,
+        _next(choice, found) if verdict == "identified" else NextExperiment(),
+        found,
+        choice,
+        split,
+        drifts,
+        time.monotonic() - began,
+    )
+
+
+def _fit_base(system: System, split: Split, seed: int, starts: int) -> Fit:
+    """Base fitted to the trials to fit, with a floor from what repeats' residuals differ by among all known trials."""
+    structure = Structure(system)
+    floor = estimate_noise(system, split.known)
+    vectors = spread_starts(structure, structure.start(), starts, seed)
+    first = fit(structure, split.fit, floor, starts=vectors, max_iterations=25)
+    residuals = first.residuals() | evaluate_on(first, split.select).residuals()
+    sharper = floor.lowered_by(estimate_noise(system, split.known, residuals))
+    again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], max_iterations=15)
+    return Fit(again.problem, again.solution, first.starts, first.starts_agreeing)
+
+
+def _remainder(fitted: Fit, seed: int) -> Remainder:
+    return find_remainder(fitted.problem.trials, fitted.scaled_residuals(), fitted.problem.floor, seed=seed)
+
+
+def _explained(left: Remainder, before: Remainder) -> bool:
+    """Nothing is left that repeats share, or too little to matter."""
+    return left.probability > _CHANCE or left.largest < max(_NEGLIGIBLE, _NEGLIGIBLE_SHARE * before.largest)
+
+
+def _verdict(choice: Choice, left: Remainder, before: Remainder, drifts: tuple[str, ...]) -> str:
+    if not _explained(left, before):
+        return "unexplained"
+    if choice.effects:
+        return "identified"
+    return "unexplained" if drifts else "none"
+
+
+def _correction(base: Candidate, chosen: Candidate, before: Fit, split: Split) -> Corrected | None:
+    tried = [base] if chosen is base else [base, chosen]
+    corrected = learn_correction(tried, split)
+    return corrected if corrected and holds(corrected, before, split) else None
+
+
+def _next(choice: Choice, found: Search) -> NextExperiment:
+    chosen = frozenset(choice.candidate.effects)
+    rivals = [choice.candidate]
+    for named in choice.effects:
+        for other in named.confusable_with:
+            rival = found.with_effects(chosen - {named.name} | {other})
+            if rival is not None:
+                rivals.append(rival)
+    return next_experiment(rivals, found.floor, dispersion_of(found.tried))

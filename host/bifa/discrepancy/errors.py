@@ -1,0 +1,71 @@
+"""How large a fit's residual is, in units of the noise."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.identify.fit import Fit, evaluate_on
+from bifa.identify.noise import repeat_pairs
+from bifa.identify.system import Channels, Trial
+
+
+@dataclass(frozen=True)
+class Error:
+    """RMS residual in units of the noise: over the trials that were fitted, the held-out ones, and the
+    latter by experiment (all trials where an experiment has none held out)."""
+
+    fitted: float
+    held_out: float
+    by_experiment: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What repeats of one condition differ by, in the same units: no model can do better."""
+
+    fitted: float
+    held_out: float
+
+
+def error_of(fitted: Fit, held_out: Sequence[Trial]) -> Error:
+    """Errors of a fit on its own trials and on trials that it has not seen."""
+    known = fitted.scaled_residuals()
+    unseen = evaluate_on(fitted, held_out).scaled_residuals() if held_out else []
+    by_experiment: dict[str, list[Channels]] = defaultdict(list)
+    for trial, channels in zip(held_out, unseen, strict=True):
+        by_experiment[trial.experiment].append(channels)
+    for trial, channels in zip(fitted.problem.trials, known, strict=True):
+        if trial.experiment not in {t.experiment for t in held_out}:
+            by_experiment[trial.experiment].append(channels)
+    return Error(rms(known), rms(unseen), {name: rms(members) for name, members in by_experiment.items()})
+
+
+def floor_of(fitted: Fit, held_out: Sequence[Trial]) -> Floor:
+    """The floor on the fitted and on the held-out trials, from the differences between repeats' residuals."""
+    unseen = evaluate_on(fitted, held_out)
+    scaled = dict(zip((t.name for t in fitted.problem.trials), fitted.scaled_residuals(), strict=True))
+    scaled |= dict(zip((t.name for t in held_out), unseen.scaled_residuals(), strict=True))
+    names = {t.name for t in held_out}
+    known_pairs, unseen_pairs = [], []
+    for first, second in repeat_pairs((*fitted.problem.trials, *held_out)):
+        pairs = unseen_pairs if {first.name, second.name} & names else known_pairs
+        pairs.append(_difference(first, second, scaled))
+    return Floor(*(rms(pairs) if pairs else 1.0 for pairs in (known_pairs, unseen_pairs)))
+
+
+def _difference(first: Trial, second: Trial, scaled: dict[str, Channels]) -> Channels:
+    return {
+        c: (z - np.interp(first.time_s, second.time_s, scaled[second.name][c])) / np.sqrt(2)
+        for c, z in scaled[first.name].items()
+        if c in scaled[second.name]
+    }
+
+
+def rms(members: Sequence[Channels]) -> float:
+    """Root mean square over trials and channels, each trial's channel counting the same."""
+    squares = [np.nanmean(z**2) for channels in members for z in channels.values() if np.isfinite(z).any()]
+    return float(np.sqrt(np.mean(squares))) if squares else float("nan")

@@ -1,0 +1,61 @@
+"""A diagnosis as JSON, format 1."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from bifa.discrepancy.diagnosis import Diagnosis
+from bifa.discrepancy.errors import Error
+
+FORMAT = 1
+
+
+def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Plain types only; numbers that do not exist (no trial held out) are null."""
+    d = diagnosis
+    return {
+        "format": FORMAT,
+        "verdict": d.verdict,
+        "effects": [
+            {
+                "name": e.name,
+                "parameters": {name: _number(value) for name, value in e.parameters.items()},
+                "probability": _number(e.probability),
+                "confusable_with": list(e.confusable_with),
+            }
+            for e in d.effects
+        ],
+        "held_out": [trial.name for trial in d.split.final],
+        "error": {
+            "unit": "RMS residual in units of the noise",
+            "before": _error(d.before),
+            "after": _error(d.after),
+            "noise_floor": {"fitted": _number(d.floor.fitted), "held_out": _number(d.floor.held_out)},
+        },
+        "signature": {
+            "experiments": list(d.signature.experiments),
+            "depends_on": list(d.signature.depends_on),
+            "text": d.signature.text,
+        },
+        "correction": d.correction and {"site": d.correction.site, "term": d.correction.term},
+        "not_detectable_here": [s.effect for s in d.search.screened if not s.detectable],
+        "next_experiment": {
+            "separates": list(d.next.separates),
+            "experiment": d.next.experiment,
+            "settings": dict(d.next.settings),
+        },
+        "seconds": _number(d.seconds),
+    }
+
+
+def _error(error: Error) -> dict[str, Any]:
+    return {
+        "fitted": _number(error.fitted),
+        "held_out": _number(error.held_out),
+        "by_experiment": {name: _number(value) for name, value in error.by_experiment.items()},
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.4g}") if math.isfinite(value) else None

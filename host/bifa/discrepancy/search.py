@@ -1,0 +1,167 @@
+"""Search over sets of effects with a beam: the right effect may rank third alone and first in company."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifa.discrepancy.candidate import Candidate, judge, profile, refit
+from bifa.discrepancy.split import Split
+from bifa.identify.fit import Fit
+from bifa.identify.noise import NoiseFloor, estimate_noise
+from bifa.identify.problem import Problem
+from bifa.identify.solve import solve
+from bifa.identify.structure import Structure
+
+LARGEST_SET = 3
+_BEAM = 3
+_REFITTED = {1: 8, 2: 5, 3: 3}  # effects fully refitted for each parent, by the size of the set
+_LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
+_REWEIGHED_ITERATIONS = 5
+_ABSORBED = 0.02  # a change in the residual of which less than this share is left after the base's is absorbed
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What the data could tell of an effect of typical size: `visible` standard deviations that its typical
+    size stands out by after everything that the base can imitate is taken off; `absorbed` if hardly
+    anything is left."""
+
+    effect: str
+    visible: float
+    absorbed: bool
+
+    @property
+    def detectable(self) -> bool:
+        return self.visible > 5.0 and not self.absorbed
+
+
+@dataclass(frozen=True)
+class Search:
+    """Every explanation that was refitted, all against the same `floor`, and the screening of the library."""
+
+    base: Candidate
+    floor: NoiseFloor
+    tried: tuple[Candidate, ...]
+    screened: tuple[Screened, ...]
+
+    def with_effects(self, effects: Sequence[str]) -> Candidate | None:
+        wanted = frozenset(effects)
+        return next((c for c in self.tried if frozenset(c.effects) == wanted), None)
+
+
+def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
+    """Sensitivity to each effect at its typical size, projected off what the parent's parameters can do."""
+    found = []
+    jacobians = parent.solution.jacobians
+    reference = parent.problem.residuals(parent.solution.point)
+    flat = _stack(jacobians)
+    basis = _orthonormal(flat)
+    for name, effect in parent.structure.system.effects.items():
+        if name in parent.structure.effects:
+            continue
+        structure = Structure(parent.structure.system, (*parent.structure.effects, name))
+        problem = Problem(structure, split.fit, floor)
+        values = structure.values(
+            structure.theta(structure.start())
+            | parent.theta
+            | {effect.full_name(p): p.value for p in effect.parameters}
+        )
+        moved = problem.residuals(type(parent.solution.point)(values, parent.solution.point.nuisances))
+        change = np.concatenate([m - r for m, r in zip(moved, reference, strict=True)])
+        left = change - basis @ (basis.T @ change)
+        size, visible = float(np.linalg.norm(change)), float(np.linalg.norm(left))
+        found.append(Screened(name, visible, size == 0 or visible < _ABSORBED * size))
+    return found
+
+
+def _stack(jacobians) -> np.ndarray:
+    """Jacobian of everything: the structure's columns, then each trial's nuisances in their own rows."""
+    rows = sum(j.shape[0] for j, _ in jacobians)
+    own = sum(k.shape[1] for _, k in jacobians)
+    shared = np.vstack([j for j, _ in jacobians])
+    blocks = np.zeros((rows, own))
+    row = column = 0
+    for _, k in jacobians:
+        blocks[row : row + k.shape[0], column : column + k.shape[1]] = k
+        row, column = row + k.shape[0], column + k.shape[1]
+    return np.hstack([shared, blocks])
+
+
+def _orthonormal(matrix: np.ndarray) -> np.ndarray:
+    norms = np.linalg.norm(matrix, axis=0)
+    kept = matrix[:, norms > 0] / norms[norms > 0]
+    if kept.shape[1] == 0:
+        return np.zeros((matrix.shape[0], 0))
+    # by the Gram matrix: the columns are few and the rows many
+    values, vectors = np.linalg.eigh(kept.T @ kept)
+    good = values > 1e-10 * values[-1]
+    return kept @ (vectors[:, good] / np.sqrt(values[good]))
+
+
+def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, progress: Progress) -> Search:
+    """Grow sets from the base model until `enough(candidate)` says that nothing is left to explain, or
+    three effects.
+
+    At each size, every effect is tried on every parent in the beam by its amplitude profile, the most
+    promising are refitted with equal effort, and the best sets make the next beam.
+    """
+    screened = screen(base, split, floor)
+    first = judge(base, split)
+    tried: dict[frozenset[str], Candidate] = {frozenset(): first}
+    beam = [first]
+    for size in range(1, LARGEST_SET + 1):
+        grown: list[Candidate] = []
+        for parent in beam:
+            grown += _grow(parent, size, split, floor, tried, progress)
+        if not grown:
+            break
+        lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
+        if lower.share_of(floor) < _LOWER:
+            floor = lower
+            progress("weighing again against a lower floor")
+            tried = {s: reweighed(c, split, floor) for s, c in tried.items()}
+        beam = _ranked(tried, size)[:_BEAM]
+        if enough(beam[0]):
+            break
+    return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened))
+
+
+def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate]:
+    return sorted((c for s, c in tried.items() if len(s) == size), key=lambda c: c.cost)
+
+
+def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
+    """The floor as the repeats show it once a better explanation has taken its share of what differs between runs."""
+    residuals = candidate.fitted.residuals() | candidate.checked.residuals()
+    system = candidate.fitted.structure.system
+    return floor.lowered_by(estimate_noise(system, split.known, residuals))
+
+
+def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor) -> Candidate:
+    """The same explanation fitted against another floor, from where it stands."""
+    point = candidate.fitted.solution.point
+    problem = Problem(candidate.fitted.structure, split.fit, floor)
+    solution = solve(problem, point, max_iterations=_REWEIGHED_ITERATIONS)
+    return judge(replace(candidate.fitted, problem=problem, solution=solution), split)
+
+
+def _grow(parent: Candidate, size, split, floor, tried, progress) -> list[Candidate]:
+    library = parent.fitted.structure.system.effects
+    fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
+    profiles = []
+    for effect in fresh:
+        progress(f"trying {' + '.join((*parent.effects, effect))}")
+        profiles.append(profile(parent.fitted, effect, split, floor))
+    profiles.sort(key=lambda p: p.cost)
+    grown = []
+    for promising in profiles[: _REFITTED[size]]:
+        progress(f"refitting {' + '.join((*parent.effects, promising.effect))}")
+        candidate = judge(refit(promising), split)
+        tried[frozenset(candidate.effects)] = candidate
+        grown.append(candidate)
+    return grown
