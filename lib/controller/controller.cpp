@@ -1,0 +1,272 @@
+#include "controller.h"
+
+#include "critical.h"
+
+namespace bifa {
+
+namespace {
+
+const uint8_t kRestShift = 5;  ///< the slow means follow within about a third of a second
+const uint8_t kPhaseShift = 16;
+const uint16_t kSilenceUnit_ms = 10;
+
+int16_t clipped(int32_t pressure_mpsi) {
+  return pressure_mpsi > INT16_MAX ? INT16_MAX : pressure_mpsi < INT16_MIN ? INT16_MIN : pressure_mpsi;
+}
+
+}  // namespace
+
+// ---- main loop ----
+
+void Controller::begin(StartCause cause, const ParameterSet& set, const Calibration& calibration) {
+  apply(set);
+  calibrate(calibration);
+  const Critical guard;
+  if (cause == StartCause::kWatchdog) trip(Fault::kWatchdog, kNoChannel, 0, 0);
+  if (cause == StartCause::kBrownOut) trip(Fault::kBrownOut, kNoChannel, 0, 0);
+}
+
+Verdict Controller::run() {
+  const Critical guard;
+  if (supervisor_.is_latched()) return Verdict::kLatched;
+  if (supervisor_.state() != State::kIdle || emergency_stop_) return Verdict::kRefused;
+  oscillators_.settle();
+  host_silence_ms_ = 0;
+  supervisor_.run();
+  return Verdict::kDone;
+}
+
+Verdict Controller::stop() {
+  const Critical guard;
+  schedule_.stop();
+  supervisor_.idle();
+  return Verdict::kDone;
+}
+
+Verdict Controller::hold(Chamber chamber, ChamberState state) {
+  const Critical guard;
+  if (supervisor_.is_latched()) return Verdict::kLatched;
+  if (supervisor_.state() == State::kRunning || emergency_stop_) return Verdict::kRefused;
+  host_silence_ms_ = 0;
+  supervisor_.hold(chamber, state);
+  return Verdict::kDone;
+}
+
+Verdict Controller::clear() {
+  const Critical guard;
+  if (emergency_stop_ || cause_stands()) return Verdict::kCauseStands;
+  supervisor_.clear();
+  for (uint8_t i = 0; i < kChamberCount; ++i) sensors_[i].reset();
+  regulator_.reset();
+  return Verdict::kDone;
+}
+
+void Controller::apply(const ParameterSet& set) {
+  const Gait gait = gait_of(set);
+  const Critical guard;
+  oscillators_.use(gait);
+  wanted_mpsi_ = set.pressure_mpsi;
+  host_timeout_ms_ = set.host_timeout_ms;
+}
+
+Verdict Controller::schedule_add(uint32_t time_ms, Chamber chamber, ChamberState state) {
+  const Critical guard;
+  if (schedule_.running()) return Verdict::kRefused;
+  if (!schedule_.in_order(time_ms)) return Verdict::kOrder;
+  return schedule_.add(time_ms, chamber, state) ? Verdict::kDone : Verdict::kFull;
+}
+
+Verdict Controller::schedule_clear() {
+  const Critical guard;
+  schedule_.clear();
+  return Verdict::kDone;
+}
+
+Verdict Controller::schedule_start() {
+  const Critical guard;
+  if (supervisor_.is_latched()) return Verdict::kLatched;
+  if (supervisor_.state() == State::kRunning || emergency_stop_) return Verdict::kRefused;
+  host_silence_ms_ = 0;
+  schedule_.start();
+  return Verdict::kDone;
+}
+
+Verdict Controller::measure_zero(Calibration& measured) const {
+  const Critical guard;
+  if (supervisor_.state() != State::kIdle) return Verdict::kRefused;
+  for (uint8_t i = 0; i < kChamberCount; ++i) {
+    measured.offset_mpsi[i] = static_cast<int16_t>((rest_[i] + (1 << (kRestShift - 1))) >> kRestShift);
+  }
+  return is_valid(measured) ? Verdict::kDone : Verdict::kRefused;
+}
+
+void Controller::calibrate(const Calibration& calibration) {
+  const Critical guard;
+  calibration_ = calibration;
+}
+
+bool Controller::take_sample(Sample& sample) {
+  const Critical guard;
+  if (!sample_waits_) return false;
+  sample = sample_;
+  sample_waits_ = false;
+  return true;
+}
+
+Status Controller::status() const {
+  const Critical guard;
+  Status status;
+  status.state = supervisor_.state();
+  status.emergency_stop = emergency_stop_;
+  status.scheduled = schedule_.running();
+  status.fault = supervisor_.fault();
+  for (uint8_t i = 0; i < kChamberCount; ++i) status.pressure_mpsi[i] = sample_.pressure_mpsi[i];
+  status.valves = supervisor_.valves().bits();
+  status.uptime_ms = uptime_ms_;
+  status.samples_lost = samples_lost_;
+  return status;
+}
+
+uint32_t Controller::uptime_ms() const {
+  const Critical guard;
+  return uptime_ms_;
+}
+
+void Controller::host_heard() {
+  const Critical guard;
+  host_silence_ms_ = 0;
+}
+
+SupplyCode Controller::supply() const {
+  const Critical guard;
+  return SupplyCode::of(set_point_mpsi());
+}
+
+void Controller::supply_told(bool answered) {
+  const Critical guard;
+  dac_.told(answered);
+  if (dac_.failed()) trip(Fault::kSupplyControl, kNoChannel, kDacAttempts, kDacAttempts - 1);
+}
+
+// ---- interrupts ----
+
+bool Controller::tick(bool emergency_stop_pressed) {
+  {
+    const Critical guard;
+    ++uptime_ms_;
+    emergency_stop_ = emergency_stop_pressed;
+    if (emergency_stop_pressed) supervisor_.stop();
+  }
+  step_oscillators();
+  follow_schedule();
+  {
+    const Critical guard;
+    supervisor_.tick();
+  }
+  watch_host();
+  if (round_complete_) finish_sample();
+  if (--to_next_sample_ms_ > 0) return false;
+  to_next_sample_ms_ = kSamplePeriod_ms;
+  begin_sample();
+  return true;
+}
+
+void Controller::converted_in_interrupt(const RawRound& round) {
+  round_ = round;
+  round_complete_ = true;
+}
+
+void Controller::step_oscillators() {
+  if (supervisor_.state() != State::kRunning) return;
+  oscillators_.step();
+  const Critical guard;  // a stop may have come since: then walk() does nothing
+  for (uint8_t i = 0; i < kChamberCount; ++i) supervisor_.walk(i, oscillators_.command(i));
+}
+
+void Controller::follow_schedule() {
+  if (!schedule_.running()) return;
+  const Critical guard;
+  if (supervisor_.is_latched()) {
+    schedule_.stop();
+    return;
+  }
+  Chamber chamber;
+  ChamberState state;
+  while (schedule_.take(chamber, state)) supervisor_.hold(chamber, state);
+  schedule_.tick();
+}
+
+void Controller::begin_sample() {
+  const Critical guard;
+  ++sampling_.sequence;
+  sampling_.time_us = uptime_ms_ * 1000;
+  sampling_.state = supervisor_.state();
+  sampling_.valves = supervisor_.valves().bits();
+  for (uint8_t i = 0; i < kChamberCount; ++i) {
+    sampling_.phase[i] = static_cast<uint16_t>(oscillators_.phase(i) >> kPhaseShift);
+    sampling_.command[i] = supervisor_.wanted(i);
+  }
+}
+
+void Controller::finish_sample() {
+  round_complete_ = false;
+  int16_t pressure_mpsi[kChamberCount];
+  for (uint8_t i = 0; i < kChamberCount; ++i) {
+    const int16_t raw_mpsi = sensor_mpsi(round_.sum[i]);
+    rest_[i] += raw_mpsi - (rest_[i] >> kRestShift);
+    pressure_mpsi[i] = clipped(static_cast<int32_t>(raw_mpsi) - calibration_.offset_mpsi[i]);
+    sampling_.pressure_mpsi[i] = pressure_mpsi[i];
+  }
+  last_second_.add(pressure_mpsi);
+  watch(pressure_mpsi);
+  if (sample_waits_ && samples_lost_ < UINT16_MAX) ++samples_lost_;
+  sample_ = sampling_;
+  sample_waits_ = true;
+}
+
+void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
+  trip_limit_.follow(set_point_mpsi());
+  for (uint8_t i = 0; i < kChamberCount; ++i) {
+    const SensorWatch::Finding finding =
+        sensors_[i].look(round_.sum[i], pressure_mpsi[i], trip_limit_.mpsi(), supervisor_.wanted(i));
+    if (finding.fault != Fault::kNone) trip(finding.fault, i, pressure_mpsi[i], finding.limit);
+  }
+  if (regulator_.look(round_.monitor, set_point_mpsi())) {
+    trip(Fault::kRegulator, kNoChannel, monitor_mpsi(round_.monitor), static_cast<int16_t>(set_point_mpsi()));
+  }
+}
+
+void Controller::watch_host() {
+  if (host_silence_ms_ < UINT16_MAX) ++host_silence_ms_;
+  if (host_timeout_ms_ == 0 || host_silence_ms_ < host_timeout_ms_ || !supervisor_.moves_air()) return;
+  trip(Fault::kHostSilent, kNoChannel, static_cast<int16_t>(host_silence_ms_ / kSilenceUnit_ms),
+       static_cast<int16_t>(host_timeout_ms_ / kSilenceUnit_ms));
+}
+
+void Controller::trip(Fault fault, uint8_t channel, int16_t value, int16_t limit) {
+  const Critical guard;
+  schedule_.stop();
+  supervisor_.trip(fault, channel, value, limit, uptime_ms_, last_second_);
+}
+
+bool Controller::cause_stands() const {
+  const FaultReport& fault = supervisor_.fault();
+  switch (fault.fault) {
+    case Fault::kOverPressure:
+    case Fault::kSensorRange:
+      for (uint8_t i = 0; i < kChamberCount; ++i) {
+        if (SensorWatch::stands(fault.fault, round_.sum[i], sample_.pressure_mpsi[i], fault.limit)) return true;
+      }
+      return false;
+    case Fault::kRegulator:
+      return regulator_.deviates();
+    case Fault::kSupplyControl:
+      return dac_.failed();
+    default:
+      return false;
+  }
+}
+
+uint16_t Controller::set_point_mpsi() const { return supervisor_.state() == State::kFault ? 0 : wanted_mpsi_; }
+
+}  // namespace bifa

@@ -1,0 +1,134 @@
+// The controller behind one facade: what the console, the frames and the board call, and nothing else.
+//
+// tick() and the *_in_interrupt functions run in interrupts; everything else in the main loop. What both touch is
+// guarded inside, so callers need no guard of their own.
+#pragma once
+
+#include "calibration.h"
+#include "oscillators.h"
+#include "parameter_table.h"
+#include "sample.h"
+#include "schedule.h"
+#include "sensor.h"
+#include "sensor_watch.h"
+#include "supervisor.h"
+#include "supply.h"
+#include "supply_watch.h"
+
+namespace bifa {
+
+/// What became of a request.
+enum class Verdict : uint8_t {
+  kDone,
+  kLatched,      ///< stopped, or a fault stands: clear first
+  kRefused,      ///< not in this state
+  kCauseStands,  ///< clear: the emergency stop is still pressed, or the cause of the fault is still there
+  kFull,         ///< the schedule is full
+  kOrder,        ///< the schedule's times must not go backwards
+};
+
+/// What a person or the host wants to know at once.
+struct Status {
+  State state;
+  bool emergency_stop;  ///< the input is active now
+  bool scheduled;       ///< timed holds are running
+  FaultReport fault;    ///< fault.fault is kNone without one
+  int16_t pressure_mpsi[kChamberCount];
+  uint8_t valves;  ///< bits of ValvePattern
+  uint32_t uptime_ms;
+  uint16_t samples_lost;  ///< samples that the main loop did not take in time
+};
+
+/// Why the chip started.
+enum class StartCause : uint8_t { kPower, kExternal, kBrownOut, kWatchdog };
+
+class Controller {
+ public:
+  explicit Controller(ValvePins& pins) : supervisor_(pins) {}
+
+  // ---- main loop ----
+
+  /// Once, before the first tick. After a watchdog reset or a brown-out the controller begins in a fault.
+  void begin(StartCause cause, const ParameterSet& set, const Calibration& calibration);
+
+  Verdict run();   ///< from idle; the oscillators start settled, the body at phase 0
+  Verdict stop();  ///< to idle; all chambers vent (a latched stop or fault stays)
+  /// From idle or holding. When all chambers are off again the controller is idle.
+  Verdict hold(Chamber chamber, ChamberState state);
+  Verdict clear();
+
+  /// Takes effect at the next tick, also while running, without a jump of the phases. The set must be valid (is_valid()).
+  void apply(const ParameterSet& set);
+
+  /// Timed holds, executed on the tick; time 0 is the first tick after the start. stop(), a stop, a fault end them.
+  Verdict schedule_add(uint32_t time_ms, Chamber chamber, ChamberState state);
+  Verdict schedule_clear();
+  Verdict schedule_start();
+
+  /// Takes the present pressures as zero: only while idle, and only if each is within kGreatestOffset_mpsi.
+  Verdict measure_zero(Calibration& measured) const;
+  void calibrate(const Calibration& calibration);
+
+  /// The next sample, if there is a new one.
+  bool take_sample(Sample& sample);
+  Status status() const;
+  uint32_t uptime_ms() const;
+
+  /// Call it whenever the host has said something that makes sense.
+  void host_heard();
+
+  /// What the DAC has to be told now. Whoever tells it reports how that ended.
+  SupplyCode supply() const;
+  void supply_told(bool answered);
+
+  // ---- interrupts ----
+
+  /// Every millisecond. Returns true if the converter is to begin a round with this tick (every tenth). Other
+  /// interrupts may nest in it: what they share is guarded inside.
+  bool tick(bool emergency_stop_pressed);
+
+  /// A round of the converter is complete.
+  void converted_in_interrupt(const RawRound& round);
+
+  /// The byte `!`, the stop message or the emergency stop: all valves are off when it returns.
+  void stop_in_interrupt() { supervisor_.stop(); }
+
+ private:
+  void step_oscillators();
+  void follow_schedule();
+  void begin_sample();
+  void finish_sample();
+  void watch(const int16_t (&pressure_mpsi)[kChamberCount]);
+  void watch_host();
+  void trip(Fault fault, uint8_t channel, int16_t value, int16_t limit);
+  bool cause_stands() const;
+  uint16_t set_point_mpsi() const;
+
+  Supervisor supervisor_;
+  Oscillators oscillators_;
+  Schedule schedule_;
+  LastSecond last_second_;
+  TripLimit trip_limit_;
+  SensorWatch sensors_[kChamberCount];
+  DacWatch dac_;
+  RegulatorWatch regulator_;
+  Calibration calibration_ = {};
+
+  uint32_t uptime_ms_ = 0;
+  uint8_t to_next_sample_ms_ = kSamplePeriod_ms;
+  volatile bool emergency_stop_ = false;
+
+  uint16_t wanted_mpsi_ = 0;
+  uint16_t host_timeout_ms_ = 0;
+  uint16_t host_silence_ms_ = 0;
+
+  RawRound round_ = {};
+  volatile bool round_complete_ = false;
+  Sample sampling_ = {};  ///< its conversions are under way
+  Sample sample_ = {};
+  bool sample_waits_ = false;
+  uint16_t samples_lost_ = 0;
+  int32_t rest_[kChamberCount] = {};  ///< slow means of the raw pressures, mpsi * 2^kRestShift
+};
+
+}  // namespace bifa

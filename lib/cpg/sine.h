@@ -1,0 +1,28 @@
+// Sine of an angle in turns / 2^32, for the CPG: table of a quarter, linear interpolation.
+#pragma once
+
+#include "flash.h"
+
+namespace bifa {
+
+/// What sine() returns for 1. Chosen so that the sum of two sines and its extrapolation fit 16 bits, and the step
+/// between two entries of the table fits 8, which makes the interpolation a single multiplication.
+const int16_t kSineOne = 16000;
+
+const uint8_t kSineSteps = 128;  ///< of a quarter turn
+extern const uint16_t kSineTable[kSineSteps + 1];
+
+/// kSineOne * sin(2 pi angle / 2^32). Greatest error 1 (6e-5). Exactly odd, and 0 only where the sine rounds to 0.
+inline __attribute__((always_inline)) int16_t sine(uint32_t angle) {
+  const bool negative = angle & 0x80000000UL;
+  uint16_t position = static_cast<uint16_t>(angle >> 15);  // in the half turn
+  if (angle & 0x40000000UL) position = ~position;          // the half mirrors the quarter
+  const uint8_t fraction = static_cast<uint8_t>(position);
+  const uint16_t* entry = &kSineTable[position >> 8];
+  const uint16_t left = flash_word(entry);
+  const uint8_t step = static_cast<uint8_t>(flash_byte(entry + 1) - left);  // little-endian: its low byte
+  const uint16_t value = left + static_cast<uint8_t>((static_cast<uint16_t>(step * fraction) + 128u) >> 8);
+  return negative ? -static_cast<int16_t>(value) : static_cast<int16_t>(value);
+}
+
+}  // namespace bifa

@@ -1,0 +1,49 @@
+#include "sensor_watch.h"
+
+#include "sensor.h"
+
+namespace bifa {
+
+void TripLimit::follow(uint16_t set_point_mpsi) {
+  int16_t target = static_cast<int16_t>(set_point_mpsi) + kTripMargin_mpsi;
+  if (target > kGreatestTrip_mpsi) target = kGreatestTrip_mpsi;
+  if (limit_mpsi_ - target > kTripFall_mpsi_per_sample) {
+    limit_mpsi_ -= kTripFall_mpsi_per_sample;
+  } else {
+    limit_mpsi_ = target;
+  }
+}
+
+SensorWatch::Finding SensorWatch::look(uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi, ChamberState chamber) {
+  if (out_of_range_.met(!is_in_range(sum), kRangeTime_ms / kSamplePeriod_ms)) {
+    return {Fault::kSensorRange, sensor_mpsi(sum < kSensorLow ? kSensorLow : kSensorHigh)};
+  }
+  if (above_.met(pressure_mpsi > trip_mpsi, kTripTime_ms / kSamplePeriod_ms)) return {Fault::kOverPressure, trip_mpsi};
+
+  if (sum != last_sum_) switched_ = false;
+  if (chamber != ChamberState::kOff && chamber != last_driven_) {
+    switched_ = last_driven_ != ChamberState::kOff;
+    last_driven_ = chamber;
+    unmoved_.reset();
+  }
+  const bool unmoved = unmoved_.met(sum == last_sum_ && switched_, kStuckTime_ms / kSamplePeriod_ms);
+  last_sum_ = sum;
+  if (unmoved) return {Fault::kSensorStuck, static_cast<int16_t>(kStuckTime_ms)};
+  return {Fault::kNone, 0};
+}
+
+bool SensorWatch::stands(Fault fault, uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi) {
+  if (fault == Fault::kSensorRange) return !is_in_range(sum);
+  if (fault == Fault::kOverPressure) return pressure_mpsi > trip_mpsi;
+  return false;
+}
+
+void SensorWatch::reset() {
+  above_.reset();
+  out_of_range_.reset();
+  unmoved_.reset();
+  last_driven_ = ChamberState::kOff;
+  switched_ = false;
+}
+
+}  // namespace bifa

@@ -1,0 +1,62 @@
+// What one pressure channel must not do.
+#pragma once
+
+#include "chamber.h"
+#include "fault.h"
+#include "persistence.h"
+
+namespace bifa {
+
+/// Over-pressure: so far above the set-point, for so long.
+const int16_t kTripMargin_mpsi = 2000;
+const uint16_t kTripTime_ms = 200;
+/// The sensor's range ends at 15 psi: from here on it could not tell over-pressure from itself.
+const int16_t kGreatestTrip_mpsi = 14800;
+/// After the set-point is lowered the trip follows it no faster than air can leave.
+const int16_t kTripFall_mpsi_per_sample = 20;
+
+const uint16_t kRangeTime_ms = 50;
+/// A valve has switched and for so long not the least bit of the reading has moved.
+const uint16_t kStuckTime_ms = 2000;
+
+const uint8_t kSamplePeriod_ms = 10;
+
+/// The limit of over-pressure, which follows the set-point.
+class TripLimit {
+ public:
+  /// Once a sample; `set_point_mpsi` at most 14000.
+  void follow(uint16_t set_point_mpsi);
+  int16_t mpsi() const { return limit_mpsi_; }
+
+ private:
+  int16_t limit_mpsi_ = kTripMargin_mpsi;
+};
+
+/// Watches one sensor.
+class SensorWatch {
+ public:
+  /// What a sample shows.
+  struct Finding {
+    Fault fault;
+    int16_t limit;
+  };
+
+  /// `sum`: raw, `pressure_mpsi`: what it means, `chamber`: what its valves do.
+  Finding look(uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi, ChamberState chamber);
+
+  /// Whether the cause of a fault is there in this very sample.
+  static bool stands(Fault fault, uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi);
+
+  /// Forgets what was counted.
+  void reset();
+
+ private:
+  Persistence above_;
+  Persistence out_of_range_;
+  Persistence unmoved_;
+  uint16_t last_sum_ = 0;
+  ChamberState last_driven_ = ChamberState::kOff;
+  bool switched_ = false;  ///< since the reading last moved
+};
+
+}  // namespace bifa

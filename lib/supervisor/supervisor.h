@@ -1,0 +1,62 @@
+// The one state machine that owns the valves. Everything that moves air goes through it.
+//
+//   idle -> running, holding -> idle          as told
+//   any  -> stopped                            stop byte, emergency stop          -> idle by clear()
+//   any  -> fault                              see Fault                          -> idle by clear()
+//
+// In idle, stopped and fault all valves are off. A fault stays a fault when a stop comes on top.
+#pragma once
+
+#include "extremes.h"
+#include "fault.h"
+#include "sequencer.h"
+#include "state.h"
+#include "valve_pattern.h"
+
+namespace bifa {
+
+class Supervisor {
+ public:
+  explicit Supervisor(ValvePins& pins) : pins_(pins) {}
+
+  State state() const { return state_; }
+  bool is_latched() const { return state_ == State::kStopped || state_ == State::kFault; }
+  bool moves_air() const { return state_ == State::kRunning || state_ == State::kHolding; }
+  const FaultReport& fault() const { return fault_; }
+  ValvePattern valves() const { return on_pins_; }
+  ChamberState wanted(uint8_t chamber) const { return wanted_.of[chamber]; }
+
+  // All of these with interrupts off.
+
+  void run();   ///< only from idle
+  void idle();  ///< from running or holding; nothing in the others
+  /// From idle or holding.
+  void hold(Chamber chamber, ChamberState state);
+  /// To stopped (a fault stays one); the valves are off on return.
+  void stop();
+  /// To fault, unless one stands already; the valves are off on return.
+  void trip(Fault fault, uint8_t channel, int16_t value, int16_t limit, uint32_t time_ms,
+            const LastSecond& last_second);
+  /// From stopped or fault to idle.
+  void clear();
+
+  /// Every millisecond: what the chambers are to do while running.
+  void walk(uint8_t chamber, ChamberState state) {
+    if (state_ == State::kRunning) wanted_.of[chamber] = state;
+  }
+  /// Every millisecond: moves the valves on towards what is wanted.
+  void tick();
+
+ private:
+  void vent();
+  void write(ValvePattern pattern);
+
+  ValvePins& pins_;
+  State state_ = State::kIdle;
+  ChamberStates wanted_ = {{ChamberState::kOff, ChamberState::kOff, ChamberState::kOff}};
+  ValveSequencer sequencers_[kChamberCount];
+  ValvePattern on_pins_;
+  FaultReport fault_ = {};
+};
+
+}  // namespace bifa

@@ -1,0 +1,31 @@
+// One chamber's pair of valves in time: break before make, and a least stay in each state.
+#pragma once
+
+#include "chamber.h"
+
+namespace bifa {
+
+/// For how long both valves stay off when one follows the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms.
+const uint8_t kDeadTime_ms = 3;
+/// How long a valve stays energised at least, however short the command. Venting does not wait for it.
+const uint8_t kDwell_ms = 20;
+
+class ValveSequencer {
+ public:
+  /// Every millisecond, with what the chamber is to do; returns what it does.
+  ChamberState tick(ChamberState wanted);
+
+  /// Off at once.
+  void vent();
+
+  ChamberState state() const { return state_; }
+
+ private:
+  ChamberState state_ = ChamberState::kOff;
+  // Whole milliseconds since the last change, at most kDwell_ms. A change may come just before a tick, so the first
+  // tick after it does not count: that makes every time a lower bound.
+  uint8_t elapsed_ms_ = kDwell_ms;
+  bool fresh_ = false;
+};
+
+}  // namespace bifa

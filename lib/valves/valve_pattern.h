@@ -1,0 +1,42 @@
+// What stands on the six valve pins. It can only be made from chamber states, so that both valves of a chamber are
+// never energised together, whatever a caller does.
+#pragma once
+
+#include "chamber.h"
+
+namespace bifa {
+
+class ValvePattern {
+ public:
+  /// All six valves off.
+  ValvePattern() : bits_(0) {}
+
+  explicit ValvePattern(const ChamberStates& states)
+      : bits_(pair(states.of[0]) | pair(states.of[1]) << 2 | pair(states.of[2]) << 4) {}
+
+  /// Bit 2i: the positive valve of chamber i; bit 2i + 1: its vacuum valve. As on D4 to D9.
+  uint8_t bits() const { return bits_; }
+
+  bool operator==(const ValvePattern& other) const { return bits_ == other.bits_; }
+  bool operator!=(const ValvePattern& other) const { return bits_ != other.bits_; }
+
+ private:
+  // Any other number that is forced into the enum (damaged RAM) means off.
+  static uint8_t pair(ChamberState state) {
+    return state == ChamberState::kPositive ? 1 : state == ChamberState::kVacuum ? 2 : 0;
+  }
+
+  uint8_t bits_;
+};
+
+/// The pins, as the controller sees them.
+class ValvePins {
+ public:
+  /// Puts the pattern on the pins at once; called with interrupts off.
+  virtual void write(ValvePattern pattern) = 0;
+
+ protected:
+  ~ValvePins() = default;
+};
+
+}  // namespace bifa
