@@ -1,0 +1,56 @@
+"""The stiffness curve while it is being fitted: the static fit plus whitened changes of its shape.
+
+In the monomials of a model file, or in Chebyshev's, the coefficients of K are hopelessly correlated. `StiffnessFit.shapes`
+gives directions in which the static data leave the curve uncertain by one standard deviation each: the coordinates
+`body_shape_01` ... (the least certain one first, mostly the continuation beyond the static range).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from bifa.identify.system import Parameter
+from bifa.robot.stiffness import StiffnessCurve
+
+from .stiffness import StiffnessFit
+
+_WIDEST = 60.0  # standard deviations that a shape may move
+_FELT_N = 0.03  # a shape that changes K by less has no say in experiments that move fast
+
+
+@dataclass(frozen=True)
+class FittedCurve:
+    """`prefix` names the actuator's parameters: "body" or "small"."""
+
+    prefix: str
+    fit: StiffnessFit
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(f"{self.prefix}_shape_{i + 1:02d}" for i in range(len(self.fit.coefficients)))
+
+    @cached_property
+    def shapes(self) -> np.ndarray:
+        return self.fit.shapes()
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        source = "one standard deviation of the static fit each"
+        return tuple(Parameter(n, "sd", 0.0, -_WIDEST, _WIDEST, scale=1.0, source=source) for n in self.names)
+
+    @cached_property
+    def felt(self) -> frozenset[str]:
+        """The shapes that matter beyond static loading."""
+        x = np.linspace(self.fit.lower_m, self.fit.upper_m, 200)
+        z = 2.0 * (x - self.fit.lower_m) / (self.fit.upper_m - self.fit.lower_m) - 1.0
+        change = np.abs(chebyshev.chebval(z, self.shapes.T)).max(axis=1)
+        return frozenset(name for name, size in zip(self.names, change, strict=True) if size > _FELT_N)
+
+    def curve(self, weights: tuple[float, ...]) -> StiffnessCurve:
+        """The curve with each shape added as often as `weights` say."""
+        coefficients = self.fit.coefficients + np.asarray(weights) @ self.shapes
+        return StiffnessCurve(tuple(chebyshev.cheb2poly(coefficients)), self.fit.lower_m, self.fit.upper_m)

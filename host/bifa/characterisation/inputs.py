@@ -1,0 +1,155 @@
+"""What was done to the robot in a trial, without what came of it: all that a free-running prediction may use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bifa import simulate
+from bifa.data import Trial
+from bifa.simulate import Plant, Timeline
+
+from .motion import imposed_motion
+from .switches import step_timeline, walk_timeline
+
+STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
+_MM = 1e3
+_STEADY_MM = 0.05  # a pull that departs from its straight line by less was driven at its rate
+
+
+class Inputs(Protocol):
+    """`channels`: what is predicted. `actuator`: "large", "small", or None where it is not a single one's test.
+    `positive_psi`: the supply, where the trial sets one of its own for the walk."""
+
+    channels: tuple[str, ...]
+    actuator: str | None
+    positive_psi: float | None
+
+    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+        """The channels, each of shape (n,). `zeros_m`: K's contracted zero of body and small actuator."""
+        ...
+
+
+@dataclass(frozen=True)
+class StaticInputs:
+    actuator: str
+    time_s: np.ndarray
+    displacement_m: np.ndarray
+    direction: np.ndarray
+    pressure_psi: float
+    channels: tuple[str, ...] = ("force_N", "pressure_psi")
+    positive_psi: None = None
+
+    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+        path_mm = (self.displacement_m - zeros_m[self.actuator == "small"]) * _MM
+        return dict(
+            simulate.static_loading(plant, self.actuator, self.time_s, path_mm, self.pressure_psi).columns
+        )
+
+
+@dataclass(frozen=True)
+class StepInputs:
+    actuator: str
+    time_s: np.ndarray
+    commands: Timeline
+    pressure_psi: float
+    channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
+    positive_psi: None = None
+
+    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+        record = simulate.step_response(
+            plant, self.actuator, self.time_s, self.commands, self.pressure_psi, tolerance_m
+        )
+        zero_mm = zeros_m[self.actuator == "small"] * _MM
+        return dict(record.columns) | {"displacement_mm": record["displacement_mm"] + zero_mm}
+
+
+@dataclass(frozen=True)
+class PullInputs:
+    pulled_s: np.ndarray
+    rate_mm_s: float
+    pressure_psi: float
+    load_cell_N_m: float
+    channels: tuple[str, ...] = ("force_N", "pressure_psi")
+    actuator: None = None
+    positive_psi: None = None
+
+    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+        record = simulate.anchor_pull(
+            plant, self.pulled_s, self.rate_mm_s, self.pressure_psi, self.load_cell_N_m, tolerance_m
+        )
+        return dict(record.columns)
+
+
+@dataclass(frozen=True)
+class WalkInputs:
+    time_s: np.ndarray
+    commands: Timeline
+    inclination_deg: float
+    positive_psi: float | None
+    channels: tuple[str, ...]
+    actuator: None = None
+
+    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+        record = simulate.walk(
+            plant,
+            commands=self.commands,
+            time_s=self.time_s,
+            inclination_deg=self.inclination_deg,
+            tolerance_m=tolerance_m,
+        )
+        return dict(record.columns)
+
+
+def inputs_of(trial: Trial) -> Inputs:
+    """The inputs of a recorded trial."""
+    return _MAKERS[trial.experiment](trial)
+
+
+def _static(trial: Trial) -> StaticInputs:
+    x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
+    return StaticInputs(trial.actuator, trial.time_s - trial.time_s[0], x, direction, trial.pressure_psi)
+
+
+def _step(trial: Trial) -> StepInputs:
+    return StepInputs(trial.actuator, trial.time_s - trial.time_s[0], step_timeline(trial), trial.pressure_psi)
+
+
+def _pull(trial: Trial) -> PullInputs:
+    rate = abs(trial.rate_mm_s)
+    backward = trial.extra.get("direction") == "backward"
+    pulled_mm = np.abs(trial.columns["displacement_mm"])
+    return PullInputs(
+        pulled_s=_pulled_time(trial.time_s - trial.time_s[0], pulled_mm, rate),
+        rate_mm_s=-rate if backward else rate,
+        pressure_psi=trial.pressure_psi,
+        load_cell_N_m=float(trial.extra.get("load_cell_N_m", simulate.records.LOAD_CELL_N_M)),
+    )
+
+
+def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
+    """For how long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
+    moving = (pulled_mm > 0.1 * pulled_mm.max()) & (pulled_mm < 0.95 * pulled_mm.max())
+    begin_s = float(np.median(time_s[moving] - pulled_mm[moving] / rate_mm_s)) if moving.any() else 0.0
+    straight_s = np.clip(time_s - begin_s, 0.0, None)
+    if np.sqrt(np.mean((rate_mm_s * straight_s - pulled_mm) ** 2)) < _STEADY_MM:
+        return straight_s
+    smooth_m, _ = imposed_motion(time_s, pulled_mm / _MM)
+    return np.maximum.accumulate(np.clip(smooth_m * _MM / rate_mm_s, 0.0, None))
+
+
+def _walk(trial: Trial) -> WalkInputs:
+    pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
+    displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
+    return WalkInputs(
+        time_s=trial.time_s - trial.time_s[0],
+        commands=walk_timeline(trial),
+        inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
+        positive_psi=trial.pressure_psi,
+        channels=(*displacements, *pressures),
+    )
+
+
+_MAKERS = {STATIC: _static, STEP: _step, ANCHOR: _pull, WALK: _walk}

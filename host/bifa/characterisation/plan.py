@@ -1,0 +1,105 @@
+"""What a session at the bench consists of (paper, section IV): which trials, at which pressures, how often."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from bifa.data import Trial
+from bifa.robot.gait import BASELINE, Gait
+
+EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
+ACTUATORS = ("large", "small")
+REPEATS = 3
+
+STATIC_RATE_MM_S = 2.0
+PULL_RATE_MM_S = 20.0  # paper, IV.B
+PULL_MM = 40.0
+
+# A second gait, faster and with unequal duties, so that a walk is not one point in the space of gaits.
+BRISK = Gait(3.4, 208.9, 331.9, 0.65, 0.44, 0.44)
+
+
+@dataclass(frozen=True)
+class PlannedTrial:
+    """One recording to be made. `settings` goes to the stand (`inclination_deg`, `direction`)."""
+
+    experiment: str
+    actuator: str | None = None
+    pressure_psi: float | None = None
+    rate_mm_s: float | None = None
+    gait: Gait | None = None
+    cycles: int = 0
+    repeat: int = 1
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def file(self) -> str:
+        """A name that tells the condition: static_large_4psi_2mm_s_1.csv."""
+        parts = [self.experiment.split("_")[0]]
+        if self.actuator:
+            parts.append(self.actuator)
+        if self.pressure_psi is not None:
+            parts.append(f"{self.pressure_psi:g}psi")
+        if self.rate_mm_s is not None:
+            parts.append(f"{self.rate_mm_s:g}mm_s")
+        if self.gait:
+            parts += [f"{self.gait.period_s:g}s", f"{self.gait.psi12_deg:g}", f"{self.gait.psi13_deg:g}"]
+            parts += [f"{duty:g}" for duty in (self.gait.duty_body, self.gait.duty_head, self.gait.duty_tail)]
+        parts += [f"{key.split('_')[0]}{value}" for key, value in sorted(self.settings.items())]
+        return "_".join([*parts, str(self.repeat)]) + ".csv"
+
+    def as_trial(self, columns: Mapping | None = None, **fields: Any) -> Trial:
+        """The trial that this becomes once it is recorded."""
+        return Trial(
+            file=self.file,
+            experiment=self.experiment,
+            columns=dict(columns or {}),
+            actuator=self.actuator,
+            pressure_psi=self.pressure_psi,
+            rate_mm_s=self.rate_mm_s,
+            gait=self.gait.as_dict() if self.gait else None,
+            repeat=self.repeat,
+            extra=dict(self.settings) | fields.pop("extra", {}),
+            **fields,
+        )
+
+
+def session(
+    experiments: Sequence[str] = EXPERIMENTS,
+    *,
+    actuators: Sequence[str] = ACTUATORS,
+    repeats: int = REPEATS,
+    pressures_psi: Sequence[float] | None = None,
+    rate_mm_s: float | None = None,
+    gaits: Sequence[Gait] = (BASELINE, BRISK),
+    cycles: int = 5,
+    settings: Mapping[str, Any] | None = None,
+    quick: bool = False,
+) -> tuple[PlannedTrial, ...]:
+    """The trials of a session, in the order in which they are run.
+
+    45 of them by default. All conditions are gone through once, then again, so that the repeats of a condition are
+    spread over the day and a drift shows between them. `quick`: one pressure less each, faster, twice instead of three
+    times, one gait: for trying things out.
+    """
+    if quick:
+        repeats, cycles, gaits = min(repeats, 2), min(cycles, 3), tuple(gaits)[:1]
+    conditions: list[PlannedTrial] = []
+    if "static_loading" in experiments:
+        speed = rate_mm_s or (5 * STATIC_RATE_MM_S if quick else STATIC_RATE_MM_S)
+        for actuator in actuators:
+            for pressure in pressures_psi or ((0.0, 8.0) if quick else (0.0, 4.0, 8.0)):
+                conditions.append(PlannedTrial("static_loading", actuator, pressure, speed))
+    if "step_response" in experiments:
+        for actuator in actuators:
+            for pressure in pressures_psi or ((8.5,) if quick else (6.5, 8.5)):
+                conditions.append(PlannedTrial("step_response", actuator, pressure))
+    if "anchor_pull" in experiments:
+        for pressure in pressures_psi or ((0.0, 8.5) if quick else (0.0, 5.0, 8.5)):
+            conditions.append(PlannedTrial("anchor_pull", None, pressure, rate_mm_s or PULL_RATE_MM_S))
+    if "locomotion" in experiments:
+        conditions += [PlannedTrial("locomotion", gait=gait, cycles=cycles) for gait in gaits]
+    conditions = [replace(condition, settings=dict(settings or {})) for condition in conditions]
+    return tuple(replace(condition, repeat=repeat) for repeat in range(1, repeats + 1) for condition in conditions)

@@ -1,0 +1,257 @@
+"""The robot and its bench as a `System`: what `bifa fit` and `bifa diagnose` run on.
+
+Displacements of single actuators are those of the data set (0 where the testing machine says 0); the simulator counts
+from K's own contracted zero, so the two differ by that zero, which is 0 where the lab set its instruments well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from bifa import robot, simulate
+from bifa.data import Dataset
+from bifa.data import Trial as Recorded
+from bifa.errors import BifaError
+from bifa.identify.system import (
+    CandidateExperiment,
+    Channels,
+    Correction,
+    CorrectionSite,
+    Effect,
+    Parameter,
+    System,
+    Theta,
+    Trial,
+)
+from bifa.robot import Model
+from bifa.robot.stiffness import StiffnessCurve
+from bifa.simulate import Plant, layout
+from bifa.simulate.plant import mask, numbers, table
+
+from . import candidates, regressors, sites
+from .curves import FittedCurve
+from .errors import TooLittleDataError
+from .inputs import ANCHOR, STATIC, STEP, WALK, Inputs, inputs_of
+from .library import engine_effects
+
+# Not to be had from these experiments: the step test cannot tell the moving mass, an impact of a millisecond not the
+# wall's damper, and the wall's stiffness hides behind mu and x_w. They stay at what is known or nominal.
+FIXED = ("head_mass_kg", "tail_mass_kg", "small_mass_kg", "wall_stiffness_N_m", "wall_damping_Ns_m")
+FRICTION_WOBBLE = 0.01  # from run to run, relative
+_ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
+_EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
+_COARSE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-6}
+
+_LARGE = ("body_damping_Ns_m", "body_area_N_psi", "body_alpha_n_per_s", "body_alpha_s_per_s")
+_SMALL = ("small_damping_Ns_m", "small_area_N_psi", "small_alpha_n_per_s", "small_alpha_s_per_s")
+_PIPE = ("wall_offset_m", "mu_s", "mu_k")
+_SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
+# Which experiments see which parameters; the shapes of the curves are added in `matters`.
+_SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
+    (STATIC, "large"): frozenset({"body_area_N_psi"}),
+    (STATIC, "small"): frozenset({"small_area_N_psi"}),
+    (STEP, "large"): frozenset({*_LARGE, "supply_negative_psi"}),
+    (STEP, "small"): frozenset({*_SMALL, "supply_negative_psi"}),
+    (ANCHOR, None): frozenset({"small_area_N_psi", *_PIPE}),
+    (WALK, None): frozenset({*_LARGE, *_SMALL, *_PIPE, *_SUPPLIES}),
+}
+
+
+class RobotSystem(System):
+    """The robot's base model, its library of effects, and the trials of a data set.
+
+    model: values from which the search starts, and those that are not searched.
+    curves: the fitted stiffness curves, "body" and "small"; their shapes are parameters. An actuator without one keeps
+        the model's.
+    fitted: names of the model's parameters to be searched.
+    """
+
+    name = "pipe robot"
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        model: Model,
+        curves: Mapping[str, FittedCurve],
+        fitted: Sequence[str],
+    ):
+        self.dataset, self.model, self.curves = dataset, model, dict(curves)
+        self.fitted = tuple(fitted)
+        self._inputs = {trial.file: inputs_of(trial) for trial in dataset.trials}
+        self.trials = tuple(_engine_trial(trial, self._inputs[trial.file]) for trial in dataset.trials)
+        self.effects: Mapping[str, Effect] = engine_effects()
+        shapes = [p for curve in self.curves.values() for p in curve.parameters]
+        self.parameters = (*(self._named(name) for name in self.fitted), *shapes)
+        self._curve = lru_cache(maxsize=128)(self._curve_of)
+        self._plant = lru_cache(maxsize=512)(self._plant_of)
+
+    # -- the System protocol ----------------------------------------------------------------------------------
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        inputs: Inputs = trial.payload
+        try:
+            plant, zeros = self._plant(self._key(theta, effects))
+            plant = sites.corrected(plant, corrections)
+            friction = theta.get("friction_scale", 1.0)
+            if friction != 1.0 or inputs.positive_psi is not None:
+                plant = _altered(plant, friction, inputs.positive_psi)
+            tolerance_m = (_COARSE_M if coarse else _EXACT_M)[trial.experiment]
+            channels = inputs.simulate(plant, zeros, tolerance_m)
+        except BifaError:  # a curve that is no longer bistable, values out of range
+            return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
+        channels = sites.corrected_readings(channels, corrections)
+        return {name: channels[name] for name in trial.channels}
+
+    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+        return regressors.of(trial, prediction)
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        if trial.experiment not in (ANCHOR, WALK):
+            return ()
+        return (
+            Parameter(
+                "friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source="friction differs from run to run"
+            ),
+        )
+
+    def matters(self, parameter: str, trial: Trial) -> bool:
+        actuator = trial.payload.actuator
+        if "_shape_" not in parameter:
+            return parameter in _SEEN_BY[trial.experiment, actuator]
+        prefix = parameter.split("_", 1)[0]
+        if actuator is not None and prefix != {"large": "body", "small": "small"}[actuator]:
+            return False
+        if trial.experiment == ANCHOR and prefix == "body":
+            return False
+        return trial.experiment == STATIC or parameter in self.curves[prefix].felt
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        """A converter's count is the least that a pressure can be uncertain by."""
+        return _ADC_COUNT_PSI / np.sqrt(12.0) if channel.startswith("pressure") else 0.0
+
+    @property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        return sites.sites(self.model, self.curves)
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return tuple(
+            CandidateExperiment(
+                experiment=recorded.experiment,
+                settings=settings,
+                trial=_engine_trial(recorded, inputs_of(recorded), measured=False),
+            )
+            for settings, recorded in candidates.of(self.dataset)
+        )
+
+    # -- from a vector to a model -----------------------------------------------------------------------------
+
+    def model_at(self, theta: Theta, effects: Iterable[str] = ()) -> Model:
+        """The model with the values of `theta`, curves included, and these effects active."""
+        values = {name: theta[name] for name in self.fitted}
+        chosen = {
+            effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
+        }
+        model = self.model.with_values(values).with_effects(chosen)
+        return _with_curves(model, {prefix: self._curve(prefix, self._weights(prefix, theta)) for prefix in self.curves})
+
+    def _named(self, name: str) -> Parameter:
+        entry = self.model.parameters[name]
+        low, high = entry.plausible
+        return Parameter(
+            name, entry.unit, entry.value, entry.lower, entry.upper, (low, high), 0.1 * (high - low), entry.source
+        )
+
+    def _weights(self, prefix: str, theta: Theta) -> tuple[float, ...]:
+        return tuple(theta[name] for name in self.curves[prefix].names)
+
+    def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple:
+        """All that a plant depends on, hashable."""
+        named = tuple(theta[name] for name in self.fitted)
+        weights = tuple((prefix, self._weights(prefix, theta)) for prefix in self.curves)
+        extra = tuple(
+            (effect, tuple((p.name, theta[f"{effect}.{p.name}"]) for p in self.effects[effect].parameters))
+            for effect in effects
+        )
+        return named, weights, extra
+
+    def _curve_of(self, prefix: str, weights: tuple[float, ...]) -> StiffnessCurve:
+        curve = self.curves[prefix].curve(weights)
+        curve.equilibria_m  # noqa: B018  (found once, and refused here if the curve is not bistable)
+        return curve
+
+    def _plant_of(self, key: tuple) -> tuple[Plant, tuple[float, float]]:
+        """The compiled code's form of a model, and K's contracted zeros of body and small actuator."""
+        named, weights, extra = key
+        curves = {"body": self.model.body_stiffness, "small": self.model.small_stiffness}
+        curves |= {prefix: self._curve(prefix, w) for prefix, w in weights}
+        effects = {effect: dict(values) for effect, values in extra}
+        values = {name: p.value for name, p in self.model.parameters.items()} | dict(
+            zip(self.fitted, named, strict=True)
+        )
+        values |= {f"{effect}.{name}": v for effect, own in effects.items() for name, v in own.items()}
+        body, small = curves["body"], curves["small"]
+        plant = Plant(numbers(values, body, small), mask(effects), table(body), table(small))
+        return plant, (body.contracted_m, small.contracted_m)
+
+
+def prepare(dataset: Dataset, model: Model | None = None) -> RobotSystem:
+    """A system ready to be fitted to `dataset`: what the lab knows is taken over, the stiffness curves and areas are
+    had from the static data, and every other parameter that the experiments can tell is to be searched.
+
+    Raises TooLittleDataError where the data set holds nothing that can be fitted.
+    """
+    from .start import start  # the stages build on this module's constants
+
+    if not dataset.trials:
+        raise TooLittleDataError("the data set holds no trials: nothing can be fitted")
+    return start(dataset, model or robot.nominal())
+
+
+def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:
+    """Names of the model's parameters that these trials see and the lab does not know."""
+    seen: set[str] = set()
+    for trial in dataset.trials:
+        seen |= _SEEN_BY[trial.experiment, trial.actuator]
+    return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known and n not in FIXED)
+
+
+def _engine_trial(recorded: Recorded, inputs: Inputs, measured: bool = True) -> Trial:
+    channels = {
+        name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
+        for name in inputs.channels
+    }
+    return Trial(
+        name=recorded.file,
+        experiment=recorded.experiment,
+        condition=recorded.condition,
+        time_s=recorded.time_s,
+        channels=channels,
+        session_order=recorded.session_order,
+        payload=inputs,
+    )
+
+
+def _altered(plant: Plant, friction: float, positive_psi: float | None) -> Plant:
+    q = plant.q.copy()
+    q[layout.MU_S] *= friction
+    q[layout.MU_K] *= friction
+    if positive_psi is not None:
+        q[layout.SUPPLY_POSITIVE] = positive_psi
+    return plant._replace(q=q)
+
+
+def _with_curves(model: Model, curves: Mapping[str, StiffnessCurve]) -> Model:
+    from dataclasses import replace
+
+    return replace(model, **{f"{prefix}_stiffness": curve for prefix, curve in curves.items()})
