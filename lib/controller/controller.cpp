@@ -157,6 +157,10 @@ bool Controller::tick(bool emergency_stop_pressed) {
     emergency_stop_ = emergency_stop_pressed;
     if (emergency_stop_pressed) supervisor_.stop();
   }
+  if (--to_next_sample_ms_ == 0) {
+    to_next_sample_ms_ = kSamplePeriod_ms;
+    begin_sample();
+  }
   step_oscillators();
   follow_schedule();
   {
@@ -165,10 +169,7 @@ bool Controller::tick(bool emergency_stop_pressed) {
   }
   watch_host();
   if (round_complete_) finish_sample();
-  if (--to_next_sample_ms_ > 0) return false;
-  to_next_sample_ms_ = kSamplePeriod_ms;
-  begin_sample();
-  return true;
+  return to_next_sample_ms_ == 1;
 }
 
 void Controller::converted_in_interrupt(const RawRound& round) {

@@ -83,8 +83,8 @@ class Controller {
 
   // ---- interrupts ----
 
-  /// Every millisecond. Returns true if the converter is to begin a round with this tick (every tenth). Other
-  /// interrupts may nest in it: what they share is guarded inside.
+  /// Every millisecond. Returns true if the strobe is to rise with the next tick and a round of conversions to begin
+  /// then (every tenth tick). Other interrupts may nest in it: what they share is guarded inside.
   bool tick(bool emergency_stop_pressed);
 
   /// A round of the converter is complete.

@@ -1,0 +1,51 @@
+#include "pins.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+
+#include "wires.h"
+
+namespace board {
+
+namespace {
+const uint8_t kValvesOnD = 0xF0;
+const uint8_t kValvesOnB = 0x03;
+const uint8_t kEmergencyStop = 1 << PD2;
+const uint8_t kLed = 1 << PB5;
+}  // namespace
+
+void Pins::begin() {
+  vent();
+  DDRD |= kValvesOnD;
+  DDRB |= kValvesOnB | kLed;
+  DDRD &= static_cast<uint8_t>(~kEmergencyStop);
+  PORTD |= kEmergencyStop;
+  EICRA = (EICRA & ~(1 << ISC00)) | 1 << ISC01;  // falling edge; the tick looks at the level
+  EIFR = 1 << INTF0;
+  EIMSK |= 1 << INT0;
+}
+
+void Pins::write(bifa::ValvePattern pattern) {
+  const uint8_t bits = pattern.bits();
+  PORTD = (PORTD & static_cast<uint8_t>(~kValvesOnD)) | static_cast<uint8_t>(bits << 4);
+  PORTB = (PORTB & static_cast<uint8_t>(~kValvesOnB)) | bits >> 4;
+}
+
+void vent() {
+  PORTD &= static_cast<uint8_t>(~kValvesOnD);
+  PORTB &= static_cast<uint8_t>(~kValvesOnB);
+}
+
+bool emergency_stop_pressed() { return !(PIND & kEmergencyStop); }
+
+void light(bool on) {
+  if (on) {
+    PORTB |= kLed;
+  } else {
+    PORTB &= static_cast<uint8_t>(~kLed);
+  }
+}
+
+}  // namespace board
+
+ISR(INT0_vect) { board::on_emergency_stop(); }

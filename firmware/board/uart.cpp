@@ -1,0 +1,52 @@
+#include "uart.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+
+#include "wires.h"
+
+namespace board {
+
+namespace {
+
+const uint32_t kBaud = 250000;
+const uint8_t kRingBytes = 128;
+
+uint8_t ring[kRingBytes];
+volatile uint8_t head;  // where the next byte goes in
+volatile uint8_t tail;  // where the next byte comes out
+
+uint8_t after(uint8_t place) { return (place + 1) % kRingBytes; }
+
+}  // namespace
+
+void Uart::begin() {
+  UBRR0 = F_CPU / 8 / kBaud - 1;
+  UCSR0A = 1 << U2X0;
+  UCSR0C = 1 << UCSZ01 | 1 << UCSZ00;  // 8N1
+  UCSR0B = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
+}
+
+void Uart::write(uint8_t byte) {
+  while (room() == 0) sleep_mode();
+  ring[head] = byte;
+  head = after(head);
+  UCSR0B |= 1 << UDRIE0;
+}
+
+uint8_t Uart::room() const { return static_cast<uint8_t>(tail - head - 1) % kRingBytes; }
+
+}  // namespace board
+
+ISR(USART_RX_vect) { board::on_byte(UDR0); }
+
+ISR(USART_UDRE_vect) {
+  using namespace board;
+  if (head == tail) {
+    UCSR0B &= ~(1 << UDRIE0);
+    return;
+  }
+  UDR0 = ring[tail];
+  tail = after(tail);
+}
