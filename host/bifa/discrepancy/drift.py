@@ -1,4 +1,4 @@
-"""Does something change over the session? Repeats made one after the other hide it; the order of the trials shows it."""
+"""Does something change over the session? Repeats in a row hide it; the order of the trials shows it."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _SHARE_OF_LARGEST = 0.05
 
 @dataclass(frozen=True)
 class Dependence:
-    """`share` of the residual's mean square that a curve over these quantities predicts in runs it was not made from."""
+    """`share` of the residual's square that a curve over these quantities predicts in other runs."""
 
     experiment: str
     channel: str
@@ -40,7 +40,7 @@ class Signature:
 
 
 def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[str] = ()) -> Signature:
-    """The signature of what `fitted` leaves, given the test of it; `drifts`: what moves with the order of the session."""
+    """The signature of what `fitted` leaves, given the test of it and what drifts over the session."""
     top = remainder.largest
     places = sorted(
         (key for key, z in remainder.z.items() if z > _VISIBLE and remainder.shared[key] > _SHARE_OF_LARGEST * top),

@@ -118,7 +118,8 @@ def _from_pairs(
     differences, moving = [], []
     for first, second in pairs:
         differences.append(_difference(first, second, channel, residuals))
-        moving.append(_moves(first, channel) | _moves(second, channel))
+        also = np.interp(first.time_s, second.time_s, _moves(second, channel).astype(float)) > 0
+        moving.append(_moves(first, channel) | also)
     everything = np.concatenate(differences)
     still = ~np.concatenate(moving)
     if still.sum() < 20:
