@@ -58,6 +58,7 @@ BASE_PARAMETERS: dict[str, Parameter] = dict(
     [
         _row("head_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_h (4)", "paper: 350 g, a half each"),
         _row("tail_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_t (4)", "paper: 350 g, a half each"),
+        _row("head_segment_mass_kg", 0.1, "kg", 0.0, 0.5, (0.05, 0.15), "m_h (7) of an anchor pull", _SEARCHED),
         _row("body_damping_Ns_m", 130.0, "N s/m", 10.0, 1000.0, (60.0, 260.0), "b_b (1)", _SEARCHED),
         _row("body_area_N_psi", 9.0, "N/psi", 2.0, 25.0, (7.0, 12.0), "a of the body (2)", _SEARCHED),
         _row("body_alpha_n_per_s", 2.0, "1/s", 0.1, 20.0, (1.2, 3.5), "alpha_n of the body (3)", _SEARCHED),

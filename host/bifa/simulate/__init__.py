@@ -1,0 +1,45 @@
+"""The simulator: every experiment of the paper, with any set of effects, fast enough to fit and to optimise.
+
+from bifa import robot, simulate
+record = simulate.walk(robot.nominal(), robot.BASELINE, cycles=10)
+record["displacement_head_mm"]
+"""
+
+from bifa.simulate.gaits import Progress, cores, gait_rows, speed, speeds
+from bifa.simulate.plant import Plant, plant
+from bifa.simulate.records import Record, anchor_pull, static_loading, step_response, walk
+from bifa.simulate.rigs import SimulationError
+from bifa.simulate.timeline import (
+    Timeline,
+    TimelineError,
+    of_gait,
+    of_phases,
+    of_samples,
+    recorded_commands,
+    refine,
+    timeline,
+)
+
+__all__ = [
+    "Plant",
+    "Progress",
+    "Record",
+    "SimulationError",
+    "Timeline",
+    "TimelineError",
+    "anchor_pull",
+    "cores",
+    "gait_rows",
+    "of_gait",
+    "of_phases",
+    "of_samples",
+    "plant",
+    "recorded_commands",
+    "refine",
+    "speed",
+    "speeds",
+    "static_loading",
+    "step_response",
+    "timeline",
+    "walk",
+]

@@ -1,0 +1,33 @@
+"""Backlash: play between the bistable mechanism and the end that moves."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="backlash",
+    summary="the spring follows the moving end only after a play is taken up, and so does a pull at the head",
+    equation="K(y), y follows x as a play of width gap_m; anchor pull: the load train is slack over gap_m",
+    source="play operator, e.g. M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, ch. 2",
+    enters="eq. (1), the argument of K; the load train of the anchor pull",
+    experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
+    confusable_with=("hysteresis",),
+    parameters=(EffectParameter("gap_m", "m", 0.0, 0.01, 0.001, "width of the play", size=True),),
+    states=1,
+)
+
+
+def initial(position_m):
+    """In the middle of the play."""
+    return position_m
+
+
+def play(gap_m, position_m, state):
+    """Where the spring is when the moving end is at `position_m`."""
+    return min(max(state, position_m - 0.5 * gap_m), position_m + 0.5 * gap_m)
+
+
+play_state = play
+
+
+def slack(gap_m):
+    """Travel of the load train before it pulls."""
+    return gap_m

@@ -1,0 +1,19 @@
+"""Friction that differs forward and backward, as tape, bristles or a curved support make it."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="friction_direction",
+    summary="sliding forward meets another friction than sliding backward",
+    equation="mu_forward = mu (1 + asymmetry),  mu_backward = mu (1 - asymmetry)",
+    source="direction-dependent Coulomb friction, e.g. A. Janot et al., the EMPS benchmark (2019)",
+    enters="eq. (5), mu_s and mu_k",
+    experiments=("anchor_pull", "locomotion"),
+    confusable_with=("inclination", "tether_drag"),
+    parameters=(EffectParameter("asymmetry", "", -0.8, 0.8, 0.15, "half the relative difference", size=True),),
+)
+
+
+def grip(asymmetry, direction):
+    """Factor of both coefficients for a direction of sliding, +1 or -1."""
+    return 1.0 + asymmetry * direction

@@ -1,0 +1,22 @@
+"""Line lag: the tube between valve and chamber has to fill first."""
+
+import math
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="line_lag",
+    summary="the pressure at the chamber's inlet follows the valve's with a lag of first order",
+    equation="time_s dp_in/dt = p_d - p_in;  eq. (2) and (3) with p_in for p_d",
+    source="lumped pneumatic line, e.g. E. Richer and Y. Hurmuzlu, J. Dyn. Sys. Meas. Control 122 (2000)",
+    enters="eq. (2), between p_d and the chamber",
+    experiments=("step_response", "locomotion"),
+    confusable_with=("valve_latency",),
+    parameters=(EffectParameter("time_s", "s", 0.0, 0.5, 0.06, "time constant of the tube", size=True),),
+    states=1,
+)
+
+
+def line(time_s, source_psi, step_s, state):
+    """Inlet pressure after the step; `state` is the one before it."""
+    return source_psi + (state - source_psi) * math.exp(-step_s / time_s)

@@ -1,0 +1,22 @@
+"""Sensor calibration: a wrong gain and offset of the pressure reading."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="sensor_calibration",
+    summary="the pressure reading is off by a gain and an offset; the motion itself is as the model says",
+    equation="reading = (1 + gain) p + offset_psi",
+    source="total error band of low-cost pressure sensors (data sheets)",
+    enters="the pressure channels only",
+    experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
+    confusable_with=("leak", "area_variation"),
+    parameters=(
+        EffectParameter("gain", "", -0.4, 0.4, 0.03, "relative error of the gain", size=True),
+        EffectParameter("offset_psi", "psi", -3.0, 3.0, 0.2, "reading at 0 psi", size=True),
+    ),
+)
+
+
+def reading(gain, offset_psi, pressure_psi):
+    """What the sensor says."""
+    return (1.0 + gain) * pressure_psi + offset_psi

@@ -1,0 +1,29 @@
+"""Sensor lag: the pressure reading follows the pressure with a lag of first order."""
+
+import math
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="sensor_lag",
+    summary="the pressure reading follows late; the motion itself is as the model says",
+    equation="time_s ds/dt = p - s, s is read",
+    source="thin tube to the sensor (paper, section II.C: 1/16 in) and the sensor's own filter",
+    enters="the pressure channels only",
+    experiments=("step_response", "locomotion"),
+    confusable_with=(),
+    parameters=(EffectParameter("time_s", "s", 0.0, 0.5, 0.05, "time constant", size=True),),
+    states=1,
+)
+
+
+def initial(pressure_psi):
+    """Settled."""
+    return pressure_psi
+
+
+def sensor(time_s, before_psi, after_psi, step_s, state):
+    """The lagged pressure after a step over which the true one changed evenly."""
+    decay = math.exp(-step_s / time_s)
+    ramp = (after_psi - before_psi) * time_s / step_s
+    return after_psi - ramp + (state - before_psi + ramp) * decay

@@ -1,0 +1,24 @@
+"""Stribeck friction: from static to kinetic friction it falls smoothly with speed, not at once."""
+
+import math
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="stribeck",
+    summary="friction falls smoothly with sliding speed",
+    equation="mu(v) = mu_k + (mu_s - mu_k) exp(-(v / speed_m_s)^2)",
+    source="B. Armstrong-Helouvry et al., Automatica 30 (1994), eq. (4)",
+    enters="eq. (5), mu_k",
+    experiments=("anchor_pull", "locomotion"),
+    confusable_with=(),
+    parameters=(
+        EffectParameter("speed_m_s", "m/s", 0.0, 0.2, 0.01, "speed at which most of it has fallen", size=True),
+    ),
+)
+
+
+def friction(speed_m_s, coefficient, static_coefficient, sliding_m_s):
+    """Coefficient at a sliding speed (not negative)."""
+    ratio = sliding_m_s / speed_m_s
+    return coefficient + (static_coefficient - coefficient) * math.exp(-ratio * ratio)

@@ -1,0 +1,19 @@
+"""Tether drag: the tubes behind the robot drag more, the further it goes."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="tether_drag",
+    summary="a resistance at the tail that grows with the distance travelled",
+    equation="friction of the tail + drag_N_m max(x_t - x_t(0), 0)",
+    source="Coulomb friction of the length of tube already in the pipe",
+    enters="eq. (5) of the tail",
+    experiments=("locomotion",),
+    confusable_with=("friction_direction", "inclination"),
+    parameters=(EffectParameter("drag_N_m", "N/m", 0.0, 30.0, 2.0, "growth with distance", size=True),),
+)
+
+
+def drag(drag_N_m, distance_m):
+    """N of additional friction at the tail."""
+    return drag_N_m * max(distance_m, 0.0)

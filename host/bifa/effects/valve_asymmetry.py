@@ -1,0 +1,21 @@
+"""Valve asymmetry: opening to positive pressure and going back to vacuum take different times."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="valve_asymmetry",
+    summary="one edge of the valves is later than the other",
+    equation="delay of the edge to positive pressure - delay of the edge to vacuum = difference_s; the earlier is 0",
+    source="opening and closing times of solenoid valves differ with their return spring (data sheets)",
+    enters="eq. (2), the time of p_d",
+    experiments=("step_response", "locomotion"),
+    confusable_with=("valve_latency", "choked_flow"),
+    parameters=(
+        EffectParameter("difference_s", "s", -0.3, 0.3, 0.03, "edge to positive minus edge to vacuum", size=True),
+    ),
+)
+
+
+def delay(difference_s, to_positive):
+    """Seconds from command to switch."""
+    return max(difference_s, 0.0) if to_positive else max(-difference_s, 0.0)

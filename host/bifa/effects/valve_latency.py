@@ -1,0 +1,19 @@
+"""Valve latency: the same delay between command and valve on both edges."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="valve_latency",
+    summary="every valve acts a fixed time after its command, opening and closing alike",
+    equation="p_d(t) = p_command(t - delay_s)",
+    source="switching time of solenoid valves, data sheets of 3/2 fast-switching valves",
+    enters="eq. (2), the time of p_d",
+    experiments=("step_response", "locomotion"),
+    confusable_with=("line_lag", "valve_asymmetry"),
+    parameters=(EffectParameter("delay_s", "s", 0.0, 0.3, 0.03, "delay", size=True),),
+)
+
+
+def delay(delay_s):
+    """Seconds from command to switch."""
+    return delay_s

@@ -1,0 +1,98 @@
+"""One actuator over one step: eq. (1)-(3), linearly implicit in the velocity, exact in the pressure.
+
+The state of the pressure is p = F / a, in psi, so that an area that varies stays apart from the air.
+`actuator` is 0 body, 1 head, 2 tail (the place in the effects' memory `z`); `block` is layout.BODY or SMALL.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bifa.simulate import layout
+from bifa.simulate.compiled import merged
+from bifa.simulate.hooks import chains
+
+_THRESHOLD = layout.THRESHOLD
+_ALPHA_S = layout.ALPHA_S
+_ALPHA_N = layout.ALPHA_N
+
+
+@merged
+def stiffness(curve, x):
+    """K(x) and its slope, straight outside the table."""
+    place = (min(max(x, curve[0, 0]), curve[0, 1]) - curve[0, 0]) * curve[0, 2]
+    i = min(int(place), curve.shape[0] - 2)
+    s = place - i
+    c0, c1, c2, c3 = curve[i + 1, 0], curve[i + 1, 1], curve[i + 1, 2], curve[i + 1, 3]
+    slope = (c1 + s * (2.0 * c2 + 3.0 * s * c3)) * curve[0, 2]
+    force = c0 + s * (c1 + s * (c2 + s * c3))
+    if x < curve[0, 0]:
+        force += slope * (x - curve[0, 0])
+    elif x > curve[0, 1]:
+        force += slope * (x - curve[0, 1])
+    return force, slope
+
+
+@merged
+def convergence(q, block, x, inlet):
+    """alpha of eq. (3)."""
+    if x > q[block + _THRESHOLD] and inlet < 0.0:
+        return q[block + _ALPHA_S]
+    return q[block + _ALPHA_N]
+
+
+@merged
+def pressure_after(plant, block, actuator, z, z_new, x, pressure, source, h):
+    """Eq. (2) over a step: exact for the inlet and the convergence factor as they are at its ends."""
+    q, active = plant.q, plant.active
+    inlet = chains.line(active, q, z, actuator, z_new, source, h)
+    rate = chains.filling(active, q, convergence(q, block, x, inlet), inlet - pressure)
+    total = rate + chains.loss(active, q)
+    settled = inlet * rate / total
+    return settled + (pressure - settled) * math.exp(-total * h)
+
+
+@merged
+def area_at(plant, block, x):
+    """a of eq. (2), in N/psi."""
+    q = plant.q
+    share = (x - q[block + layout.CONTRACTED]) / q[block + layout.STROKE]
+    return q[block + layout.AREA] * chains.area(plant.active, q, share)
+
+
+@merged
+def resistance(plant, curve, block, actuator, z, x, v, h):
+    """Spring and damper at the end of a step as `force + growth * velocity`; the velocity is that of the end."""
+    q, active = plant.q, plant.active
+    if active & chains.PLAY:
+        here = chains.play(active, q, z, actuator, x)
+        force, slope = stiffness(curve, here)
+        if v != 0.0:
+            slope *= (chains.play(active, q, z, actuator, x + h * v) - here) / (h * v)
+    else:
+        force, slope = stiffness(curve, x)
+    growth = q[block + layout.DAMPING] + h * slope
+    if active & chains.SPRING:
+        direction = 1.0 if v > 0.0 else (-1.0 if v < 0.0 else 0.0)
+        more, steeper = chains.spring(active, q, z, actuator, block == layout.SMALL, direction, h)
+        force += more
+        growth += steeper
+    return force, growth
+
+
+@merged
+def remember(plant, actuator, z, z_new, x_new, travel, h):
+    """The effects' memory of the spring after a step."""
+    q, active = plant.q, plant.active
+    if active & chains.SPRING_STATE:
+        chains.spring_state(active, q, z, actuator, z_new, travel, h)
+    if active & chains.PLAY:
+        chains.play_state(active, q, z, actuator, z_new, x_new)
+
+
+@merged
+def read_pressure(plant, block, pressure, v, source):
+    """Pressure where the sensor sits; inside, p = (F - b v) / a (section III.A)."""
+    q, active = plant.q, plant.active
+    inside = pressure - q[block + layout.DAMPING] * v / q[block + layout.AREA]
+    return chains.sensed(active, q, inside, source)

@@ -1,0 +1,48 @@
+"""The compiled functions that Python calls, with an on-disk cache that notices a change of any source.
+
+The one file with a cache is generated: three lines a function, and in its name the hash of all sources of the
+simulator and of the effects.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bifa.effects
+from bifa.simulate import generated
+
+_ENTRIES = {
+    "walk_record": "locomotion",
+    "gait_batch": "locomotion",
+    "step_record": "stand",
+    "static_record": "stand",
+    "anchor_record": "stand",
+    "gait_switches": "timeline",
+}
+
+
+def _sources() -> list[str]:
+    folders = (Path(__file__).parent, Path(bifa.effects.__path__[0]))
+    return [path.read_text("utf-8") for folder in folders for path in sorted(folder.glob("*.py"))]
+
+
+def _entry_source() -> str:
+    lines = [f'"""Generated; sources {generated.digest(*_sources())}."""', "from numba import njit"]
+    for name, module in _ENTRIES.items():
+        lines.append(f"from bifa.simulate.{module} import {name} as _{name}")
+    for name, module in _ENTRIES.items():
+        arguments = ", ".join(_arguments(module, name))
+        lines += ["", "", '@njit(cache=True, nogil=True, error_model="numpy")']
+        lines += [f"def {name}({arguments}):", f"    return _{name}({arguments})"]
+    return "\n".join(lines) + "\n"
+
+
+def _arguments(module: str, name: str) -> list[str]:
+    from importlib import import_module
+    from inspect import signature
+
+    function = getattr(import_module(f"bifa.simulate.{module}"), name)
+    return list(signature(function.py_func).parameters)
+
+
+entries = generated.load("entries", _entry_source())

@@ -1,0 +1,192 @@
+"""Marching in time: steps as long as the error allows, ending exactly at switches and samples.
+
+A step of h is taken once whole and once as two halves. Their difference is the error's estimate, and 2 (halves) -
+(whole) is of second order. Where the three are not of one kind (something started to slide, touched the wall or
+passed x_th in between) the halves stand as they are, and the tolerance makes the step short.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from bifa.simulate import layout
+from bifa.simulate.actuator import read_pressure
+from bifa.simulate.compiled import inner, kernel, merged
+from bifa.simulate.hooks import chains
+from bifa.simulate.stepper import (
+    P_BODY,
+    STATES,
+    TOO_LONG,
+    V_HEAD,
+    V_SMALL_HEAD,
+    V_TAIL,
+    X_HEAD,
+    X_TAIL,
+    gravity_of,
+    sources,
+    step,
+)
+
+LONGEST_S = 0.05
+SHORTEST_S = 1e-5
+_FIRST_S = 1e-3
+_POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
+# Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
+_WEIGHTS = np.array(
+    [_POSITION, _VELOCITY, _POSITION, _VELOCITY, _PRESSURE, *(2 * (_SMALL_POSITION, _SMALL_VELOCITY, _PRESSURE))]
+)
+
+
+class Run(NamedTuple):
+    """What a march works on. `y`, `z`: the state now; `clock`: time, proposed step; `slip`: both ends' travel while
+    both slide, the lesser one summed; `command`: (3,) of the chambers; the rest is scratch."""
+
+    y: np.ndarray
+    z: np.ndarray
+    clock: np.ndarray
+    slip: np.ndarray
+    command: np.ndarray
+    gravity: np.ndarray
+    source: np.ndarray
+    whole: np.ndarray
+    first: np.ndarray
+    halves: np.ndarray
+    z_whole: np.ndarray
+    z_first: np.ndarray
+    z_halves: np.ndarray
+    read: np.ndarray
+
+
+@kernel
+def new_run(states_of_effects):
+    """At rest at time 0, everything 0, all valves off."""
+    n = states_of_effects
+    return Run(
+        np.zeros(STATES),
+        np.zeros(n),
+        np.array([0.0, _FIRST_S]),
+        np.zeros(1),
+        np.full(3, 2),
+        np.zeros(2),
+        np.zeros(3),
+        np.zeros(STATES),
+        np.zeros(STATES),
+        np.zeros(STATES),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(3),
+    )
+
+
+@merged
+def start_effects(plant, rig, run):
+    """First memory of the effects, where positions and pressures are as in `run`."""
+    y = run.y
+    gravity_of(plant, rig, run.gravity)
+    if plant.active & chains.INITIAL:
+        for i in range(3):
+            x = y[X_HEAD] - y[X_TAIL] if i == 0 else y[X_HEAD + 2 + 3 * i]
+            chains.initial(plant.active, plant.q, run.z, i, x, y[P_BODY + 3 * i])
+    sources(plant, rig, run.command, y, run.clock[0], run.source)
+    pressures(plant, run)
+
+
+@merged
+def pressures(plant, run):
+    """What the sensors' places see, into `run.read`."""
+    y, read, source = run.y, run.read, run.source
+    read[0] = read_pressure(plant, layout.BODY, y[P_BODY], y[V_HEAD] - y[V_TAIL], source[0])
+    for i in (1, 2):
+        read[i] = read_pressure(plant, layout.SMALL, y[P_BODY + 3 * i], y[V_SMALL_HEAD + 3 * (i - 1)], source[i])
+
+
+@merged
+def shown(plant, run, actuator):
+    """What the sensor of an actuator says."""
+    value = run.read[actuator]
+    if plant.active & chains.SENSOR:
+        value = chains.sensor(plant.active, plant.q, run.z, actuator, value, value, 1e-9)
+    return chains.reading(plant.active, plant.q, value)
+
+
+@merged
+def switched(run):
+    """A valve switched: begin with a short step."""
+    run.clock[1] = _FIRST_S
+
+
+@inner
+def march(plant, rig, run, until, tolerance):
+    """Advance `run` to `until`. `tolerance`: of a position in m, a step."""
+    clock = run.clock
+    y, z = run.y, run.z
+    whole, first, halves = run.whole, run.first, run.halves
+    while until - clock[0] > 1e-12:
+        left = until - clock[0]
+        h = min(clock[1], LONGEST_S)
+        if h > 0.5 * left:
+            h = left if h >= left else 0.5 * left
+        sources(plant, rig, run.command, y, clock[0] + h, run.source)
+        kind = step(plant, rig, run.gravity, run.source, y, z, h, whole, run.z_whole)
+        if kind == TOO_LONG:
+            clock[1] = 0.3 * h
+            continue
+        sources(plant, rig, run.command, y, clock[0] + 0.5 * h, run.source)
+        kind_first = step(plant, rig, run.gravity, run.source, y, z, 0.5 * h, first, run.z_first)
+        sources(plant, rig, run.command, first, clock[0] + h, run.source)
+        kind_second = step(plant, rig, run.gravity, run.source, first, run.z_first, 0.5 * h, halves, run.z_halves)
+        if kind_first == TOO_LONG or kind_second == TOO_LONG:
+            clock[1] = 0.3 * h
+            continue
+        error = 0.0
+        for i in range(STATES):
+            error = max(error, abs(halves[i] - whole[i]) / _WEIGHTS[i])
+        error /= tolerance
+        if error > 1.0 and h > SHORTEST_S:
+            clock[1] = h * max(0.2, 0.9 / math.sqrt(error))
+            continue
+        run.slip[0] += _both_slide(y, first) + _both_slide(first, halves)
+        smooth = kind == kind_first and kind == kind_second
+        _accept(plant, run, smooth)
+        clock[0] += h
+        if plant.active & chains.SENSOR:
+            _sense(plant, run, h)
+        grown = min(3.0, 0.9 / math.sqrt(max(error, 1e-6)))
+        clock[1] = max(clock[1], h * grown) if h < 0.5 * clock[1] else h * grown
+    clock[0] = until
+    if not plant.active & chains.SENSOR:
+        pressures(plant, run)
+
+
+@merged
+def _accept(plant, run, smooth):
+    y, z = run.y, run.z
+    for i in range(STATES):
+        y[i] = 2.0 * run.halves[i] - run.whole[i] if smooth else run.halves[i]
+    if run.halves[V_HEAD] == 0.0:
+        y[V_HEAD] = 0.0
+    if run.halves[V_TAIL] == 0.0:
+        y[V_TAIL] = 0.0
+    if plant.active:
+        for i in range(z.size):
+            z[i] = 2.0 * run.z_halves[i] - run.z_whole[i] if smooth else run.z_halves[i]
+
+
+@merged
+def _both_slide(before, after):
+    if after[V_HEAD] == 0.0 or after[V_TAIL] == 0.0:
+        return 0.0
+    return min(abs(after[X_HEAD] - before[X_HEAD]), abs(after[X_TAIL] - before[X_TAIL]))
+
+
+@merged
+def _sense(plant, run, h):
+    b0, b1, b2 = run.read[0], run.read[1], run.read[2]
+    pressures(plant, run)
+    chains.sensor(plant.active, plant.q, run.z, 0, b0, run.read[0], h)
+    chains.sensor(plant.active, plant.q, run.z, 1, b1, run.read[1], h)
+    chains.sensor(plant.active, plant.q, run.z, 2, b2, run.read[2], h)

@@ -1,0 +1,143 @@
+"""Single actuators on their stands: step response, static loading, anchor pull (paper, section IV)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifa.simulate import layout
+from bifa.simulate.actuator import area_at, pressure_after, remember, resistance
+from bifa.simulate.compiled import kernel
+from bifa.simulate.hooks import chains
+from bifa.simulate.march import march, new_run, pressures, shown, start_effects, switched
+from bifa.simulate.stepper import (
+    HAS_BODY,
+    P_BODY,
+    POSITIVE,
+    VACUUM,
+    X_HEAD,
+    X_SMALL_HEAD,
+    coefficient,
+    grip,
+    sources,
+)
+from bifa.simulate.timeline import delayed
+
+_SETTLE_S = 30.0  # of a step response's vacuum, many times every time constant
+_HOLD_S = 20.0  # of the pressure before a static loading or a pull
+_SUBSTEP_S = 0.005
+
+
+@kernel
+def _places(rig):
+    """Actuator, block, and places of position and pressure in y of a stand's only actuator."""
+    if rig.parts & HAS_BODY:
+        return 0, layout.BODY, X_HEAD, P_BODY
+    return 1, layout.SMALL, X_SMALL_HEAD, P_BODY + 3
+
+
+@kernel
+def _settled(plant, rig, states_of_effects, start, command, seconds, tolerance):
+    """A run that has held `command` until time 0, from rest and vented at `start`."""
+    run = new_run(states_of_effects)
+    actuator, _, x, _ = _places(rig)
+    run.y[x] = start
+    run.clock[0] = -seconds
+    run.command[actuator] = command
+    start_effects(plant, rig, run)
+    march(plant, rig, run, 0.0, tolerance)
+    return run
+
+
+@kernel
+def step_record(plant, rig, states_of_effects, times, command, sample_times, tolerance):
+    """(n, 3): displacement from contracted in m, velocity, reading in psi; at rest under vacuum at time 0."""
+    actuator, block, x, _ = _places(rig)
+    contracted = plant.q[block + layout.CONTRACTED]
+    run = _settled(plant, rig, states_of_effects, contracted, VACUUM, _SETTLE_S, tolerance)
+    late, order = delayed(plant, times, command)
+    out = np.empty((sample_times.size, 3))
+    i = 0
+    for k in range(sample_times.size):
+        while i < order.size and late[order[i]] <= sample_times[k]:
+            march(plant, rig, run, late[order[i]], tolerance)
+            if run.command[actuator] != command[order[i]]:
+                run.command[actuator] = command[order[i]]
+                switched(run)
+            i += 1
+        march(plant, rig, run, sample_times[k], tolerance)
+        out[k, 0] = run.y[x] - contracted
+        out[k, 1] = run.y[x + 1]
+        out[k, 2] = shown(plant, run, actuator)
+    return out
+
+
+@kernel
+def _steady(plant):
+    """Nothing changes the pressure of a chamber that is held at one command."""
+    return not plant.active & chains.SUPPLY
+
+
+@kernel
+def static_record(plant, rig, states_of_effects, displacement, sample_times):
+    """(n, 2): force of the testing machine in N, reading in psi, while it moves the end along `displacement` (n,).
+
+    Quasi-static: K(x) - a p without the damper; the air, and what the effects remember, run in time. The pressure
+    has been held for a while when the record begins.
+    """
+    actuator, block, x, p = _places(rig)
+    curve = plant.body_curve if actuator == 0 else plant.small_curve
+    contracted = plant.q[block + layout.CONTRACTED]
+    run = new_run(states_of_effects)
+    y, z = run.y, run.z
+    y[x] = contracted
+    run.command[actuator] = POSITIVE
+    start_effects(plant, rig, run)
+    out = np.empty((sample_times.size, 2))
+    now = sample_times[0] - _HOLD_S
+    before = contracted
+    for k in range(sample_times.size):
+        span = sample_times[k] - now
+        target = contracted + displacement[k]
+        steps = 1 if _steady(plant) and k > 0 else max(1, int(np.ceil(span / _SUBSTEP_S - 1e-9)))
+        if steps > 0 and span > 0.0:
+            h = span / steps
+            for s in range(steps):
+                reached = before + (target - before) * (s + 1) / steps
+                sources(plant, rig, run.command, y, now + (s + 1) * h, run.source)
+                y[p] = pressure_after(plant, block, actuator, z, z, y[x], y[p], run.source[actuator], h)
+                remember(plant, actuator, z, z, reached, reached - y[x], h)
+                y[x] = reached
+                if plant.active & chains.SENSOR:
+                    old = run.read[actuator]
+                    pressures(plant, run)
+                    chains.sensor(plant.active, plant.q, z, actuator, old, run.read[actuator], h)
+        now, before = sample_times[k], target
+        pressures(plant, run)
+        spring, _ = resistance(plant, curve, block, actuator, z, y[x], 0.0, 0.0)
+        out[k, 0] = spring - area_at(plant, block, y[x]) * y[p]
+        out[k, 1] = shown(plant, run, actuator)
+    return out
+
+
+@kernel
+def anchor_record(plant, rig, states_of_effects, rate, load_cell, sample_times, tolerance):
+    """(n, 2): resistance in N, reading in psi, of a head pulled at `rate` m/s (its sign: direction).
+
+    The head has been extended by pressure and then held at `rig.positive_psi`. Quasi-static: the load cell's spring
+    takes up force until static friction gives, then kinetic friction at the speed of pulling remains.
+    """
+    q = plant.q
+    run = _settled(plant, rig, states_of_effects, q[layout.WALL_OFFSET], POSITIVE, _HOLD_S, tolerance)
+    direction = 1.0 if rate > 0.0 else -1.0
+    slack = chains.slack(plant.active, q)
+    sliding = False
+    out = np.empty((sample_times.size, 2))
+    for k in range(sample_times.size):
+        if sample_times[k] > run.clock[0]:
+            march(plant, rig, run, sample_times[k], tolerance)
+        normal = grip(plant, rig, run.gravity, 0, run.y)
+        pull = load_cell * max(abs(rate) * sample_times[k] - slack, 0.0)
+        sliding = sliding or pull >= coefficient(plant, direction, 0.0) * normal
+        out[k, 0] = coefficient(plant, direction, abs(rate)) * normal if sliding else pull
+        out[k, 1] = shown(plant, run, 1)
+    return out

@@ -1,0 +1,170 @@
+"""Valve commands over time: from a gait, from initial phases, or from a record's command columns.
+
+A timeline is a table of switches in order of time; a chamber that no switch has reached yet is off (vented).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.errors import BifaError
+from bifa.robot import cpg
+from bifa.robot.gait import Gait
+from bifa.simulate.compiled import kernel
+from bifa.simulate.hooks import chains
+from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
+
+_TWO_PI = 2.0 * math.pi
+_RESOLUTION_S = 1e-3
+
+
+class TimelineError(BifaError):
+    """Commands that cannot be simulated; the text says which."""
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """`time_s` (n,) rising, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive, 0 vacuum, 2 off."""
+
+    time_s: np.ndarray
+    chamber: np.ndarray
+    command: np.ndarray
+
+    def at(self, time_s: np.ndarray) -> np.ndarray:
+        """(m, 3) commands in force at times, off before the first."""
+        time_s = np.asarray(time_s, dtype=float)
+        state = np.full((time_s.size, 3), OFF)
+        for chamber in range(3):
+            mine = self.chamber == chamber
+            last = np.searchsorted(self.time_s[mine], time_s, side="right") - 1
+            state[last >= 0, chamber] = self.command[mine][last[last >= 0]]
+        return state
+
+
+def timeline(switches) -> Timeline:
+    """From rows (time_s, chamber, command) in any order; of equal times the later row wins."""
+    rows = np.array(list(switches), dtype=float).reshape(-1, 3)
+    if not np.all(np.isfinite(rows)):
+        raise TimelineError("a switch needs a time, a chamber (0 to 2) and a command (0 to 2), all numbers")
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    chamber, command = rows[:, 1].astype(np.int64), rows[:, 2].astype(np.int64)
+    if np.any((chamber < 0) | (chamber > 2) | (command < 0) | (command > 2)):
+        raise TimelineError("chambers are 0 (body), 1 (head), 2 (tail); commands 0 (vacuum), 1 (positive), 2 (off)")
+    return Timeline(np.ascontiguousarray(rows[:, 0]), chamber, command)
+
+
+def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Timeline:
+    """Settled switching: phases a constant psi apart from time 0 on, the body at `first_phase_rad`."""
+    row = np.array([*gait.as_dict().values()])
+    return Timeline(*gait_switches(row, duration_s, first_phase_rad))
+
+
+def of_phases(gait: Gait, duration_s: float, initial_rad, coupling_per_s: float = cpg.COUPLING_PER_S) -> Timeline:
+    """Switching of eq. (9) integrated from three initial phases, at the robot's 1 kHz."""
+    time = np.arange(0.0, duration_s + 0.5 * _RESOLUTION_S, _RESOLUTION_S)
+    phases = cpg.phases(gait, time, initial_rad, coupling_per_s)
+    return of_samples(time, (np.mod(phases, _TWO_PI) > _TWO_PI * cpg.duties(gait)).astype(float).T)
+
+
+def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:
+    """From recorded commands: `columns` (3, n) of body, head, tail; 1, 0, and NaN for off.
+
+    A switch is put where the new command is first seen. `refine` places it better where the gait is known.
+    """
+    rows = []
+    for chamber, column in enumerate(np.asarray(columns, dtype=float)):
+        state = np.where(np.isnan(column), OFF, column)
+        changes = [0, *(np.flatnonzero(np.diff(state)) + 1)]
+        rows += [(time_s[i], chamber, state[i]) for i in changes]
+    return timeline(rows)
+
+
+def refine(recorded: Timeline, gait: Gait, sample_s: float) -> Timeline:
+    """Place switches of a 100 Hz record to well under a sample by the gait that made them.
+
+    A record shows a switch up to `sample_s` late. The gait's settled times, with start and clock fitted to all the
+    intervals in which switches were seen, are used wherever they fall into those intervals (with half a sample to
+    spare); other switches (a start, a transient) are put in the middle of theirs.
+    """
+    offsets, duty = cpg.phase_offsets_rad(gait), cpg.duties(gait)
+    target = np.where(recorded.command == POSITIVE, duty[recorded.chamber], 0.0)
+    ahead = offsets[recorded.chamber] / _TWO_PI
+    first = recorded.time_s <= recorded.time_s.min()
+    middle = np.where(first, recorded.time_s, recorded.time_s - 0.5 * sample_s)
+    usable = ~first & (recorded.command != OFF)
+    if usable.sum() < 4:
+        return Timeline(middle, recorded.chamber, recorded.command)
+    # switch time = start + clock * period * (cycle + target - ahead)
+    turns = target - ahead
+    rough = middle[usable] / gait.period_s - turns[usable]
+    phase = np.angle(np.exp(1j * _TWO_PI * rough).mean()) / _TWO_PI
+    turns = turns + np.round(middle / gait.period_s - turns - phase)
+    clock, start = _fit_line(gait.period_s * turns[usable], middle[usable], sample_s)
+    predicted = start + clock * gait.period_s * turns
+    good = usable & (np.abs(predicted - middle) <= sample_s)
+    time = np.where(good, predicted, middle)
+    order = np.argsort(time, kind="stable")
+    return Timeline(time[order], recorded.chamber[order], recorded.command[order])
+
+
+def _fit_line(x: np.ndarray, y: np.ndarray, spread: float) -> tuple[float, float]:
+    """Slope and start of the line through most points: those off by more than `spread` are left out in turn."""
+    kept = np.ones(x.size, dtype=bool)
+    slope, start = 1.0, float(np.median(y - x))
+    for _ in range(5):
+        if kept.sum() >= 4 and np.ptp(x[kept]) > 0.0:
+            slope, start = np.polyfit(x[kept], y[kept], 1)
+        kept = np.abs(y - start - slope * x) <= spread
+    return float(slope), float(start)
+
+
+def recorded_commands(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(3, n) of a walk's `command_body`, `command_head`, `command_tail`."""
+    return np.array([columns[f"command_{chamber}"] for chamber in cpg.CHAMBERS], dtype=float)
+
+
+@kernel
+def gait_switches(gait, duration, first_phase):
+    """Switches of a settled gait (period, psi12, psi13 in degrees, three duties) as three arrays."""
+    period = gait[0]
+    cycles = int(duration / period) + 2
+    times = np.empty(3 + 6 * (cycles + 1))
+    chamber = np.empty(times.size, np.int64)
+    command = np.empty(times.size, np.int64)
+    n = 0
+    for i in range(3):
+        phase = first_phase / (2.0 * math.pi)
+        if i > 0:
+            phase += gait[i] / 360.0
+        phase -= math.floor(phase)
+        duty = gait[3 + i]
+        times[n], chamber[n], command[n] = 0.0, i, 1 if phase > duty else 0
+        n += 1
+        if duty >= 1.0 or duty <= 0.0:
+            command[n - 1] = 1 if duty <= 0.0 else 0
+            continue
+        for cycle in range(cycles + 1):
+            for to_positive in range(2):
+                time = (cycle + (duty if to_positive else 0.0) - phase) * period
+                if 0.0 < time < duration:
+                    times[n], chamber[n], command[n] = time, i, to_positive
+                    n += 1
+    order = np.argsort(times[:n], kind="mergesort")
+    return times[:n][order], chamber[:n][order], command[:n][order]
+
+
+@kernel
+def delayed(plant, times, command):
+    """When the valves switch, and the order in which they do."""
+    late = times.copy()
+    if plant.active & chains.DELAY:
+        for i in range(times.size):
+            late[i] += chains.delay(plant.active, plant.q, command[i] == 1)
+    return late, np.argsort(late, kind="mergesort")
+
+
+COMMANDS = {"positive": POSITIVE, "vacuum": VACUUM, "off": OFF}
