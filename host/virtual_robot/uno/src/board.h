@@ -31,6 +31,8 @@ enum {
   REG_ADCSRA = 0x7A,
   REG_ADCSRB = 0x7B,
   REG_ADMUX = 0x7C,
+  REG_TCCR1A = 0x80,
+  REG_TCCR1C = 0x82,
   REG_TWBR = 0xB8,
   REG_TWSR = 0xB9,
   REG_TWDR = 0xBB,
@@ -72,6 +74,11 @@ typedef struct WrappedWrite {  // libsimavr's own handler behind ours
   avr_io_write_t write;
   void *param;
 } WrappedWrite;
+
+typedef struct Compare {
+  WrappedWrite behind;
+  bool level;  // of OC1B, whether it is on the pin or not
+} Compare;
 
 typedef struct Usart {
   ByteQueue line_in;   // on the wire towards the Uno, stamped with the end of the stop bit
@@ -135,6 +142,7 @@ struct Uno {
   int reset_cause, last_reset_cause;
   WrappedWrite port_write[PORT_COUNT * 3];
   uint8_t driven[PORT_COUNT], direction[PORT_COUNT], wired[PORT_COUNT], input[PORT_COUNT];
+  Compare compare;
   Usart usart;
   Adc adc;
   Twi twi;
@@ -167,5 +175,9 @@ void eeprom_after_reset(Uno *uno);
 void pins_attach(Uno *uno);
 void pins_release(Uno *uno);
 void pins_after_reset(Uno *uno);
+void pins_update_port_b(Uno *uno);
+void compare_attach(Uno *uno);
+void compare_after_reset(Uno *uno);
+uint8_t compare_overrides(const Uno *uno, uint8_t latch);
 
 #endif

@@ -83,6 +83,7 @@ static void after_reset(avr_io_t *io) {
   uno->last_reset_cause = cause;
   uno->resets++;
   events_add(uno, UNO_EVENT_RESET, cause, 0);
+  compare_after_reset(uno);
   pins_after_reset(uno);
   usart_after_reset(uno);
   adc_after_reset(uno);
@@ -160,6 +161,7 @@ Uno *uno_new(const char *elf_path, char *error, int error_size) {
   append_io(avr, &uno->after_reset);
   chip_take_register(uno, REG_MCUSR, NULL, mcusr_write);
   pins_attach(uno);
+  compare_attach(uno);
   usart_attach(uno);
   adc_attach(uno);
   twi_attach(uno);

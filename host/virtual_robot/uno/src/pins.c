@@ -27,14 +27,21 @@ static void announce(Uno *uno, int port, uint8_t outputs, uint8_t levels) {
   }
 }
 
+static void update(Uno *uno, int port) {
+  uint8_t outputs = uno->avr->data[port_pin_register[port] + 1];
+  uint8_t latch = uno->avr->data[port_pin_register[port] + 2];
+  if (port == 0) latch = compare_overrides(uno, latch);
+  announce(uno, port, outputs, outputs & latch);
+}
+
+void pins_update_port_b(Uno *uno) { update(uno, 0); }
+
 static void port_written(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
   Uno *uno = param;
   int port = (address - REG_PINB) / 3;
   WrappedWrite *behind = &uno->port_write[address - REG_PINB];
   behind->write(avr, address, value, behind->param);
-  uint8_t outputs = avr->data[port_pin_register[port] + 1];
-  uint8_t latch = avr->data[port_pin_register[port] + 2];
-  announce(uno, port, outputs, outputs & latch);
+  update(uno, port);
 }
 
 // What is wired to an input wins over the pull-up. libsimavr would raise pulled-up pins at each PORT write.
