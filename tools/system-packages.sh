@@ -72,12 +72,13 @@ else
 fi
 
 echo "Installing Debian packages:$missing"
-apt() { $as_root env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 -qq "$@" >/dev/null; }
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+apt() { $as_root env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=120 -qq "$@" >"$log" 2>&1; }
 # shellcheck disable=SC2086  # the list is words on purpose
-apt install --yes --no-install-recommends $missing 2>/dev/null || {
-    apt update
-    apt install --yes --no-install-recommends $missing
-} || {
+apt install --yes --no-install-recommends $missing ||
+    { apt update && apt install --yes --no-install-recommends $missing; } || {
+    tail -n 5 "$log" >&2
     echo "error: apt-get could not install:$missing" >&2
     exit 1
 }

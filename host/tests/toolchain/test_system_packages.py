@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-NEEDED = ("sh", "cut", "sed", "env", "dirname")
+NEEDED = ("sh", "cut", "sed", "env", "dirname", "mktemp", "rm", "tail")
 
 
 @pytest.fixture
@@ -73,10 +73,10 @@ def test_what_is_there_is_left_alone(machine):
 
 def test_a_failing_apt_is_reported(machine):
     machine.program("id", "echo 0")
-    machine.program("apt-get", "exit 100")
+    machine.program("apt-get", "echo E: no room left; exit 100")
     done = machine("lint")
     assert done.returncode == 1
-    assert "error: apt-get could not install: clang-format cppcheck" in done.stderr
+    assert done.stderr == "E: no room left\nerror: apt-get could not install: clang-format cppcheck\n"
 
 
 def test_an_unknown_group_is_refused(machine):
