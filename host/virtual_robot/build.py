@@ -65,7 +65,18 @@ def compile_part(part: Part) -> None:
         sources=[str(p) for p in part.sources()],
         include_dirs=[str(part.folder), *part.include],
         libraries=list(part.libraries),
-        extra_compile_args=["-O2", "-std=gnu11", "-Wall", "-Wextra", "-Wno-missing-field-initializers"],
+        extra_compile_args=[
+            "-O3",
+            "-flto",
+            "-fvisibility=hidden",
+            "-fno-math-errno",
+            "-fno-trapping-math",
+            "-std=gnu11",
+            "-Wall",
+            "-Wextra",
+            "-Wno-missing-field-initializers",
+        ],
+        extra_link_args=["-flto", "-O3"],
     )
     with tempfile.TemporaryDirectory() as scratch:
         built = Path(ffi.compile(tmpdir=scratch, verbose=False))

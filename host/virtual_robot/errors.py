@@ -6,7 +6,7 @@ class VirtualRobotError(Exception):
     """The root of every error that the virtual bench expects."""
 
 
-class NotBuilt(VirtualRobotError):
+class NotBuiltError(VirtualRobotError):
     """A C part has not been compiled."""
 
     def __init__(self, part: str) -> None:
@@ -16,12 +16,12 @@ class NotBuilt(VirtualRobotError):
         )
 
 
-class NoFirmware(VirtualRobotError):
+class FirmwareError(VirtualRobotError):
     """There is no image to run."""
 
     def __init__(self, path: object, why: str = "not found") -> None:
         super().__init__(f"firmware image {path}: {why}; build it with `pio run -e uno`")
 
 
-class PortClosed(ConnectionError):
+class PortClosedError(ConnectionError):
     """The simulated serial port is no longer there (closed, or the board has no power)."""

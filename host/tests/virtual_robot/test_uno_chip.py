@@ -1,8 +1,10 @@
 """The simulated ATmega328P where libsimavr had to be put right: time, pins, resets, interrupts, sleep."""
 
+import itertools
+
 import pytest
 
-from virtual_robot.errors import NoFirmware
+from virtual_robot.errors import FirmwareError
 from virtual_robot.uno import CLOCK_HZ, Uno
 
 pytestmark = pytest.mark.uno
@@ -27,7 +29,7 @@ def test_timer_edges_are_16000_cycles_apart_and_the_chip_sleeps_between(board):
     uno.run_for(0.1)
     rises = [cycle for cycle, level in pin_edges(uno, 4) if level]
     assert len(rises) in (99, 100)
-    assert {b - a for a, b in zip(rises[1:], rises[2:], strict=False)} == {16000}
+    assert {b - a for a, b in itertools.pairwise(rises)} == {16000}
     assert uno.asleep_s / uno.time_s > 0.99
     assert int.from_bytes(uno.peek("ticks", 2), "little") == len(rises)
 
@@ -120,7 +122,8 @@ int main(void) {
 
 def test_the_emergency_input_survives_port_writes_and_resets(board):
     uno = board("""
-int main(void) { DDRD = 0x10; PORTD = 0x04; for (;;) { PORTD ^= 0x20; if (PIND & 4) PORTD |= 0x10; else PORTD &= ~0x10; } }
+int main(void) { DDRD = 0x10; PORTD = 0x04; 
+  for (;;) { PORTD ^= 0x20; if (PIND & 4) PORTD |= 0x10; else PORTD &= ~0x10; } }
 """)
     uno.run_for(0.001)
     assert uno.pin(4) == 1
@@ -173,8 +176,8 @@ int main(void) { DDRD = 0x10; PORTD = 0x10; _delay_us(10); ((void (*)(void))0x30
 
 def test_an_image_that_is_not_one_is_refused(tmp_path):
     text = tmp_path / "x.elf"
-    with pytest.raises(NoFirmware, match="pio run -e uno"):
+    with pytest.raises(FirmwareError, match="pio run -e uno"):
         Uno(text)
     text.write_text("no ELF")
-    with pytest.raises(NoFirmware, match="not an AVR ELF image"):
+    with pytest.raises(FirmwareError, match="not an AVR ELF image"):
         Uno(text)

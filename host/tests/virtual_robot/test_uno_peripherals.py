@@ -1,5 +1,7 @@
 """Serial port, ADC, two-wire bus and EEPROM of the simulated chip against the datasheet's figures."""
 
+import itertools
+
 import pytest
 
 from virtual_robot.uno import CLOCK_HZ
@@ -21,7 +23,7 @@ def test_a_byte_takes_ten_bits_each_way(board):
     stamped = uno.receive_stamped()
     assert bytes(byte for _, byte in stamped) == b"bcd"
     frame = 10 * CLOCK_HZ // 250_000
-    gaps = [b - a for (a, _), (b, _) in zip(stamped, stamped[1:], strict=False)]
+    gaps = [b - a for (a, _), (b, _) in itertools.pairwise(stamped)]
     assert all(abs(gap - frame) <= 8 for gap in gaps)
     assert 2 * frame < stamped[0][0] - start < 2 * frame + 100
 
@@ -41,7 +43,8 @@ def test_the_receiver_holds_three_bytes_and_reports_the_lost_one(board):
     uno = board("""
 int main(void) {
   serial(); _delay_ms(1); put('R');
-  for (uint8_t i = 0; i < 3; i++) { while (!(UCSR0A & 0x80)) {} uint8_t a = UCSR0A; put(UDR0); put(a & 0x08 ? '!' : '.'); }
+  for (uint8_t i = 0; i < 3; i++) { while (!(UCSR0A & 0x80)) {}
+    uint8_t a = UCSR0A; put(UDR0); put(a & 0x08 ? '!' : '.'); }
   for (;;) {}
 }
 """)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from virtual_robot.errors import NoFirmware, NotBuilt
+from virtual_robot.errors import FirmwareError, NotBuiltError
 from virtual_robot.uno import elf
 
 try:
@@ -41,14 +41,14 @@ class Uno:
 
     def __init__(self, firmware: Path, *, eeprom: Path | None = None, keep_events: bool = True) -> None:
         if lib is None:
-            raise NotBuilt("uno")
+            raise NotBuiltError("uno")
         self.firmware = Path(firmware)
         if not self.firmware.is_file():
-            raise NoFirmware(self.firmware)
+            raise FirmwareError(self.firmware)
         error = ffi.new("char[256]")
         self._uno = lib.uno_new(str(self.firmware).encode(), error, 256)
         if self._uno == ffi.NULL:
-            raise NoFirmware(self.firmware, ffi.string(error).decode())
+            raise FirmwareError(self.firmware, ffi.string(error).decode())
         self._symbols: dict[str, tuple[int, int]] | None = None
         self._world: Any = None
         self._eeprom_file = Path(eeprom) if eeprom is not None else None

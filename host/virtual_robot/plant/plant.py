@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plant as Python sees it: a time line of valve commands in, a record of every channel out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from virtual_robot.errors import NotBuiltError
+from virtual_robot.plant.curves import Curve, nominal_curves
+from virtual_robot.plant.parameters import NOMINAL, ParameterError
+
+try:
+    from virtual_robot.plant._plant import ffi, lib
+except ImportError:
+    ffi = lib = None
+
+EXPERIMENTS = ("locomotion", "step_response", "static_loading", "anchor_pull")
+CHAMBERS = ("body", "head", "tail")
+STATES = ("off", "positive", "vacuum")
+
+# One row of a record; the C struct PlantSample.
+SAMPLE = np.dtype(
+    [
+        ("time_s", "f8"),
+        ("head_m", "f8"),
+        ("tail_m", "f8"),
+        ("crosshead_m", "f8"),
+        ("force_N", "f8"),
+        ("pressure_psi", "f8", 3),
+        ("small_m", "f8", 3),
+        ("connected", "i4", 3),
+        ("sliding_head", "i4"),
+        ("sliding_tail", "i4"),
+    ],
+    align=True,
+)
+
+
+class Plant:
+    """One robot with its air and stands. `parameters`: names of PlantParameters in plant.h; absent = 0."""
+
+    def __init__(self, parameters: Mapping[str, float] = NOMINAL, curves: tuple[Curve, Curve] | None = None) -> None:
+        if lib is None:
+            raise NotBuiltError("plant")
+        self.parameters = dict(parameters)
+        numbers = ffi.new("PlantParameters *")
+        for name, value in parameters.items():
+            if not hasattr(numbers, name):
+                raise ParameterError(f"the plant has no parameter {name!r}")
+            setattr(numbers, name, value)
+        body, small = curves or nominal_curves()
+        self._plant = lib.plant_new(numbers, *_table(body), *_table(small))
+        assert ffi.sizeof("PlantSample") == SAMPLE.itemsize
+
+    def close(self) -> None:
+        if self._plant is not None:
+            lib.plant_free(self._plant)
+            self._plant = None
+
+    def __del__(self) -> None:
+        if getattr(self, "_plant", None) is not None:
+            self.close()
+
+    # --- stand ------------------------------------------------------------------------------------------
+
+    def mount(self, experiment: str, chamber: str = "body", start: str = "off") -> None:
+        """Put an experiment on the stand at rest; `start` has been connected until everything settled."""
+        lib.plant_mount(self._plant, EXPERIMENTS.index(experiment), CHAMBERS.index(chamber), STATES.index(start))
+
+    def set_step(self, step_s: float) -> None:
+        """Greatest step of the integrator, until the next mount."""
+        lib.plant_set_step(self._plant, step_s)
+
+    def connect(self, time_s: float, chamber: str, state: str) -> None:
+        """Command a chamber's valves from `time_s` on; commands come in the order of time."""
+        lib.plant_connect(self._plant, time_s, CHAMBERS.index(chamber), STATES.index(state))
+
+    def move(self, start_s: float, travel_m: float, rate_m_s: float, there_and_back: bool) -> None:
+        """Move the cross-head or the puller."""
+        lib.plant_move(self._plant, start_s, travel_m, rate_m_s, there_and_back)
+
+    @property
+    def moving(self) -> bool:
+        return bool(lib.plant_moving(self._plant))
+
+    def record(self, times: Iterable[float] | np.ndarray) -> np.ndarray:
+        """Samples at even, increasing times [s]; array of dtype SAMPLE."""
+        times = np.asarray(times, float)
+        rows = np.zeros(len(times), SAMPLE)
+        period = times[1] - times[0] if len(times) > 1 else 0.0
+        lib.plant_record(self._plant, times[0], period, len(times), ffi.cast("PlantSample *", rows.ctypes.data))
+        return rows
+
+    # --- looking inside ---------------------------------------------------------------------------------
+
+    def spring_force(self, small: bool, displacement_m: np.ndarray) -> np.ndarray:
+        return np.array([lib.plant_spring(self._plant, small, float(x)) for x in np.ravel(displacement_m)])
+
+    def landmarks_m(self, small: bool) -> tuple[float, float, float]:
+        """Contracted, unstable and extended equilibrium."""
+        out = ffi.new("double[3]")
+        lib.plant_landmarks(self._plant, small, out, out + 1, out + 2)
+        return out[0], out[1], out[2]
+
+    @property
+    def energy_joule(self) -> float:
+        return lib.plant_energy(self._plant)
+
+    @property
+    def time_s(self) -> float:
+        return lib.plant_time(self._plant)
+
+    # --- wired to the Uno -------------------------------------------------------------------------------
+
+    def wire(self, uno: Any, noise_seed: int, noise_psi: float, offset_psi: float = 0.0) -> None:
+        """Connect valves, strobe, sensors and DAC to a board; from now on the board's cycles are time."""
+        lib.plant_wire(self._plant, uno.cycle, noise_seed, noise_psi, offset_psi)
+        address = [
+            int(ffi.cast("uintptr_t", pointer))
+            for pointer in (
+                self._plant,
+                lib.plant_pin_changed_address(),
+                lib.plant_analog_volts_address(),
+                lib.plant_dac_changed_address(),
+            )
+        ]
+        uno.connect(*address)
+
+    def remount(self, experiment: str, chamber: str, cycle: int) -> None:
+        """Put another experiment on the stand while the board goes on; time is 0 at `cycle`."""
+        lib.plant_remount(self._plant, EXPERIMENTS.index(experiment), CHAMBERS.index(chamber), cycle)
+
+    def advance(self, time_s: float) -> None:
+        lib.plant_advance(self._plant, time_s)
+
+    def break_sensor(self, channel: int, volts: float | None) -> None:
+        """Fix a sensor's (0-2) or the regulator monitor's (3) output; None = in order again."""
+        lib.plant_break_sensor(self._plant, channel, float("nan") if volts is None else volts)
+
+    @property
+    def both_valves(self) -> int:
+        """How often both valves of a chamber were energised together (must stay 0)."""
+        return lib.plant_both_valves(self._plant)
+
+    def take_strobes(self) -> np.ndarray:
+        """Rising edges of the sampling strobe since the last call [s]."""
+        times = np.zeros(4096)
+        parts = []
+        while count := lib.plant_strobes(self._plant, ffi.cast("double *", times.ctypes.data), len(times)):
+            parts.append(times[:count].copy())
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def watch(self, period_s: float, offset_s: float) -> None:
+        """Have an instrument sample at offset_s + n period_s from now on; period 0 stops."""
+        lib.plant_watch(self._plant, period_s, offset_s)
+
+    def take_watched(self) -> np.ndarray:
+        """What the instrument has seen since the last call; dtype SAMPLE."""
+        rows = np.zeros(4096, SAMPLE)
+        parts = []
+        while count := lib.plant_watched(self._plant, ffi.cast("PlantSample *", rows.ctypes.data), len(rows)):
+            parts.append(rows[:count].copy())
+        return np.concatenate(parts) if parts else np.zeros(0, SAMPLE)
+
+
+def _table(curve: Curve) -> tuple[Any, int, float, float]:
+    force = ffi.new("double[]", list(map(float, curve.force_N)))
+    return force, len(curve.force_N), curve.first_m, curve.step_m

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sealed data sets: effects that nobody is told of, drawn by a seed.
+
+    python -m virtual_robot.sealed --seed 7 --out runs/seven
+
+writes a data set of 45 trials into runs/seven and what is in it into runs/seven.sealed.toml, beside the folder,
+which the diagnosis never opens. Another seed is another specimen of the robot, other noise and another order of
+the day. Effect, size (0.3 to 1.5 of what the lab calls modest) and its remaining parameters are drawn as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from virtual_robot import gait, toml
+from virtual_robot.effects import EFFECTS, LIBRARY, OUTSIDE, plant_parameters
+from virtual_robot.errors import VirtualRobotError
+from virtual_robot.plant import NOMINAL, Curve, nominal_curves
+from virtual_robot.trials import Lab, Plan
+
+KINDS = ("single", "none", "pair", "outside")
+SIZES = (0.3, 1.5)
+REPEATS = 3
+
+# How much specimens differ, sd of the logarithm.
+_SPREAD = {
+    "body_damping_Ns_m": 0.08,
+    "body_area_N_psi": 0.04,
+    "body_alpha_n_per_s": 0.06,
+    "body_alpha_s_per_s": 0.06,
+    "small_damping_Ns_m": 0.08,
+    "small_area_N_psi": 0.03,
+    "small_alpha_n_per_s": 0.06,
+    "small_alpha_s_per_s": 0.06,
+    "wall_stiffness_N_m": 0.10,
+    "wall_damping_Ns_m": 0.10,
+    "mu_s": 0.05,
+    "supply_positive_psi": 0.01,
+    "supply_negative_psi": 0.01,
+}
+_KNOWN = ("head_mass_kg", "tail_mass_kg", "supply_positive_psi", "supply_negative_psi")
+
+
+class SealedError(VirtualRobotError):
+    """The request cannot be carried out."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """What is in a sealed data set: the effects with their parameters, and the specimen."""
+
+    seed: int
+    kind: str
+    effects: Mapping[str, Mapping[str, float]]
+    sizes: Mapping[str, float]
+    parameters: Mapping[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "format": 1,
+            "seed": self.seed,
+            "kind": self.kind,
+            "sizes": dict(self.sizes),
+            "effects": {name: dict(values) for name, values in self.effects.items()},
+            "parameters": dict(self.parameters),
+        }
+
+
+def plans() -> list[Plan]:
+    """The 15 conditions of the day; each is repeated three times."""
+    static = [
+        *(("body", p, 0.002) for p in (0.0, 4.0, 8.5)),
+        ("body", 0.0, 0.008),
+        ("head", 0.0, 0.002),
+        ("head", 8.5, 0.002),
+    ]
+    steps = [("body", 6.0), ("body", 8.5), ("head", 8.5)]
+    walks = {"baseline": gait.BASELINE, "easy": gait.EASY, "leisurely": gait.LEISURELY}
+    named = []
+    for chamber, psi, rate in static:
+        size = "large" if chamber == "body" else "small"
+        name = f"static_{size}_{psi:g}psi_{rate * 1e3:g}mm_s"
+        named.append(Plan("static_loading", name, chamber, psi, rate))
+    for chamber, psi in steps:
+        size = "large" if chamber == "body" else "small"
+        named.append(Plan("step_response", f"step_{size}_{psi:g}psi", chamber, psi))
+    named += [Plan("anchor_pull", f"anchor_{psi:g}psi", "head", psi, 0.020) for psi in (0.0, 5.0, 8.5)]
+    named += [Plan("locomotion", f"walk_{name}", gait=g) for name, g in walks.items()]
+    return named
+
+
+def specimen(random: np.random.Generator) -> tuple[dict[str, float], tuple[Curve, Curve]]:
+    """Another robot of the same design: its parameters and its two stiffness curves."""
+    numbers = dict(NOMINAL)
+    for name, spread in _SPREAD.items():
+        numbers[name] *= float(np.exp(spread * random.standard_normal()))
+    numbers["mu_k"] = numbers["mu_s"] * float(random.uniform(0.80, 0.88))
+    numbers["wall_offset_m"] += float(1e-4 * random.standard_normal())
+    body, small = nominal_curves()
+    deform = 0.04 * random.standard_normal((2, 3))
+    return numbers, (body.deformed(*deform[0]), small.deformed(*deform[1]))
+
+
+def draw_effects(kind: str, random: np.random.Generator) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
+    """Effects with their parameters, and each one's factor of its modest size."""
+    pool, count = {"none": (LIBRARY, 0), "single": (LIBRARY, 1), "pair": (LIBRARY, 2), "outside": (OUTSIDE, 1)}[kind]
+    names = [str(name) for name in random.choice(pool, count, replace=False)]
+    sizes = {name: float(random.uniform(*SIZES)) for name in names}
+    return {name: EFFECTS[name].at(sizes[name], random) for name in names}, sizes
+
+
+def generate(
+    seed: int,
+    out: Path,
+    kind: str = "single",
+    effect: str | None = None,
+    size: float | None = None,
+    label_file: Path | None = None,
+) -> Label:
+    """Write the data set `out` and its label; both appear complete or not at all.
+
+    `effect` and `size` (a factor of its modest size) fix what would be drawn. Raises SealedError if `out` exists
+    or the effect is unknown.
+    """
+    out = Path(out)
+    if out.exists():
+        raise SealedError(f"{out} exists already; data sets are never overwritten")
+    if kind not in KINDS:
+        raise SealedError(f"no kind {kind!r}; there are {', '.join(KINDS)}")
+    if effect is not None and effect not in EFFECTS:
+        raise SealedError(f"no effect {effect!r}; there are {', '.join(EFFECTS)}")
+    random = np.random.default_rng(seed)
+    parameters, curves = specimen(random)
+    effects, sizes = draw_effects(kind, random)
+    if effect is not None:
+        sizes = {effect: float(random.uniform(*SIZES)) if size is None else size}
+        effects = {effect: EFFECTS[effect].at(sizes[effect], random)}
+    lab = Lab(parameters | plant_parameters(effects), curves)
+    label = Label(seed, kind, effects, sizes, parameters)
+    write(out, f"sealed-{seed}", lab, random)
+    (label_file or out.with_name(out.name + ".sealed.toml")).write_text(toml.dumps(label.as_dict()))
+    return label
+
+
+def write(out: Path, name: str, lab: Lab, random: np.random.Generator) -> None:
+    """Run the day's trials in a random order and write them in the contract's format."""
+    day = [(plan, repeat) for plan in plans() for repeat in range(1, REPEATS + 1)]
+    order = {job: place for place, job in enumerate(random.permutation(len(day)))}
+    out.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}-"))
+    try:
+        entries = []
+        for job, (plan, repeat) in enumerate(day):
+            place = order[job]
+            columns = lab.run(plan, place / (len(day) - 1), random)
+            file = f"{plan.name}_{repeat}.csv"
+            write_csv(scratch / file, columns)
+            entries.append({"file": file, **plan.entry(), "repeat": repeat, "session_order": int(place) + 1})
+        head = {
+            "format": 1,
+            "name": name,
+            "known": {key: round(lab.parameters[key], 6) for key in _KNOWN},
+            "trial": entries,
+        }
+        (scratch / "dataset.toml").write_text(toml.dumps(head))
+        scratch.chmod(0o755)
+        scratch.rename(out)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+
+
+def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """One header line, then rows with the digits that the instruments give."""
+    digits = [_digits(name) for name in columns]
+    line = ",".join(f"%.{n}f" for n in digits) + "\n"
+    rows = np.column_stack(list(columns.values()))
+    text = (line * len(rows)) % tuple(rows.ravel())
+    path.write_text(",".join(columns) + "\n" + text)
+
+
+def _digits(column: str) -> int:
+    if column.startswith("command"):
+        return 0
+    return {"time_s": 4, "force_N": 3}.get(column, 4)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m virtual_robot.sealed",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--out", type=Path, required=True, help="folder of the data set, new")
+    parser.add_argument("--label", type=Path, help="the sealed file (default: OUT.sealed.toml)")
+    parser.add_argument("--effect", help=f"instead of a drawn one: {', '.join(EFFECTS)}")
+    parser.add_argument("--size", type=float, help="factor of its modest size, instead of a drawn one")
+    kind = parser.add_mutually_exclusive_group()
+    for name, text in (
+        ("none", "no effect"),
+        ("pair", "two effects of the library"),
+        ("outside", "an effect in no library"),
+    ):
+        kind.add_argument(f"--{name}", dest="kind", action="store_const", const=name, help=text)
+    options = parser.parse_args(arguments)
+    try:
+        generate(options.seed, options.out, options.kind or "single", options.effect, options.size, options.label)
+    except VirtualRobotError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One day in the lab without the Uno: the trials of a data set straight from the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from virtual_robot.gait import Gait
+from virtual_robot.instruments.sensors import Noise, converted_psi, measured
+from virtual_robot.plant import Curve, Plant
+
+_STATIC_HZ, _STEP_HZ, _ANCHOR_HZ, _WALK_HZ = 50.0, 100.0, 50.0, 100.0
+_STEP_UP_S, _STEP_DOWN_S, _STEP_END_S = 0.5, 5.0, 14.0
+_PULL_M = 0.06
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What one trial does. `chamber` is "body" (large actuator) or "head" (small)."""
+
+    experiment: str
+    name: str
+    chamber: str = "body"
+    pressure_psi: float = 0.0
+    rate_m_s: float = 0.0
+    gait: Gait | None = None
+    cycles: int = 5
+
+    @property
+    def actuator(self) -> str:
+        return "large" if self.chamber == "body" else "small"
+
+    def entry(self) -> dict[str, Any]:
+        """Its keys of [[trial]] in dataset.toml."""
+        entry: dict[str, Any] = {"experiment": self.experiment}
+        if self.experiment in ("static_loading", "step_response"):
+            entry["actuator"] = self.actuator
+        if self.experiment != "locomotion":
+            entry["pressure_psi"] = self.pressure_psi
+        if self.experiment in ("static_loading", "anchor_pull"):
+            entry["rate_mm_s"] = self.rate_m_s * 1e3
+        if self.gait is not None:
+            entry["gait"] = self.gait.as_dict()
+        return entry
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A robot and its bench. `parameters` are the plant's; `wobble` is the friction's run-to-run sd."""
+
+    parameters: Mapping[str, float]
+    curves: tuple[Curve, Curve] | None = None
+    noise: Noise = field(default_factory=Noise)
+    wobble: float = 0.01
+
+    def run(self, plan: Plan, session_share: float, random: np.random.Generator) -> dict[str, np.ndarray]:
+        """The trial's columns as in the contract's table."""
+        own = {
+            "friction_factor": float(1.0 + self.wobble * random.standard_normal()),
+            "ripple_phase_rad": float(random.uniform(0.0, 2.0 * np.pi)),
+            "session_share": session_share,
+        }
+        if plan.experiment != "locomotion":
+            own["supply_positive_psi"] = plan.pressure_psi
+        plant = Plant({**self.parameters, **own}, self.curves)
+        try:
+            return _RUNS[plan.experiment](self, plant, plan, random)
+        finally:
+            plant.close()
+
+    def pressure(self, rows: np.ndarray, chamber: int, random: np.random.Generator) -> np.ndarray:
+        return converted_psi(rows["pressure_psi"][:, chamber], self.noise.pressure_psi, random)
+
+
+def _chamber_number(plan: Plan) -> int:
+    return 0 if plan.chamber == "body" else 1
+
+
+def _static(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
+    contracted, _, extended = plant.landmarks_m(plan.chamber != "body")
+    travel = np.round((extended - contracted) * 1e3, 1) * 1e-3
+    plant.mount("static_loading", plan.chamber, "positive" if plan.pressure_psi > 0 else "off")
+    plant.move(0.0, travel, plan.rate_m_s, there_and_back=True)
+    time = np.arange(int(2.0 * travel / plan.rate_m_s * _STATIC_HZ) + 1) / _STATIC_HZ
+    rows = plant.record(time)
+    return {
+        "time_s": time,
+        "displacement_mm": 1e3 * measured(rows["crosshead_m"], lab.noise.crosshead_m, random),
+        "force_N": measured(rows["force_N"], lab.noise.force_N, random),
+        "pressure_psi": lab.pressure(rows, _chamber_number(plan), random),
+    }
+
+
+def _step(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
+    plant.mount("step_response", plan.chamber, "vacuum")
+    plant.connect(_STEP_UP_S, plan.chamber, "positive")
+    plant.connect(_STEP_DOWN_S, plan.chamber, "vacuum")
+    time = np.arange(int(_STEP_END_S * _STEP_HZ) + 1) / _STEP_HZ
+    rows = plant.record(time)
+    return {
+        "time_s": time,
+        "command": ((time >= _STEP_UP_S - 1e-9) & (time < _STEP_DOWN_S - 1e-9)).astype(int),
+        "displacement_mm": 1e3 * measured(rows["head_m"], lab.noise.camera_m, random),
+        "pressure_psi": lab.pressure(rows, _chamber_number(plan), random),
+    }
+
+
+def _anchor(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
+    plant.mount("anchor_pull", "head", "positive" if plan.pressure_psi > 0 else "off")
+    plant.move(0.0, _PULL_M, plan.rate_m_s, there_and_back=False)
+    time = np.arange(int(_PULL_M / plan.rate_m_s * _ANCHOR_HZ)) / _ANCHOR_HZ
+    rows = plant.record(time)
+    return {
+        "time_s": time,
+        "displacement_mm": 1e3 * measured(rows["crosshead_m"], lab.noise.crosshead_m, random),
+        "force_N": measured(rows["force_N"], lab.noise.force_N, random),
+        "pressure_psi": lab.pressure(rows, 1, random),
+    }
+
+
+def _walk(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
+    assert plan.gait is not None
+    time = np.arange(round(plan.cycles * plan.gait.period_s * _WALK_HZ) + 1) / _WALK_HZ
+    commands = plan.gait.commands(time)
+    plant.mount("locomotion")
+    # The controller switches on the grid of the samples, so the commands recorded are the whole truth.
+    changed = np.vstack([np.ones((1, 3), bool), np.diff(commands, axis=0) != 0])
+    for k, c in zip(*np.nonzero(changed), strict=True):
+        plant.connect(time[k], ("body", "head", "tail")[c], "positive" if commands[k, c] else "vacuum")
+    rows = plant.record(time)
+    return {
+        "time_s": time,
+        **{f"command_{name}": commands[:, c] for c, name in enumerate(("body", "head", "tail"))},
+        "displacement_head_mm": 1e3 * measured(rows["head_m"], lab.noise.camera_m, random),
+        "displacement_tail_mm": 1e3 * measured(rows["tail_m"], lab.noise.camera_m, random),
+        **{f"pressure_{name}_psi": lab.pressure(rows, c, random) for c, name in enumerate(("body", "head", "tail"))},
+    }
+
+
+_RUNS: dict[str, Callable[[Lab, Plant, Plan, np.random.Generator], dict[str, np.ndarray]]] = {
+    "static_loading": _static,
+    "step_response": _step,
+    "anchor_pull": _anchor,
+    "locomotion": _walk,
+}
