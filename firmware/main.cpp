@@ -11,8 +11,7 @@
 #include "board/uart.h"
 #include "board/wires.h"
 #include "controller.h"
-#include "parameters.h"
-#include "receiver.h"
+#include "host_port.h"
 
 namespace {
 
@@ -20,16 +19,30 @@ board::Pins pins;
 board::Uart uart;
 board::Cells cells;
 bifa::Controller controller(pins);
-bifa::Receiver receiver;
+bifa::HostPort port(controller, cells, uart);
+
+const uint16_t kSupplyEvery_ms = 100;
+
+/// Tells the regulator its set-point when that has changed, and again from time to time.
+void tell_supply() {
+  static uint16_t told = 0xFFFF;
+  static uint32_t told_ms = 0;
+  const bifa::SupplyCode code = controller.supply();
+  const uint32_t now_ms = controller.uptime_ms();
+  if (code.counts() == told && now_ms - told_ms < kSupplyEvery_ms) return;
+  told = code.counts();
+  told_ms = now_ms;
+  controller.supply_told(board::regulator_write(code));
+}
 
 }  // namespace
 
 bool board::on_tick(bool emergency_stop_pressed) {
-  receiver.tick();
+  port.tick_in_interrupt();
   return controller.tick(emergency_stop_pressed);
 }
 void board::on_byte(uint8_t byte) {
-  if (receiver.push(byte)) controller.stop_in_interrupt();
+  if (port.byte_in_interrupt(byte)) controller.stop_in_interrupt();
 }
 void board::on_emergency_stop() { controller.stop_in_interrupt(); }
 void board::on_round(const bifa::RawRound& round) { controller.converted_in_interrupt(round); }
@@ -37,8 +50,9 @@ void board::on_round(const bifa::RawRound& round) { controller.converted_in_inte
 void setup() {
   TIMSK0 = 0;
   pins.begin();
-  controller.begin(board::start_cause(), bifa::factory_preset(0), bifa::Calibration());
   uart.begin();
+  const bifa::StartCause cause = board::start_cause();
+  port.begin(board::boot_nonce(), cause);
   board::regulator_begin();
   board::converter_begin();
   board::tick_begin();
@@ -47,5 +61,7 @@ void setup() {
 
 void loop() {
   board::watchdog_feed();
-  sleep_mode();
+  port.poll();
+  tell_supply();
+  if (!port.has_input()) sleep_mode();
 }

@@ -10,6 +10,7 @@ def command_header(table: CommandTable) -> str:
     width = max(len(c.name) for c in typed) + 1
     results = "\n".join(f"  {constant(name)}," for name, _ in table.results)
     ids = "\n".join(f"  {constant(c.name)}," for c in typed)
+    words = "\n".join(f"extern const char k{name}Words[] BIFA_FLASH;" for name in table.words)
     return f"""{NOTICE}#pragma once
 
 #include <stdint.h>
@@ -40,6 +41,9 @@ struct CommandDescriptor {{
 }};
 extern const CommandDescriptor kCommandDescriptors[kCommandCount];
 
+// Words for numbers, one after the other, each ended by a zero; see word() in print.h.
+{words}
+
 }}  // namespace bifa
 """
 
@@ -56,6 +60,10 @@ def command_source(table: CommandTable) -> str:
         f"reinterpret_cast<FlashText>({constant(c.name)}Help)}},"
         for c in typed
     )
+    words = "\n".join(
+        f"const char k{name}Words[] BIFA_FLASH =\n    " + " ".join(text(word + "\0") for word in words) + ";"
+        for name, words in table.words.items()
+    )
     cases = "\n".join(
         f"    case Result::{constant(name)}:\n      return BIFA_TEXT({text(words)});" for name, words in table.results
     )
@@ -70,6 +78,8 @@ namespace {{
 const CommandDescriptor kCommandDescriptors[kCommandCount] BIFA_FLASH = {{
 {rows}
 }};
+
+{words}
 
 FlashText result_text(Result result) {{
   switch (result) {{

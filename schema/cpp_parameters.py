@@ -12,7 +12,7 @@ def constant(name: str) -> str:
 
 
 def text(value: str) -> str:
-    return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "\\0") + '"'
 
 
 def header(table: ParameterTable) -> str:

@@ -86,6 +86,7 @@ class CommandTable:
     commands: tuple[Command, ...]
     reports: tuple[Message, ...]
     results: tuple[tuple[str, str], ...]
+    words: dict[str, list[str]]
 
 
 def _load(name: str) -> dict:
@@ -151,7 +152,7 @@ def command_table() -> CommandTable:
     if len({m.number for m in messages}) != len(messages):
         raise ValueError("two messages have the same number")
     results = tuple((row["name"], row["text"]) for row in raw["result"])
-    return CommandTable(raw["protocol_version"], commands, reports, results)
+    return CommandTable(raw["protocol_version"], commands, reports, results, raw["words"])
 
 
 def table_hash(parameters: ParameterTable, commands: CommandTable) -> int:
@@ -163,5 +164,6 @@ def table_hash(parameters: ParameterTable, commands: CommandTable) -> int:
             for m in [*(c.message for c in commands.commands if c.message), *commands.reports]
         ],
         "results": [name for name, _ in commands.results],
+        "words": commands.words,
     }
     return int.from_bytes(hashlib.sha256(json.dumps(agreed).encode()).digest()[:4], "little")

@@ -64,6 +64,17 @@ const CommandDescriptor kCommandDescriptors[kCommandCount] BIFA_FLASH = {
     {"echo", reinterpret_cast<FlashText>(kEchoUsage), reinterpret_cast<FlashText>(kEchoHelp)},
 };
 
+const char kChamberWords[] BIFA_FLASH =
+    "body\0" "head\0" "tail\0";
+const char kChamberStateWords[] BIFA_FLASH =
+    "off\0" "vacuum\0" "positive\0";
+const char kStateWords[] BIFA_FLASH =
+    "idle\0" "running\0" "holding\0" "stopped\0" "fault\0";
+const char kFaultWords[] BIFA_FLASH =
+    "none\0" "over_pressure\0" "sensor_range\0" "sensor_stuck\0" "regulator\0" "supply_control\0" "host_silent\0" "watchdog\0" "brown_out\0";
+const char kStartCauseWords[] BIFA_FLASH =
+    "power\0" "external\0" "brown_out\0" "watchdog\0";
+
 FlashText result_text(Result result) {
   switch (result) {
     case Result::kOk:
@@ -95,7 +106,7 @@ FlashText result_text(Result result) {
     case Result::kCheck:
       return BIFA_TEXT("the set arrived differently from what was meant");
     case Result::kFault:
-      return BIFA_TEXT("the cause of the fault is still there; type status");
+      return BIFA_TEXT("its cause is still there; type status");
     case Result::kOrder:
       return BIFA_TEXT("times must not go backwards");
   }

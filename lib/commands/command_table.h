@@ -62,4 +62,11 @@ struct CommandDescriptor {
 };
 extern const CommandDescriptor kCommandDescriptors[kCommandCount];
 
+// Words for numbers, one after the other, each ended by a zero; see word() in print.h.
+extern const char kChamberWords[] BIFA_FLASH;
+extern const char kChamberStateWords[] BIFA_FLASH;
+extern const char kStateWords[] BIFA_FLASH;
+extern const char kFaultWords[] BIFA_FLASH;
+extern const char kStartCauseWords[] BIFA_FLASH;
+
 }  // namespace bifa

@@ -10,7 +10,7 @@ namespace bifa {
 
 const uint8_t kProtocolVersion = 1;
 /// Changes whenever anything changes that host and Uno must agree on.
-const uint32_t kTableHash = 0x2D7D9C47UL;
+const uint32_t kTableHash = 0x7D108464UL;
 
 enum class MessageId : uint8_t {
   kVersion = 0x01,
@@ -47,7 +47,7 @@ enum class MessageId : uint8_t {
 };
 
 const uint8_t kLongestInward = 12;   ///< bytes of the fields of the longest message to the Uno
-const uint8_t kLongestOutward = 27;  ///< and of the longest from it
+const uint8_t kLongestOutward = 43;  ///< and of the longest from it
 const uint8_t kNameBytes = 12;
 
 /// The real-time stop between its delimiters; the same in every version, and always the same bytes.
@@ -134,7 +134,7 @@ struct HelloMessage {
   uint8_t firmware[3];
   uint32_t table_hash;
   uint16_t boot_nonce;
-  uint8_t reset_cause;
+  uint8_t start_cause;
   uint16_t session_key;
 } __attribute__((packed));
 static_assert(sizeof(HelloMessage) == 13, "no holes");
@@ -145,13 +145,16 @@ struct DoneMessage {
 } __attribute__((packed));
 static_assert(sizeof(DoneMessage) == 1, "no holes");
 
-/// answer to status; bit 0 of flags: the wanted set is not yet the running one, bit 1: timed holds are running.
+/// answer to status; flags: 1 the wanted set is not yet the running one, 2 timed holds are running, 4 the emergency stop is pressed.
 struct StatusReportMessage {
   uint8_t state;
   uint8_t fault;
   uint8_t fault_channel;
   int16_t fault_value;
   int16_t fault_limit;
+  uint32_t fault_time_ms;
+  int16_t fault_lowest_mpsi[3];
+  int16_t fault_highest_mpsi[3];
   int16_t pressure_mpsi[3];
   uint8_t valves;
   uint8_t flags;
@@ -161,7 +164,7 @@ struct StatusReportMessage {
   uint16_t bytes_lost;
   uint16_t samples_lost;
 } __attribute__((packed));
-static_assert(sizeof(StatusReportMessage) == 27, "no holes");
+static_assert(sizeof(StatusReportMessage) == 43, "no holes");
 
 /// answer to read_set; pending is 1 until the running set is this one.
 struct SetReportMessage {

@@ -26,6 +26,8 @@ class Receiver {
   /// Takes the next byte out of the queue; false if it is empty.
   bool pop(uint8_t& byte);
 
+  bool has_input() const { return head_ != tail_; }
+
   /// Whether bytes were lost for want of room. Then nothing more is queued until the queue is empty and recover() called.
   bool overrun() const { return overrun_; }
   /// Starts to queue again (with interrupts off); returns whether the next byte belongs to a frame.

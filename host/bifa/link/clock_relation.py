@@ -1,0 +1,84 @@
+"""The Uno's clock in terms of the host's: offset and drift, with a bound that holds whatever the delays were.
+
+Every exchange says that the Uno's time fell between the host's sending and receiving. All exchanges together confine the
+straight line host = offset + rate * uno; the extremes of what is left bound the error. An Uno's ceramic resonator is good
+to 0.5 %.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+
+LARGEST_DRIFT = 0.01
+EXCHANGES_KEPT = 64
+
+
+@dataclass(frozen=True)
+class HostTime:
+    """A moment on the host's clock, right within +- bound_s."""
+
+    time_s: float
+    bound_s: float
+
+
+class ClockRelation:
+    """Collects exchanges; empty until the first."""
+
+    def __init__(self) -> None:
+        self._exchanges: deque[tuple[float, float, float]] = deque(maxlen=EXCHANGES_KEPT)
+
+    def __len__(self) -> int:
+        return len(self._exchanges)
+
+    def add(self, sent_s: float, uno_s: float, received_s: float) -> None:
+        """The Uno read `uno_s` at some moment between the host's `sent_s` and `received_s`."""
+        self._exchanges.append((sent_s, uno_s, received_s))
+
+    def to_host(self, uno_s: float) -> HostTime:
+        """When the Uno's clock showed `uno_s`; raises ValueError before the first exchange."""
+        low, high = self._extremes(np.array([1.0, uno_s - self._origin()[0]]))
+        return HostTime(self._origin()[1] + (low + high) / 2, (high - low) / 2)
+
+    @property
+    def offset_s(self) -> float:
+        """Host time minus Uno time at the middle of the exchanges."""
+        uno_s = self._origin()[0]
+        return self.to_host(uno_s).time_s - uno_s
+
+    @property
+    def drift(self) -> float:
+        """How much faster the host's clock runs, as a fraction."""
+        low, high = self._extremes(np.array([0.0, 1.0]))
+        return (low + high) / 2 - 1
+
+    @property
+    def bound_s(self) -> float:
+        """Bound of the error at the middle of the exchanges."""
+        return self.to_host(self._origin()[0]).bound_s
+
+    def _origin(self) -> tuple[float, float]:
+        """Middle of the exchanges: (Uno time, host time)."""
+        if not self._exchanges:
+            raise ValueError("no exchange of clocks yet")
+        table = np.array(self._exchanges)
+        return float(table[:, 1].mean()), float((table[:, 0] + table[:, 2]).mean() / 2)
+
+    def _extremes(self, objective: np.ndarray) -> tuple[float, float]:
+        """Least and greatest objective . (offset, rate) that all exchanges allow, relative to the origin.
+
+        A resonator that warms up bends the line; the exchanges are then widened by as little as makes them agree.
+        """
+        uno_0, host_0 = self._origin()
+        sent, uno, received = np.array(self._exchanges).T
+        uno, sent, received = uno - uno_0, sent - host_0, received - host_0
+        ones = np.ones_like(uno)
+        rows = np.vstack([np.column_stack([ones, uno, -ones]), np.column_stack([-ones, -uno, -ones])])
+        limits = np.concatenate([received, -sent])
+        rate = (1 - LARGEST_DRIFT, 1 + LARGEST_DRIFT)
+        slack = linprog([0, 0, 1], rows, limits, bounds=[(None, None), rate, (0, None)]).x[2] * (1 + 1e-9)
+        bounds = [(None, None), rate, (0, slack + 1e-12)]
+        low = linprog([*objective, 0], rows, limits, bounds=bounds).fun
+        high = -linprog([*-objective, 0], rows, limits, bounds=bounds).fun
+        return low, high

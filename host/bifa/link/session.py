@@ -1,0 +1,246 @@
+"""A session with the Uno: commands arrive once and in order, or the caller is told that they did not.
+
+Commands are numbered and up to four are under way at once. The Uno carries out the one it expects, answers repeats from
+memory and names the number it waits for when one is missing; what stays unanswered is sent again, in order (go-back-N).
+Telemetry and lines of text arrive in between; they are handed on as they come.
+"""
+
+import random
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from bifa import __version__
+from bifa.link import frames
+from bifa.link.clock import Clock
+from bifa.link.errors import MismatchError, NoAnswerError, RefusedError, RestartedError
+from bifa.link.table import COMMANDS, PROTOCOL_VERSION, START_CAUSES, TABLE_HASH
+from bifa.link.transport import Transport
+
+WINDOW = 4
+RESEND_AFTER_S = 0.03
+PROBE_AFTER_S = 0.5  # without progress: ask whether the Uno is still the same
+GREET_EVERY_S = 0.1
+
+
+@dataclass
+class Counters:
+    """What the link has been through; everything but `frames` should stay near zero on a good cable."""
+
+    frames: int = 0
+    bad: int = 0
+    resent: int = 0
+    samples: int = 0
+    lost: int = 0
+
+
+@dataclass(frozen=True)
+class Hello:
+    """Who the Uno says it is."""
+
+    firmware: str
+    protocol: int
+    table_hash: int
+    boot_nonce: int
+    start_cause: str
+    session_key: int
+
+    @classmethod
+    def of(cls, report: frames.Report) -> "Hello":
+        """From a hello message."""
+        return cls(
+            ".".join(map(str, report["firmware"])),
+            report["protocol"],
+            report["table_hash"],
+            report["boot_nonce"],
+            START_CAUSES[report["start_cause"]],
+            report["session_key"],
+        )
+
+
+@dataclass
+class _Request:
+    name: str
+    data: bytes
+    sequence: int
+    first_sent_s: float
+    answer: frames.Report | None = None
+    answered_s: float | None = None
+    sent_s: float = field(default=-1e9)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The report that answered a command, and the host's times between which it was carried out."""
+
+    report: frames.Report
+    sent_s: float
+    received_s: float
+
+
+class Session:
+    """Commands and answers over a transport; time passes only while a method waits."""
+
+    def __init__(self, transport: Transport, clock: Clock, seed: int | None = None) -> None:
+        """`seed` makes the keys of sessions repeatable."""
+        self.transport = transport
+        self.clock = clock
+        self.counters = Counters()
+        self.lines: deque[str] = deque(maxlen=1000)
+        self.hello: Hello | None = None
+        self.on_sample: Callable[[frames.Report], None] = lambda report: None
+        self._random = random.Random(seed)
+        self._splitter = frames.Splitter()
+        self._key = 0
+        self._sequence = 0
+        self._outstanding: deque[_Request] = deque()
+        self._hellos: deque[Hello] = deque(maxlen=8)
+        self._go_back = False
+
+    def connect(self, timeout_s: float = 5.0) -> Hello:
+        """Wait for the Uno and open a session; anything of an earlier one is void.
+
+        Raises MismatchError when the image is another version, NoAnswerError when nothing answers.
+        """
+        deadline = self.clock.now() + timeout_s
+        self._key = 0
+        hello = self._greet("version", (), deadline)
+        if (hello.protocol, hello.table_hash) != (PROTOCOL_VERSION, TABLE_HASH):
+            raise MismatchError(
+                f"the Uno runs firmware {hello.firmware} (protocol {hello.protocol}, table {hello.table_hash:08x}), "
+                f"this is bifa {__version__} (protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}); "
+                "bring the Uno up to date with: bifa flash"
+            )
+        while True:
+            key = self._random.randrange(1, 0x10000)
+            values = (hello.boot_nonce, key)
+            hello = self._greet("connect", values, deadline)
+            if hello.session_key == key:
+                break
+        self._key = key
+        self._sequence = 0
+        self._outstanding.clear()
+        self.hello = hello
+        return hello
+
+    def _greet(self, name: str, values: tuple, deadline: float) -> Hello:
+        """Send an open message again and again until a hello comes."""
+        message = frames.encode(COMMANDS[name], 0, values, frames.OPEN_SEED)
+        self._hellos.clear()
+        while self.clock.now() < deadline:
+            self.transport.write(message)
+            resend_at = self.clock.now() + GREET_EVERY_S
+            while (left := resend_at - self.clock.now()) > 0:
+                self.poll(left)
+                if self._hellos:
+                    return self._hellos.popleft()
+        raise NoAnswerError(
+            "no Uno with the bifa firmware answers on this port; check the cable and the port, or flash it: bifa flash"
+        )
+
+    def poll(self, timeout_s: float = 0.0) -> None:
+        """Take in what has arrived, waiting at most `timeout_s` for something."""
+        data = self.transport.read(timeout_s)
+        now = self.clock.now()
+        for kind, content in self._splitter.feed(data):
+            if kind == "line":
+                self.lines.append(content.decode("ascii", "replace"))
+                continue
+            report = frames.decode(content, frames.session_seed(self._key))
+            if report is None:
+                self.counters.bad += 1
+                continue
+            self.counters.frames += 1
+            self._take(report, now)
+
+    def _take(self, report: frames.Report, now: float) -> None:
+        if report.name == "sample":
+            self.on_sample(report)
+        elif report.name == "hello":
+            self._hellos.append(Hello.of(report))
+        elif report.name == "expected":
+            waiting = next((r for r in self._outstanding if r.sequence == report.sequence), None)
+            self._go_back = self._go_back or (waiting is not None and waiting.answer is None)
+        else:
+            for request in self._outstanding:
+                if request.sequence == report.sequence and request.answer is None:
+                    request.answer, request.answered_s = report, now
+
+    def call(self, name: str, *values, timeout_s: float = 5.0) -> frames.Report:
+        """Carry out one command; raises RefusedError, NoAnswerError or RestartedError."""
+        return self.call_timed(name, *values, timeout_s=timeout_s).report
+
+    def call_timed(self, name: str, *values, timeout_s: float = 5.0) -> Answer:
+        """As call(); with the times between which the Uno carried the command out."""
+        return self.call_all([(name, values)], timeout_s)[0]
+
+    def call_all(self, commands: Sequence[tuple[str, tuple]], timeout_s: float = 5.0) -> list[Answer]:
+        """Carry out commands in order, several under way at once.
+
+        `timeout_s` is the longest time without any progress. The first command that is refused raises RefusedError;
+        the ones after it may have been carried out.
+        """
+        queue = deque(commands)
+        answers: list[Answer] = []
+        refused: RefusedError | None = None
+        progress_s = self.clock.now()
+        probe_s = progress_s + PROBE_AFTER_S
+        while queue or self._outstanding:
+            self._send_due(queue)
+            self.poll(RESEND_AFTER_S / 3)
+            while self._outstanding and self._outstanding[0].answer is not None:
+                request = self._outstanding.popleft()
+                answers.append(Answer(request.answer, request.first_sent_s, request.answered_s))
+                progress_s = self.clock.now()
+                probe_s = progress_s + PROBE_AFTER_S
+                if request.answer.name == "done" and request.answer["result"] != 0 and refused is None:
+                    refused = RefusedError(request.name, request.answer["result"])
+                    queue.clear()  # what is under way already is still carried out
+            self._raise_if_restarted()
+            if self.clock.now() > probe_s:
+                self.transport.write(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
+                probe_s += GREET_EVERY_S
+            if self.clock.now() > progress_s + timeout_s:
+                self._outstanding.clear()
+                raise NoAnswerError(
+                    f"the Uno has not answered for {timeout_s:g} s ({self.counters.bad} bad frames, "
+                    f"{self.counters.resent} sent again); check the cable, then connect again"
+                )
+        if refused is not None:
+            raise refused
+        return answers
+
+    def _request(self, name: str, values: tuple) -> _Request:
+        sequence = self._sequence
+        self._sequence = (sequence + 1) % 256
+        data = frames.encode(COMMANDS[name], sequence, values, frames.session_seed(self._key))
+        return _Request(name, data, sequence, self.clock.now())
+
+    def _send_due(self, queue: deque) -> None:
+        """Send new commands while the window has room, and the unanswered ones again when they are due."""
+        now = self.clock.now()
+        if self._outstanding and self._outstanding[0].answer is None:
+            oldest_s = self._outstanding[0].sent_s
+            if now - oldest_s > RESEND_AFTER_S or (self._go_back and now - oldest_s > RESEND_AFTER_S / 6):
+                for request in self._outstanding:
+                    if request.answer is None:
+                        self._send(request, now)
+                        self.counters.resent += 1
+        self._go_back = False
+        while queue and len(self._outstanding) < WINDOW:
+            name, values = queue.popleft()
+            request = self._request(name, values)
+            self._outstanding.append(request)
+            self._send(request, now)
+
+    def _send(self, request: _Request, now: float) -> None:
+        request.sent_s = now
+        self.transport.write(request.data)
+
+    def _raise_if_restarted(self) -> None:
+        while self._hellos:
+            hello = self._hellos.popleft()
+            if hello.session_key != self._key:
+                self._outstanding.clear()
+                what = "restarted" if hello.boot_nonce != self.hello.boot_nonce else "lost the session"
+                raise RestartedError(f"the Uno {what} (after {hello.start_cause}); connect again and repeat")

@@ -1,0 +1,62 @@
+"""Parameters between people's decimal units and the integers of the wire."""
+
+import math
+import struct
+from collections.abc import Mapping
+from decimal import ROUND_HALF_UP, Decimal
+
+from bifa.errors import BifaError
+from bifa.link.table import PARAMETERS, SET_FORMAT, Parameter
+
+BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
+
+
+class ParameterError(BifaError):
+    """A parameter that does not exist or whose value lies out of its range."""
+
+
+def _parameter(name: str) -> Parameter:
+    try:
+        return BY_NAME[name]
+    except KeyError:
+        raise ParameterError(f"there is no parameter {name!r}; there are {', '.join(BY_NAME)}") from None
+
+
+def range_text(parameter: Parameter) -> str:
+    """ "0.5 to 60 s" """
+    low, high = (from_wire(parameter.name, bound) for bound in (parameter.minimum, parameter.maximum))
+    return f"{low:g} to {high:g} {parameter.unit}".rstrip()
+
+
+def to_wire(name: str, value: float) -> int:
+    """The integer that stands for `value` (in the unit of the name), rounded half up as the Uno rounds.
+
+    Raises ParameterError, which names the range, for an unknown name, NaN, infinity and values out of range.
+    """
+    parameter = _parameter(name)
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        raise ParameterError(f"{name} must be a number, {range_text(parameter)}, not {value!r}")
+    scaled = Decimal(str(value)).scaleb(parameter.decimals)
+    if not parameter.minimum <= scaled <= parameter.maximum:
+        raise ParameterError(f"{name} = {value:g} is out of range: {range_text(parameter)}")
+    return int(scaled.to_integral_value(ROUND_HALF_UP))
+
+
+def from_wire(name: str, value: int) -> float:
+    """The value in the unit of the name."""
+    return float(Decimal(value).scaleb(-_parameter(name).decimals))
+
+
+def index_of(name: str) -> int:
+    """The number of a parameter on the wire."""
+    return PARAMETERS.index(_parameter(name))
+
+
+def unpack_set(data: bytes) -> dict[str, int]:
+    """A parameter set from its bytes, in wire units."""
+    return dict(zip(BY_NAME, struct.unpack(SET_FORMAT, data), strict=True))
+
+
+def pack_set(values: Mapping[str, int]) -> bytes:
+    """The bytes of a parameter set in wire units."""
+    return struct.pack(SET_FORMAT, *(values[name] for name in BY_NAME))

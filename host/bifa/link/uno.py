@@ -1,0 +1,328 @@
+"""The Uno as the rest of the host uses it: parameters, walking, holding, telemetry."""
+
+import binascii
+import math
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from bifa.link import frames
+from bifa.link.clock import Clock
+from bifa.link.clock_relation import ClockRelation
+from bifa.link.errors import LinkError
+from bifa.link.session import Counters, Hello, Session
+from bifa.link.table import CHAMBER_STATES, CHAMBERS, FAULTS, STATES
+from bifa.link.transport import Transport
+from bifa.link.units import ParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
+
+
+EEPROM_TIMEOUT_S = 10.0
+CLOCK_EVERY_S = 1.0
+EXCHANGES_AT_START = 5
+_WRAP_US = 1 << 32
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One line of telemetry; tuples are body, head, tail."""
+
+    sequence: int  # counts all samples, lost ones too
+    time_us: int  # the Uno's clock when the pressures were sampled, since its start
+    state: str
+    pressure_psi: tuple[float, float, float]
+    command: tuple[float, float, float]  # 1 positive, 0 vacuum, NaN off
+    phase_rad: tuple[float, float, float]
+    valves: int  # bit per valve: body +, body -, head +, head -, tail +, tail -
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the Uno says about itself."""
+
+    state: str
+    fault: str
+    fault_channel: int
+    fault_value: int
+    fault_limit: int
+    fault_time_s: float
+    fault_lowest_psi: tuple[float, float, float]
+    fault_highest_psi: tuple[float, float, float]
+    pressure_psi: tuple[float, float, float]
+    valves: int
+    is_set_pending: bool
+    is_schedule_running: bool
+    is_emergency_stop_pressed: bool
+    uptime_s: float
+    frames_bad: int
+    frames_repeated: int
+    bytes_lost: int
+    samples_lost: int
+
+
+class Uno:
+    """A session with the Uno. As a context manager it leaves the valves off, whatever happened inside."""
+
+    def __init__(self, transport: Transport, clock: Clock, seed: int | None = None) -> None:
+        """`seed` makes the session's key repeatable (tests in virtual time)."""
+        self.session = Session(transport, clock, seed)
+        self.session.on_sample = self._take_sample
+        self.clock_relation = ClockRelation()
+        self._clock = clock
+        self._samples: deque[Sample] = deque(maxlen=100_000)
+        self._time_us: int | None = None
+        self._last_sequence: int | None = None
+        self._streaming = False
+        self._next_exchange_s = math.inf
+        self._exchange_every_s = CLOCK_EVERY_S
+
+    def __enter__(self) -> "Uno":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.make_safe()
+
+    # -- session ----------------------------------------------------------------------------------------------
+
+    def connect(self, timeout_s: float = 5.0) -> Hello:
+        """Wait for the Uno (opening a port restarts it), check versions, open a session, relate the clocks."""
+        hello = self.session.connect(timeout_s)
+        self.clock_relation = ClockRelation()
+        self._time_us = None
+        self._last_sequence = None
+        self._streaming = False
+        for _ in range(EXCHANGES_AT_START):
+            self.exchange_clocks()
+        self._plan_exchanges(self._read_set()[0]["host_timeout_s"])
+        return hello
+
+    @property
+    def counters(self) -> Counters:
+        """What the link has been through on the host's side."""
+        return self.session.counters
+
+    def make_safe(self) -> None:
+        """Valves off by every means; says nothing if the port is gone."""
+        try:
+            self.stop()
+        except ConnectionError:
+            return
+
+    def exchange_clocks(self) -> None:
+        """One more measurement for `clock_relation`."""
+        answer = self.session.call_timed("read_clock")
+        uno_s = self._unwrap(answer.report["time_us"]) / 1e6
+        self.clock_relation.add(answer.sent_s, uno_s, answer.received_s)
+        self._next_exchange_s = self._clock.now() + self._exchange_every_s
+
+    def keep_alive(self) -> None:
+        """Talk to the Uno if it is time to: relates the clocks, and keeps `host_timeout_s` from venting."""
+        if self._clock.now() >= self._next_exchange_s:
+            self.exchange_clocks()
+
+    def _plan_exchanges(self, host_timeout_wire: int) -> None:
+        timeout_s = from_wire("host_timeout_s", host_timeout_wire)
+        self._exchange_every_s = min(CLOCK_EVERY_S, timeout_s / 4) if timeout_s > 0 else CLOCK_EVERY_S
+        self._next_exchange_s = self._clock.now() + self._exchange_every_s
+
+    # -- parameters -------------------------------------------------------------------------------------------
+
+    def parameters(self) -> dict[str, float]:
+        """All parameters, read from the Uno."""
+        return {name: from_wire(name, value) for name, value in self._read_set()[0].items()}
+
+    def get(self, name: str) -> float:
+        """One parameter, read from the Uno."""
+        index_of(name)
+        return self.parameters()[name]
+
+    def set(self, name: str, value: float) -> None:
+        """Change one parameter; the others stay."""
+        self.upload({name: value})
+
+    def upload(self, parameters: Mapping[str, float], save: str | None = None, wait: bool = False) -> None:
+        """Replace the parameter set as a whole and read it back; parameters not named stay as they are.
+
+        A walking robot takes the new set at the next cycle boundary: `wait` returns only then. `save` keeps it as a
+        preset as well. Raises ParameterError before anything is sent if a value is out of range, and LinkError if the
+        Uno ends up with anything but what was meant.
+        """
+        wanted = {name: to_wire(name, value) for name, value in parameters.items()}
+        wanted = {**self._read_set()[0], **wanted}
+        data = pack_set(wanted)
+        fields = [("field", (index_of(name), value)) for name, value in wanted.items()]
+        check = binascii.crc_hqx(data, 0xFFFF)
+        self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
+        if self._read_set()[0] != wanted:
+            raise LinkError("the parameters read back are not those sent; upload again")
+        self._plan_exchanges(wanted["host_timeout_s"])
+        if wait:
+            self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
+        if save is not None:
+            self.save(save)
+
+    def _wait_for_boundary(self, period_s: float) -> None:
+        deadline = self._clock.now() + 2 * max(period_s, 60.0)
+        while self._read_set()[1]:
+            if self._clock.now() > deadline:
+                raise LinkError("the Uno did not take the new parameters at a cycle boundary; look at its status")
+            self.session.poll(0.02)
+
+    def _read_set(self) -> tuple[dict[str, int], bool]:
+        report = self.session.call("read_set")
+        return unpack_set(report["set"]), bool(report["pending"])
+
+    # -- presets ----------------------------------------------------------------------------------------------
+
+    def save(self, preset: str) -> None:
+        """Keep the parameters in EEPROM; returns after they were read back."""
+        self.session.call("save", _name_field(preset), timeout_s=EEPROM_TIMEOUT_S)
+
+    def load(self, preset: str) -> None:
+        """Take the parameters of a preset."""
+        self.session.call("load", _name_field(preset))
+        self._plan_exchanges(self._read_set()[0]["host_timeout_s"])
+
+    def forget(self, preset: str) -> None:
+        """Delete a preset from EEPROM."""
+        self.session.call("forget", _name_field(preset), timeout_s=EEPROM_TIMEOUT_S)
+
+    def presets(self) -> dict[str, bool]:
+        """Names of all presets; True for those in EEPROM, False for those from the factory."""
+        presets, index = {}, 0
+        while True:
+            report = self.session.call("presets", index)
+            if index >= report["count"]:
+                return presets
+            presets[report["preset"]] = bool(report["source"])
+            index += 1
+
+    def defaults(self) -> None:
+        """Erase presets and settings and load the baseline."""
+        self.session.call("defaults", timeout_s=EEPROM_TIMEOUT_S)
+
+    def zero(self, factory: bool = False) -> None:
+        """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; or go back to the data sheet."""
+        self.session.call("zero", int(factory), timeout_s=EEPROM_TIMEOUT_S)
+
+    # -- motion -----------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Walk."""
+        self.session.call("run")
+
+    def halt(self) -> None:
+        """Stop walking or holding; nothing is latched."""
+        self.session.call("stop")
+
+    def stop(self) -> None:
+        """The real-time stop: all valves off, latched until clear(). Sent as a frame and as `!`; no answer is awaited."""
+        self.session.transport.write(frames.STOP_FRAME + b"!")
+
+    def clear(self) -> None:
+        """Release a stop, or a fault whose cause is gone."""
+        self.session.call("clear")
+
+    def hold(self, chamber: str, state: str) -> None:
+        """Inflate ("positive"), evacuate ("vacuum") or vent ("off") the body, head or tail."""
+        self.session.call("hold", *_hold_fields(chamber, state))
+
+    def schedule(self, holds: Iterable[tuple[float, str, str]]) -> None:
+        """Start timed holds (time_s, chamber, state), in order of time, executed by the Uno on its own ticks (1 ms).
+
+        Time 0 is the start. Raises RefusedError when there are more than the Uno has room for, or out of order.
+        """
+        additions = [("schedule_add", (round(time_s * 1000), *_hold_fields(c, s))) for time_s, c, s in holds]
+        self.session.call_all([("schedule_clear", ()), *additions, ("schedule_start", ())])
+
+    # -- telemetry --------------------------------------------------------------------------------------------
+
+    def status(self) -> Status:
+        """State, fault, pressures, valves and the Uno's own counters."""
+        report = self.session.call("status")
+        flags = report["flags"]
+        return Status(
+            state=STATES[report["state"]],
+            fault=FAULTS[report["fault"]],
+            fault_channel=report["fault_channel"],
+            fault_value=report["fault_value"],
+            fault_limit=report["fault_limit"],
+            fault_time_s=report["fault_time_ms"] / 1000,
+            fault_lowest_psi=_psi(report["fault_lowest_mpsi"]),
+            fault_highest_psi=_psi(report["fault_highest_mpsi"]),
+            pressure_psi=_psi(report["pressure_mpsi"]),
+            valves=report["valves"],
+            is_set_pending=bool(flags & 1),
+            is_schedule_running=bool(flags & 2),
+            is_emergency_stop_pressed=bool(flags & 4),
+            uptime_s=report["uptime_ms"] / 1000,
+            frames_bad=report["frames_bad"],
+            frames_repeated=report["frames_repeated"],
+            bytes_lost=report["bytes_lost"],
+            samples_lost=report["samples_lost"],
+        )
+
+    def stream(self, on: bool) -> None:
+        """Telemetry in frames, 100 samples a second."""
+        self.session.call("stream", int(on))
+        if on and not self._streaming:
+            self._last_sequence = None
+        self._streaming = on
+
+    def samples(self, timeout_s: float) -> list[Sample]:
+        """The samples that have arrived, waiting at most `timeout_s` for the first; keeps the link alive."""
+        deadline = self._clock.now() + timeout_s
+        self.keep_alive()
+        while not self._samples and (left := deadline - self._clock.now()) > 0:
+            self.session.poll(min(left, self._exchange_every_s))
+            self.keep_alive()
+        samples = list(self._samples)
+        self._samples.clear()
+        return samples
+
+    def _take_sample(self, report: frames.Report) -> None:
+        self.counters.samples += 1
+        sequence = report["sequence"]
+        if self._last_sequence is not None:
+            step = (sequence - self._last_sequence) % 65536
+            if step == 0 or step > 32768:
+                return  # a repeat
+            self.counters.lost += step - 1
+            sequence = self._last_sequence + step
+        self._last_sequence = sequence
+        command = tuple({1: 0.0, 2: 1.0}.get(report["command"] >> 2 * i & 3, math.nan) for i in range(3))
+        self._samples.append(
+            Sample(
+                sequence=sequence,
+                time_us=self._unwrap(report["time_us"]),
+                state=STATES[report["state"]],
+                pressure_psi=_psi(report["pressure_mpsi"]),
+                command=command,
+                phase_rad=tuple(phase * (2 * math.pi / 65536) for phase in report["phase"]),
+                valves=report["valves"],
+            )
+        )
+
+    def _unwrap(self, time_us: int) -> int:
+        """The Uno's 32-bit microseconds (they wrap every 71.6 minutes) as a time that goes on."""
+        if self._time_us is None:
+            self._time_us = time_us
+        step = (time_us - self._time_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
+        unwrapped = self._time_us + step
+        self._time_us = max(self._time_us, unwrapped)
+        return unwrapped
+
+
+def _psi(milli: tuple[int, int, int]) -> tuple[float, float, float]:
+    return tuple(value / 1000 for value in milli)
+
+
+def _name_field(preset: str) -> bytes:
+    if not preset or len(preset) > 12 or not all(c in "abcdefghijklmnopqrstuvwxyz0123456789_-" for c in preset):
+        raise ParameterError(f"a preset's name is 1 to 12 of a-z, 0-9, _ and -, not {preset!r}")
+    return frames.encode_name(preset)
+
+
+def _hold_fields(chamber: str, state: str) -> tuple[int, int]:
+    if chamber not in CHAMBERS or state not in CHAMBER_STATES:
+        raise ParameterError(f"hold {'|'.join(CHAMBERS)} {'|'.join(CHAMBER_STATES)}, not {chamber!r} {state!r}")
+    return CHAMBERS.index(chamber), CHAMBER_STATES.index(state)

@@ -1,0 +1,165 @@
+#include "commands.h"
+
+#include "crc.h"
+
+namespace bifa {
+
+namespace {
+
+Result result_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kDone:
+      return Result::kOk;
+    case Verdict::kLatched:
+      return Result::kLatched;
+    case Verdict::kCauseStands:
+      return Result::kFault;
+    case Verdict::kFull:
+      return Result::kFull;
+    case Verdict::kOrder:
+      return Result::kOrder;
+    case Verdict::kRefused:
+      break;
+  }
+  return Result::kRefused;
+}
+
+bool is_hold(uint8_t chamber, uint8_t state) {
+  return chamber < kChamberCount && state <= static_cast<uint8_t>(ChamberState::kPositive);
+}
+
+static_assert(sizeof(Calibration) <= sizeof(ParameterSet), "the settings fit a record");
+
+}  // namespace
+
+void Commands::begin(StartCause cause) {
+  store_.begin();
+  uint8_t payload[sizeof(ParameterSet)];
+  Calibration calibration = {};
+  if (store_.load_settings(payload)) {
+    memcpy(&calibration, payload, sizeof calibration);
+    if (!is_valid(calibration)) calibration = {};
+  }
+  if (!store_.load(kStartPreset, wanted_)) wanted_ = factory_preset(0);
+  controller_.begin(cause, wanted_, calibration);
+}
+
+Result Commands::run() { return result_of(controller_.run()); }
+Result Commands::stop() { return result_of(controller_.stop()); }
+Result Commands::clear() { return result_of(controller_.clear()); }
+
+Result Commands::hold(uint8_t chamber, uint8_t state) {
+  if (!is_hold(chamber, state)) return Result::kRange;
+  return result_of(controller_.hold(static_cast<Chamber>(chamber), static_cast<ChamberState>(state)));
+}
+
+Result Commands::schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state) {
+  if (!is_hold(chamber, state)) return Result::kRange;
+  return result_of(controller_.schedule_add(time_ms, static_cast<Chamber>(chamber), static_cast<ChamberState>(state)));
+}
+
+Result Commands::schedule_clear() { return result_of(controller_.schedule_clear()); }
+Result Commands::schedule_start() { return result_of(controller_.schedule_start()); }
+
+void Commands::use(const ParameterSet& set) {
+  wanted_ = set;
+  pending_ = false;
+  controller_.apply(wanted_);
+}
+
+Result Commands::take_over_soon(const ParameterSet& set) {
+  if (controller_.status().state != State::kRunning) {
+    use(set);
+  } else {
+    wanted_ = set;
+    pending_ = true;
+  }
+  return Result::kOk;
+}
+
+void Commands::follow(const Sample& sample) {
+  const uint16_t kQuarter = 0x4000;
+  const uint16_t phase = sample.phase[0];
+  const bool boundary = phase < kQuarter && last_phase_ >= 3 * kQuarter;
+  last_phase_ = phase;
+  if (pending_ && (boundary || sample.state != State::kRunning)) use(wanted_);
+}
+
+Result Commands::set(ParameterId id, uint32_t value) {
+  if (!in_range(id, value)) return Result::kRange;
+  ParameterSet changed = wanted_;
+  put_value(changed, id, value);
+  use(changed);
+  return Result::kOk;
+}
+
+Result Commands::begin_set() {
+  draft_ = wanted_;
+  draft_state_ = Draft::kOpen;
+  return Result::kOk;
+}
+
+Result Commands::field(uint8_t parameter, uint32_t value) {
+  if (draft_state_ != Draft::kOpen) return Result::kTransaction;
+  const ParameterId id = static_cast<ParameterId>(parameter);
+  const Result result = parameter >= kParameterCount ? Result::kNoParameter
+                        : in_range(id, value)        ? Result::kOk
+                                                     : Result::kRange;
+  if (result == Result::kOk) {
+    put_value(draft_, id, value);
+  } else {
+    draft_state_ = Draft::kSpoilt;
+  }
+  return result;
+}
+
+Result Commands::commit(uint16_t check) {
+  const bool open = draft_state_ == Draft::kOpen;
+  draft_state_ = Draft::kNone;
+  if (!open) return Result::kTransaction;
+  if (crc16(&draft_, sizeof draft_) != check) return Result::kCheck;
+  if (!is_valid(draft_)) return Result::kRange;
+  return take_over_soon(draft_);
+}
+
+Result Commands::save(const char* name) { return store_.save(name, wanted_); }
+
+Result Commands::load(const char* name) {
+  ParameterSet set;
+  if (!find_factory_preset(name, set) && !(is_name(name) && store_.load(name, set))) return Result::kNoPreset;
+  return take_over_soon(set);
+}
+
+Result Commands::forget(const char* name) { return store_.forget(name); }
+
+Result Commands::defaults() {
+  const Result result = store_.erase_all();
+  if (result != Result::kOk) return result;
+  controller_.calibrate({});
+  return take_over_soon(factory_preset(0));
+}
+
+Result Commands::zero(bool factory) {
+  Calibration calibration = {};
+  if (!factory) {
+    const Result result = result_of(controller_.measure_zero(calibration));
+    if (result != Result::kOk) return result;
+  }
+  uint8_t payload[sizeof(ParameterSet)] = {};
+  memcpy(payload, &calibration, sizeof calibration);
+  const Result result = store_.save_settings(payload);
+  if (result == Result::kOk) controller_.calibrate(calibration);
+  return result;
+}
+
+bool Commands::preset_at(uint8_t index, char* name, bool& stored) {
+  stored = index >= kFactoryPresetCount;
+  if (stored) return store_.name_at(index - kFactoryPresetCount, name);
+  memset(name, 0, kNameSize + 1);
+  flash_copy(name, kFactoryPresets[index].name, sizeof kFactoryPresets[index].name);
+  return true;
+}
+
+uint8_t Commands::preset_count() { return kFactoryPresetCount + store_.count(); }
+
+}  // namespace bifa

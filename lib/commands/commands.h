@@ -1,0 +1,72 @@
+// What commands do, for the console and for frames alike.
+#pragma once
+
+#include "command_table.h"
+#include "controller.h"
+#include "store.h"
+
+namespace bifa {
+
+/// Name of the preset that `save` without a name writes, and that is loaded at start.
+const char kStartPreset[kNameSize + 1] = "startup";
+
+class Commands {
+ public:
+  Commands(Controller& controller, Store& store) : controller_(controller), store_(store) {}
+
+  /// Starts the controller with the settings and the start preset from EEPROM, or with the baseline; call once.
+  void begin(StartCause cause);
+
+  Result run();
+  Result stop();
+  Result clear();
+  Result hold(uint8_t chamber, uint8_t state);
+  Result schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state);
+  Result schedule_clear();
+  Result schedule_start();
+
+  /// Changes one parameter (value in wire units) at once.
+  Result set(ParameterId id, uint32_t value);
+
+  // A new set as a whole: begin, fields, commit. The first error makes commit fail, and the old set goes on. While
+  // walking the new set takes over at the next cycle boundary.
+  Result begin_set();
+  Result field(uint8_t parameter, uint32_t value);
+  Result commit(uint16_t check);
+
+  /// The running set, or the one that will take over at the next cycle boundary.
+  const ParameterSet& wanted() const { return wanted_; }
+  bool is_pending() const { return pending_; }
+  /// A new sample shows where in the cycle the robot is.
+  void follow(const Sample& sample);
+
+  // EEPROM: Result::kOk while store().busy() means that the result comes later.
+  Result save(const char* name);
+  Result load(const char* name);
+  Result forget(const char* name);
+  Result defaults();
+  Result zero(bool factory);
+
+  /// Preset number `index`, factory presets first; `name` has kNameSize + 1 bytes.
+  bool preset_at(uint8_t index, char* name, bool& stored);
+  uint8_t preset_count();
+
+  Controller& controller() { return controller_; }
+  Store& store() { return store_; }
+
+ private:
+  enum class Draft : uint8_t { kNone, kOpen, kSpoilt };
+
+  void use(const ParameterSet& set);
+  Result take_over_soon(const ParameterSet& set);
+
+  Controller& controller_;
+  Store& store_;
+  ParameterSet wanted_;
+  ParameterSet draft_;
+  Draft draft_state_ = Draft::kNone;
+  bool pending_ = false;
+  uint16_t last_phase_ = 0;
+};
+
+}  // namespace bifa

@@ -1,0 +1,81 @@
+// The text console: lines in, lines out. Every line is answered by exactly one line that begins "ok" or "error", after
+// any lines of information, which begin "[".
+#pragma once
+
+#include "commands.h"
+#include "print.h"
+#include "session.h"
+
+namespace bifa {
+
+const uint8_t kLongestLine = 63;
+
+class Console {
+ public:
+  Console(Commands& commands, const Session& session, Sink& out) : commands_(commands), session_(session), out_(out) {}
+
+  /// What a person sees at start.
+  void greet();
+
+  /// Takes one byte of text. Only while not waiting().
+  void feed(uint8_t byte);
+  /// Bytes were lost: the present line is answered with an error, whatever else it holds.
+  void spoil() { spoilt_ = true; }
+
+  /// Whether the last command is still busy (EEPROM) and its answer is owed.
+  bool waiting() const { return waiting_; }
+  /// Answers the command that was waited for, once it is finished; tells of stops and faults as they come.
+  void poll(const LinkCounters& counters);
+
+  /// Prints a sample if streaming or plotting is on.
+  void sample(const Sample& sample);
+
+ private:
+  void end_line();
+  void execute();
+  void dispatch(CommandId id);
+  void answer(Result result);
+  void answer_usage(CommandId id);
+  void finish_later(Result started);
+  bool is(uint8_t word, FlashText text) const;
+
+  void help();
+  void help_on(const char* name);
+  void version();
+  void status();
+  void show();
+  void set();
+  void hold();
+  void switch_to(CommandId id, bool& flag);
+  void with_preset(Result (Commands::*command)(const char*));
+  void presets();
+
+  void print_help(FlashText name, FlashText text);
+  void print_range(ParameterId id);
+  void show_parameter(ParameterId id);
+  void print_fault(const FaultReport& fault);
+  void print_triple(const int16_t (&pressure_mpsi)[kChamberCount]);
+  void print_stream(const Sample& sample);
+  void print_plot(const Sample& sample);
+
+  static const uint8_t kWords = 4;
+
+  Commands& commands_;
+  const Session& session_;
+  Sink& out_;
+  char line_[kLongestLine + 1];
+  uint8_t length_ = 0;
+  char* words_[kWords];
+  uint8_t word_count_ = 0;
+  LinkCounters counters_ = {};
+  State last_state_ = State::kIdle;
+  bool spoilt_ = false;
+  bool too_long_ = false;
+  bool waiting_ = false;
+  bool echo_ = false;
+  bool after_return_ = false;
+  bool streaming_ = false;
+  bool plotting_ = false;
+};
+
+}  // namespace bifa

@@ -1,0 +1,57 @@
+#include "host_port.h"
+
+#include "critical.h"
+
+namespace bifa {
+
+void HostPort::begin(uint16_t boot_nonce, StartCause cause) {
+  commands_.begin(cause);
+  session_.begin(boot_nonce, cause);
+  console_.greet();
+}
+
+void HostPort::poll() {
+  store_.poll();
+  session_.poll();
+  console_.poll({frames_bad_, receiver_.lost()});
+  uint8_t byte;
+  // A bounded number, so that a flood does not keep telemetry and EEPROM waiting.
+  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && receiver_.pop(byte); --budget) take(byte);
+  if (receiver_.overrun() && !receiver_.has_input()) recover();
+  Sample sample;
+  if (!commands_.controller().take_sample(sample)) return;
+  commands_.follow(sample);
+  session_.sample(sample);
+  console_.sample(sample);
+}
+
+void HostPort::take(uint8_t byte) {
+  const bool delimiter = byte == 0;
+  if (!delimiter) {
+    if (in_frame_) {
+      decoder_.feed(byte);
+    } else {
+      commands_.controller().host_heard();
+      console_.feed(byte);
+    }
+    return;
+  }
+  in_frame_ = !in_frame_;
+  if (in_frame_) {
+    decoder_.start();
+  } else if (decoder_.finish(session_.seed())) {
+    commands_.controller().host_heard();
+    session_.take(decoder_.frame(), {frames_bad_, receiver_.lost()});
+  } else if (frames_bad_ != 0xFFFF) {
+    ++frames_bad_;
+  }
+}
+
+void HostPort::recover() {
+  console_.spoil();
+  decoder_.start();
+  const Critical guard;
+  in_frame_ = receiver_.recover();
+}
+
+}  // namespace bifa

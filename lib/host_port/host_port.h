@@ -1,0 +1,45 @@
+// Everything behind the serial port: tells text from frames, feeds the console and the session, keeps the store going.
+//
+// The board calls byte_in_interrupt(), tick_in_interrupt() and, as often as it can, poll(); that is all there is to it.
+#pragma once
+
+#include "console.h"
+#include "receiver.h"
+#include "session.h"
+
+namespace bifa {
+
+class HostPort {
+ public:
+  HostPort(Controller& controller, Eeprom& eeprom, Sink& out)
+      : store_(eeprom), commands_(controller, store_), session_(commands_, out), console_(commands_, session_, out) {}
+
+  /// Loads what is in EEPROM, starts the controller and greets. `boot_nonce` differs from that of the last start.
+  void begin(uint16_t boot_nonce, StartCause cause);
+
+  /// In the receive interrupt. True: the byte asks for a stop; let the controller stop before returning.
+  bool byte_in_interrupt(uint8_t byte) { return receiver_.push(byte); }
+  /// In the interrupt of the 1 kHz timer.
+  void tick_in_interrupt() { receiver_.tick(); }
+
+  /// In the main loop: handles what has arrived, answers, sends telemetry, goes on writing the EEPROM.
+  void poll();
+
+  /// Whether poll() has something to do at once, so that the board must not go to sleep.
+  bool has_input() const { return receiver_.has_input(); }
+
+ private:
+  void take(uint8_t byte);
+  void recover();
+
+  Receiver receiver_;
+  Store store_;
+  Commands commands_;
+  Session session_;
+  Console console_;
+  FrameDecoder decoder_;
+  bool in_frame_ = false;
+  uint16_t frames_bad_ = 0;
+};
+
+}  // namespace bifa

@@ -1,0 +1,218 @@
+#include "session.h"
+
+namespace bifa {
+
+namespace {
+
+template <typename Fields>
+Fields fields_of(const Frame& frame) {
+  static_assert(sizeof(Fields) <= kLongestInward, "a field fits its frame");
+  Fields fields;
+  memcpy(&fields, frame.fields, sizeof fields);
+  return fields;
+}
+
+void count(uint16_t& counter) {
+  if (counter != 0xFFFF) ++counter;
+}
+
+}  // namespace
+
+void Session::take(const Frame& frame, const LinkCounters& counters) {
+  switch (static_cast<MessageId>(frame.message)) {
+    case MessageId::kVersion:
+      return hello();
+    case MessageId::kConnect:
+      return connect(frame);
+    case MessageId::kStopNow:
+      return;  // acted on when it arrived
+    default:
+      break;
+  }
+  if (key_ == 0) return;
+  const uint8_t ahead = frame.sequence - expected_;
+  if (ahead == 0) {
+    if (!waiting_) in_order(frame, counters);
+    return;
+  }
+  if (ahead < static_cast<uint8_t>(-kRemembered)) {
+    send(MessageId::kExpected, expected_, nullptr, 0);
+    return;
+  }
+  count(repeated_);
+  const bool unfinished = waiting_ && ahead == static_cast<uint8_t>(-1);
+  if (!unfinished && !query(frame, counters)) done(frame.sequence);
+}
+
+void Session::hello() {
+  HelloMessage message;
+  message.protocol = kProtocolVersion;
+  memcpy(message.firmware, kFirmwareVersion, sizeof message.firmware);
+  message.table_hash = kTableHash;
+  message.boot_nonce = boot_nonce_;
+  message.start_cause = static_cast<uint8_t>(cause_);
+  message.session_key = key_;
+  send_frame(out_, MessageId::kHello, 0, &message, sizeof message, kOpenSeed);
+}
+
+void Session::connect(const Frame& frame) {
+  const ConnectMessage wanted = fields_of<ConnectMessage>(frame);
+  if (wanted.boot_nonce == boot_nonce_) {
+    key_ = wanted.session_key;
+    expected_ = 0;
+    waiting_ = false;
+    streaming_ = false;
+  }
+  hello();
+}
+
+void Session::in_order(const Frame& frame, const LinkCounters& counters) {
+  ++expected_;
+  if (query(frame, counters)) return;
+  Result& result = results_[frame.sequence % kRemembered];
+  result = execute(frame);
+  waiting_ = result == Result::kOk && commands_.store().busy();
+  if (!waiting_) done(frame.sequence);
+}
+
+void Session::poll() {
+  if (!waiting_ || commands_.store().busy()) return;
+  waiting_ = false;
+  const uint8_t sequence = expected_ - 1;
+  results_[sequence % kRemembered] = commands_.store().result();
+  done(sequence);
+}
+
+/// Commands that only ask: they are answered by what they ask for, as often as they come.
+bool Session::query(const Frame& frame, const LinkCounters& counters) {
+  switch (static_cast<MessageId>(frame.message)) {
+    case MessageId::kStatus:
+      send_status(frame.sequence, counters);
+      return true;
+    case MessageId::kReadSet: {
+      const SetReportMessage message = {commands_.is_pending(), commands_.wanted()};
+      send(MessageId::kSetReport, frame.sequence, &message, sizeof message);
+      return true;
+    }
+    case MessageId::kPresets:
+      send_preset(frame.sequence, fields_of<PresetsMessage>(frame).index);
+      return true;
+    case MessageId::kReadClock: {
+      const ClockReportMessage message = {commands_.controller().uptime_ms() * 1000};
+      send(MessageId::kClockReport, frame.sequence, &message, sizeof message);
+      return true;
+    }
+    default:
+      return false;
+  }
+}
+
+Result Session::execute(const Frame& frame) {
+  char name[kNameSize + 1];
+  memcpy(name, frame.fields, kNameSize);
+  name[kNameSize] = '\0';
+  switch (static_cast<MessageId>(frame.message)) {
+    case MessageId::kRun:
+      return commands_.run();
+    case MessageId::kStop:
+      return commands_.stop();
+    case MessageId::kClear:
+      return commands_.clear();
+    case MessageId::kHold: {
+      const HoldMessage fields = fields_of<HoldMessage>(frame);
+      return commands_.hold(fields.chamber, fields.state);
+    }
+    case MessageId::kStream:
+      streaming_ = fields_of<StreamMessage>(frame).on != 0;
+      return Result::kOk;
+    case MessageId::kSave:
+      return commands_.save(name);
+    case MessageId::kLoad:
+      return commands_.load(name);
+    case MessageId::kForget:
+      return commands_.forget(name);
+    case MessageId::kDefaults:
+      return commands_.defaults();
+    case MessageId::kZero:
+      return commands_.zero(fields_of<ZeroMessage>(frame).factory != 0);
+    case MessageId::kBegin:
+      return commands_.begin_set();
+    case MessageId::kField: {
+      const FieldMessage fields = fields_of<FieldMessage>(frame);
+      return commands_.field(fields.parameter, fields.value);
+    }
+    case MessageId::kCommit:
+      return commands_.commit(fields_of<CommitMessage>(frame).check);
+    case MessageId::kScheduleClear:
+      return commands_.schedule_clear();
+    case MessageId::kScheduleAdd: {
+      const ScheduleAddMessage fields = fields_of<ScheduleAddMessage>(frame);
+      return commands_.schedule_add(fields.time_ms, fields.chamber, fields.state);
+    }
+    case MessageId::kScheduleStart:
+      return commands_.schedule_start();
+    default:
+      return Result::kUnknown;
+  }
+}
+
+void Session::send(MessageId message, uint8_t sequence, const void* fields, uint8_t size) {
+  send_frame(out_, message, sequence, fields, size, seed());
+}
+
+void Session::done(uint8_t sequence) {
+  const DoneMessage message = {static_cast<uint8_t>(results_[sequence % kRemembered])};
+  send(MessageId::kDone, sequence, &message, sizeof message);
+}
+
+void Session::send_status(uint8_t sequence, const LinkCounters& counters) {
+  const Status status = commands_.controller().status();
+  StatusReportMessage message;
+  message.state = static_cast<uint8_t>(status.state);
+  message.fault = static_cast<uint8_t>(status.fault.fault);
+  message.fault_channel = status.fault.channel;
+  message.fault_value = status.fault.value;
+  message.fault_limit = status.fault.limit;
+  message.fault_time_ms = status.fault.time_ms;
+  memcpy(message.fault_lowest_mpsi, status.fault.lowest_mpsi, sizeof message.fault_lowest_mpsi);
+  memcpy(message.fault_highest_mpsi, status.fault.highest_mpsi, sizeof message.fault_highest_mpsi);
+  memcpy(message.pressure_mpsi, status.pressure_mpsi, sizeof message.pressure_mpsi);
+  message.valves = status.valves;
+  message.flags = (commands_.is_pending() ? 1 : 0) | (status.scheduled ? 2 : 0) | (status.emergency_stop ? 4 : 0);
+  message.uptime_ms = status.uptime_ms;
+  message.frames_bad = counters.frames_bad;
+  message.frames_repeated = repeated_;
+  message.bytes_lost = counters.bytes_lost;
+  message.samples_lost = status.samples_lost + samples_dropped_;
+  send(MessageId::kStatusReport, sequence, &message, sizeof message);
+}
+
+void Session::send_preset(uint8_t sequence, uint8_t index) {
+  char name[kNameSize + 1];
+  bool stored = false;
+  PresetReportMessage message = {};
+  message.count = commands_.preset_count();
+  if (commands_.preset_at(index, name, stored)) memcpy(message.preset, name, sizeof message.preset);
+  message.source = stored;
+  send(MessageId::kPresetReport, sequence, &message, sizeof message);
+}
+
+void Session::sample(const Sample& sample) {
+  if (!streaming_) return;
+  SampleMessage message;
+  if (out_.room() < frame_room(sizeof message)) {
+    count(samples_dropped_);
+    return;
+  }
+  message.sequence = sample.sequence;
+  message.time_us = sample.time_us;
+  message.state = static_cast<uint8_t>(sample.state);
+  memcpy(message.pressure_mpsi, sample.pressure_mpsi, sizeof message.pressure_mpsi);
+  memcpy(message.phase, sample.phase, sizeof message.phase);
+  message.command = 0;
+  for (uint8_t i = 0; i < kChamberCount; ++i) message.command |= static_cast<uint8_t>(sample.command[i]) << (2 * i);
+  message.valves = sample.valves;
+  send_frame(out_, MessageId::kSample, static_cast<uint8_t>(sample.sequence), &message, sizeof message, kStreamSeed);
+}
+
+}  // namespace bifa
