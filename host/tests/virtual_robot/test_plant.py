@@ -73,7 +73,7 @@ def test_anchoring_force_is_that_of_the_paper():
         plant.move(0.0, 0.03, 0.02, there_and_back=False)
         pulled = plant.record(np.arange(3000) / 2000)["force_N"]
         assert pulled.max() == pytest.approx(force, abs=0.5)
-        assert pulled[-1] == pytest.approx(pulled.max() * NOMINAL["mu_k"] / NOMINAL["mu_s"], rel=0.003)
+        assert pulled[-1] == pytest.approx(pulled.max() * NOMINAL["mu_k"] / NOMINAL["mu_s"], abs=0.1)
 
 
 def test_static_loading_is_the_spring_less_the_pressure_force():
