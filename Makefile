@@ -38,7 +38,10 @@ bench: setup
 	@cd host && ../$(bin)/python -m bench $(ARGS)
 
 soak: setup $(stamps)/fuzz
-	@cd host && ../$(bin)/pytest -n 2 -m soak $(ARGS)
+	@failed=
+	$(bin)/python tools/unity_suites.py sanitized || failed="$$failed sanitized"
+	(cd host && ../$(bin)/pytest -n 2 -m soak $(ARGS)) || failed="$$failed pytest"
+	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
 
 blind: setup
 	@cd host && ../$(bin)/python -m bench.blind $(ARGS)
