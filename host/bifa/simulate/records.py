@@ -189,7 +189,7 @@ def anchor_pull(
         "force_N": rows[:, 0],
         "pressure_psi": rows[:, 1],
     }
-    return Record("anchor_pull", columns)
+    return Record("anchor_pull", columns, {"wound_N": rows[:, 2], "holding_N": rows[:, 3], "kinetic_N": rows[:, 4]})
 
 
 def _times(time_s) -> np.ndarray:

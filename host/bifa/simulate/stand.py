@@ -89,12 +89,12 @@ def static_record(plant, rig, states_of_effects, displacement, sample_times):
     contracted = plant.q[block + layout.CONTRACTED]
     run = new_run(states_of_effects)
     y, z = run.y, run.z
-    y[x] = contracted
+    y[x] = contracted + displacement[0]
     run.command[actuator] = POSITIVE
     start_effects(plant, rig, run)
     out = np.empty((sample_times.size, 2))
     now = sample_times[0] - _HOLD_S
-    before = contracted
+    before = y[x]
     for k in range(sample_times.size):
         span = sample_times[k] - now
         target = contracted + displacement[k]
@@ -121,7 +121,8 @@ def static_record(plant, rig, states_of_effects, displacement, sample_times):
 
 @kernel
 def anchor_record(plant, rig, states_of_effects, rate, load_cell, sample_times, tolerance):
-    """(n, 2): resistance in N, reading in psi, of a head pulled at `rate` m/s (its sign: direction).
+    """(n, 5): resistance in N, reading in psi, of a head pulled at `rate` m/s (its sign: direction); then what the load
+    cell would pull if the head held, what the head holds at most, and its friction when it slides, in N.
 
     The head has been extended by pressure and then held at `rig.positive_psi`. Quasi-static: the load cell's spring
     takes up force until static friction gives, then kinetic friction at the speed of pulling remains.
@@ -131,13 +132,16 @@ def anchor_record(plant, rig, states_of_effects, rate, load_cell, sample_times, 
     direction = 1.0 if rate > 0.0 else -1.0
     slack = chains.slack(plant.active, q)
     sliding = False
-    out = np.empty((sample_times.size, 2))
+    out = np.empty((sample_times.size, 5))
     for k in range(sample_times.size):
         if sample_times[k] > run.clock[0]:
             march(plant, rig, run, sample_times[k], tolerance)
         normal = grip(plant, rig, run.gravity, 0, run.y)
         pull = load_cell * max(abs(rate) * sample_times[k] - slack, 0.0)
-        sliding = sliding or pull >= coefficient(plant, direction, 0.0) * normal
-        out[k, 0] = coefficient(plant, direction, abs(rate)) * normal if sliding else pull
+        holding = coefficient(plant, direction, 0.0) * normal
+        kinetic = coefficient(plant, direction, abs(rate)) * normal
+        sliding = sliding or pull >= holding
+        out[k, 0] = kinetic if sliding else pull
         out[k, 1] = shown(plant, run, 1)
+        out[k, 2], out[k, 3], out[k, 4] = pull, holding, kinetic
     return out

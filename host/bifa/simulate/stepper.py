@@ -30,6 +30,7 @@ VACUUM, POSITIVE, OFF = 0, 1, 2
 _GRAVITY = 9.80665
 _WALL_COUNT = 3.0  # eq. (7): three actuators a segment
 _LEAST_GROWTH = 0.05  # of the damping: below, the step is too long for the falling part of K
+_ALIKE = 1e-9  # relative difference of two holds that counts as none
 TOO_LONG = -1
 
 
@@ -242,6 +243,9 @@ def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
     s_h = _sign(v_h)
     s_t = _sign(v_t)
     may_h, may_t = s_h == 0.0, s_t == 0.0  # may start to slide in this step
+    if may_h and may_t:
+        s_h, s_t = _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y)
+        may_h, may_t = s_h == 0.0, s_t == 0.0
     w_h = w_t = 0.0
     for _ in range(6):
         drive_h = m_h * v_h + push_h
@@ -282,6 +286,21 @@ def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
     if s_t == 0.0:
         w_t = 0.0
     return w_h, w_t, int(3.0 * (s_h + 1.0) + s_t + 1.0)
+
+
+@merged
+def _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y):
+    """Directions of two resting ends whose hold gives in the same step: of unequal holds the weaker goes alone, as
+    the damper then relieves the other; equal ones (both ends free, equal halves) go together."""
+    side_h, side_t = _sign(push_h), _sign(push_t)
+    hold_h = _limit(plant, rig, 0, normal_h, side_h, 0.0, y)
+    hold_t = _limit(plant, rig, 1, normal_t, side_t, 0.0, y)
+    excess_h, excess_t = abs(push_h) - hold_h, abs(push_t) - hold_t
+    if excess_h <= 0.0 or excess_t <= 0.0:
+        return 0.0, 0.0
+    if abs(excess_h - excess_t) <= _ALIKE * (hold_h + hold_t):
+        return side_h, side_t
+    return (side_h, 0.0) if excess_h > excess_t else (0.0, side_t)
 
 
 @merged
