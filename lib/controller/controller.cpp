@@ -181,7 +181,7 @@ void Controller::step_oscillators() {
   if (supervisor_.state() != State::kRunning) return;
   oscillators_.step();
   const Critical guard;  // a stop may have come since: then walk() does nothing
-  for (uint8_t i = 0; i < kChamberCount; ++i) supervisor_.walk(i, oscillators_.command(i));
+  supervisor_.walk(oscillators_.outputs());
 }
 
 void Controller::follow_schedule() {

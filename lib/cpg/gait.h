@@ -6,14 +6,16 @@
 
 namespace bifa {
 
+/// The oscillators look at the upper 16 bits of an error; half of the last of these, added, rounds.
+const uint32_t kHalfStep = 0x8000;
+
 struct Gait {
-  uint32_t increment;          ///< of every phase a step: 2^32 f / 1000
-  uint8_t increment_fraction;  ///< and 1/256 of that unit, which keeps the period within 0.03 ppm
-  uint16_t gain;               ///< what a sine of 1 / kSineOne adds in a step, in 1/64 of the phases' unit
-  uint32_t psi12;
-  uint32_t psi13;
-  uint32_t threshold[kChamberCount];   ///< duties d_i: positive from this phase on
-  bool never_positive[kChamberCount];  ///< d_i = 1 has no threshold within 32 bits
+  uint32_t increment;                 ///< of every phase a step: 2^32 f / 1000; rounded, within 7 ppm at 60 s
+  uint16_t gain;                      ///< what a sine of 1 / kSineOne adds in a step, in 1/256 of the phases' unit
+  bool strong;                        ///< the gain is in 1/64 instead
+  uint32_t psi12;                     ///< less kHalfStep
+  uint32_t psi13;                     ///< less kHalfStep
+  uint32_t threshold[kChamberCount];  ///< duties d_i: positive beyond this phase; 1 is 2^32 - 1
 };
 
 /// Converts the parameters of a valid set.

@@ -1,51 +1,104 @@
 #include "oscillators.h"
 
+#include <string.h>
+
 #include "sine.h"
+
+// For the one function that runs a thousand times a second speed counts more than size.
+#define BIFA_FAST __attribute__((optimize("O2")))
+#define BIFA_INLINE inline __attribute__((always_inline))
 
 namespace bifa {
 
-void Oscillators::place(uint32_t body, uint32_t head, uint32_t tail) {
-  phase_[0] = body;
-  phase_[1] = head;
-  phase_[2] = tail;
-  fraction_ = 0;
-  first_ = true;
-}
-
 namespace {
 
-/// What the pull of a step and of the one before it (sums of sines) add to a phase.
-inline int32_t advance(int16_t pull, int16_t& before, uint16_t gain) {
-  const int16_t extrapolated = pull + (pull - before) / 2;
-  before = pull;
-  return ((static_cast<int32_t>(extrapolated) * gain) >> 8) * 4;
+/// The upper half of an error (both machines are little-endian). Loading no more than that spares an AVR registers.
+BIFA_INLINE uint16_t upper(const uint32_t& error) {
+  uint16_t half;
+  memcpy(&half, reinterpret_cast<const uint8_t*>(&error) + 2, sizeof half);
+  return half;
 }
+
+/// Eq. (10): u = 1 beyond the threshold. The lowest bit makes a duty of 0 (threshold 0) always and a duty of 1
+/// (threshold 2^32 - 1) never positive.
+BIFA_INLINE bool is_positive(uint32_t phase, uint32_t threshold) { return (phase | 1) > threshold; }
 
 }  // namespace
 
-void Oscillators::step() {
-  const uint32_t head_error = phase_[1] - phase_[0] - gait_.psi12;
-  const uint32_t tail_error = phase_[2] - phase_[0] - gait_.psi13;
+void Oscillators::use(const Gait& gait) {
+  const uint32_t head = phase(1);
+  const uint32_t tail = phase(2);
+  gait_ = gait;
+  place(body_, head, tail);
+}
+
+void Oscillators::place(uint32_t body, uint32_t head, uint32_t tail) {
+  body_ = body;
+  head_error_ = head - body - gait_.psi12;
+  tail_error_ = tail - body - gait_.psi13;
+  begin_anew();
+}
+
+void Oscillators::settle() {
+  body_ = 0;
+  head_error_ = kHalfStep;
+  tail_error_ = kHalfStep;
+  begin_anew();
+}
+
+uint32_t Oscillators::phase(uint8_t chamber) const {
+  if (chamber == 1) return body_ + gait_.psi12 + head_error_;
+  if (chamber == 2) return body_ + gait_.psi13 + tail_error_;
+  return body_;
+}
+
+BIFA_INLINE Oscillators::Pulls Oscillators::pulls(uint16_t head_error, uint16_t tail_error) {
   const int16_t body_head = sine(head_error);
   const int16_t body_tail = sine(tail_error);
   const int16_t head_tail = sine(tail_error - head_error);
-  const int16_t pull_body = body_head + body_tail;
-  const int16_t pull_head = head_tail - body_head;
-  if (first_) {
-    pull_body_ = pull_body;
-    pull_head_ = pull_head;
-    first_ = false;
-  }
-  const int32_t body = advance(pull_body, pull_body_, gait_.gain);
-  const int32_t head = advance(pull_head, pull_head_, gait_.gain);
+  return {static_cast<int16_t>(body_head + body_tail), static_cast<int16_t>(head_tail - body_head)};
+}
 
-  uint32_t increment = gait_.increment;
-  const uint8_t fraction = fraction_;
-  fraction_ = static_cast<uint8_t>(fraction + gait_.increment_fraction);
-  if (fraction_ < fraction) ++increment;
-  phase_[0] += increment + body;
-  phase_[1] += increment + head;
-  phase_[2] += increment - body - head;  // what they pull adds up to nothing: the mean runs at exactly f
+/// What the extrapolated pull adds to a phase.
+BIFA_INLINE uint32_t Oscillators::advance(int16_t pull, int16_t last) const {
+  const int16_t extrapolated = pull + (pull - last) / 2;
+  return static_cast<uint32_t>((static_cast<int32_t>(extrapolated) * gait_.gain) >> 8);
+}
+
+BIFA_INLINE void Oscillators::compare() {
+  uint8_t outputs = 0;
+  if (is_positive(body_, gait_.threshold[0])) outputs |= 1;
+  if (is_positive(body_ + gait_.psi12 + head_error_, gait_.threshold[1])) outputs |= 2;
+  if (is_positive(body_ + gait_.psi13 + tail_error_, gait_.threshold[2])) outputs |= 4;
+  outputs_ = outputs;
+}
+
+void Oscillators::begin_anew() {
+  last_ = pulls(upper(head_error_), upper(tail_error_));
+  compare();
+}
+
+BIFA_FAST void Oscillators::step() {
+  const uint16_t head_error = upper(head_error_);
+  const uint16_t tail_error = upper(tail_error_);
+  if ((head_error | tail_error | last_.body | last_.head) == 0) {
+    body_ += gait_.increment;  // settled: nothing pulls
+    compare();
+    return;
+  }
+  const Pulls now = pulls(head_error, tail_error);
+  uint32_t body = advance(now.body, last_.body);
+  uint32_t head = advance(now.head, last_.head);
+  last_ = now;
+  if (gait_.strong) {
+    body <<= 2;
+    head <<= 2;
+  }
+  // The pulls add up to nothing, so the tail's is -(body + head), and the mean of the phases runs at exactly f.
+  head_error_ += head - body;
+  tail_error_ -= head + body + body;
+  body_ += gait_.increment + body;
+  compare();
 }
 
 }  // namespace bifa

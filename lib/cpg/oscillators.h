@@ -7,37 +7,45 @@ namespace bifa {
 
 /// Second-order Adams-Bashforth: the sines of one step serve the next one again, so that it costs three sines a step,
 /// as forward Euler does (the coupling is antisymmetric).
+///
+/// What is kept are the body's phase and how far head and tail are off the phases that they are to have towards it:
+/// only the sines of these are needed, and settled they rest. They carry kHalfStep, so that their upper half is rounded.
 class Oscillators {
  public:
   /// Takes a new gait; the phases go on from where they are.
-  void use(const Gait& gait) {
-    gait_ = gait;
-    first_ = true;
-  }
+  void use(const Gait& gait);
 
-  /// Puts the phases (turns / 2^32) where they are asked for.
+  /// Puts the phases (turns / 2^32).
   void place(uint32_t body, uint32_t head, uint32_t tail);
   /// Starts with the body at phase 0 and the others where the coupling would bring them.
-  void settle() { place(0, gait_.psi12, gait_.psi13); }
+  void settle();
 
   /// One millisecond.
   void step();
 
-  /// The output of eq. (10) as a chamber's state: u = 1 is positive pressure.
-  ChamberState command(uint8_t chamber) const {
-    const bool positive = phase_[chamber] >= gait_.threshold[chamber] && !gait_.never_positive[chamber];
-    return positive ? ChamberState::kPositive : ChamberState::kVacuum;
-  }
+  /// The outputs u of eq. (10) after the last step: bit i for chamber i, 1 is positive pressure.
+  uint8_t outputs() const { return outputs_; }
 
-  uint32_t phase(uint8_t chamber) const { return phase_[chamber]; }
+  uint32_t phase(uint8_t chamber) const;
 
  private:
-  uint32_t phase_[kChamberCount];
-  int16_t pull_body_;  ///< sums of sines of the step before
-  int16_t pull_head_;
-  uint8_t fraction_ = 0;
-  bool first_ = true;  ///< no step before this one has the same right-hand side: begin with Euler
-  Gait gait_;
+  /// Sums of sines that pull at body and head; the one at the tail is what they lack to zero.
+  struct Pulls {
+    int16_t body;
+    int16_t head;
+  };
+
+  static Pulls pulls(uint16_t head_error, uint16_t tail_error);
+  uint32_t advance(int16_t pull, int16_t last) const;
+  void begin_anew();
+  void compare();
+
+  uint32_t body_ = 0;
+  uint32_t head_error_ = kHalfStep;
+  uint32_t tail_error_ = kHalfStep;
+  Pulls last_ = {0, 0};  ///< of the step before; after a change what they would have been
+  uint8_t outputs_ = 0;
+  Gait gait_ = {};
 };
 
 }  // namespace bifa

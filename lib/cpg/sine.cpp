@@ -1,5 +1,7 @@
 #include "sine.h"
 
+#include "flash.h"
+
 namespace bifa {
 
 // round(kSineOne * sin(pi / 2 * i / kSineSteps)); the unit test recomputes every entry.

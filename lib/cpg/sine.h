@@ -1,4 +1,4 @@
-// Sine of an angle in turns / 2^32, for the CPG: table of a quarter, linear interpolation.
+// Sine of an angle in turns / 2^16, for the CPG: table of a quarter, linear interpolation.
 #pragma once
 
 #include "flash.h"
@@ -12,17 +12,16 @@ const int16_t kSineOne = 16000;
 const uint8_t kSineSteps = 128;  ///< of a quarter turn
 extern const uint16_t kSineTable[kSineSteps + 1];
 
-/// kSineOne * sin(2 pi angle / 2^32). Greatest error 1 (6e-5). Exactly odd, and 0 only where the sine rounds to 0.
-inline __attribute__((always_inline)) int16_t sine(uint32_t angle) {
-  const bool negative = angle & 0x80000000UL;
-  uint16_t position = static_cast<uint16_t>(angle >> 15);  // in the half turn
-  if (angle & 0x40000000UL) position = ~position;          // the half mirrors the quarter
-  const uint8_t fraction = static_cast<uint8_t>(position);
-  const uint16_t* entry = &kSineTable[position >> 8];
+/// kSineOne * sin(2 pi angle / 2^16). Greatest error 2 (1.2e-4 of 1); exactly odd.
+inline __attribute__((always_inline)) int16_t sine(uint16_t angle) {
+  uint16_t place = angle << 1;         // in the half turn
+  if (place & 0x8000) place = -place;  // which mirrors the quarter
+  const uint8_t fraction = static_cast<uint8_t>(place);
+  const uint16_t* entry = &kSineTable[static_cast<uint8_t>(place >> 8)];
   const uint16_t left = flash_word(entry);
   const uint8_t step = static_cast<uint8_t>(flash_byte(entry + 1) - left);  // little-endian: its low byte
-  const uint16_t value = left + static_cast<uint8_t>((static_cast<uint16_t>(step * fraction) + 128u) >> 8);
-  return negative ? -static_cast<int16_t>(value) : static_cast<int16_t>(value);
+  const uint16_t value = left + static_cast<uint8_t>(static_cast<uint16_t>(step * fraction) >> 8);
+  return angle & 0x8000 ? -static_cast<int16_t>(value) : static_cast<int16_t>(value);
 }
 
 }  // namespace bifa

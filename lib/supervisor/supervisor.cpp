@@ -49,6 +49,14 @@ void Supervisor::clear() {
   fault_ = FaultReport();
 }
 
+void Supervisor::walk(uint8_t outputs) {
+  if (state_ != State::kRunning) return;
+  for (uint8_t i = 0; i < kChamberCount; ++i) {
+    wanted_.of[i] = outputs & 1 ? ChamberState::kPositive : ChamberState::kVacuum;
+    outputs >>= 1;
+  }
+}
+
 void Supervisor::tick() {
   ChamberStates now;
   for (uint8_t i = 0; i < kChamberCount; ++i) now.of[i] = sequencers_[i].tick(wanted_.of[i]);

@@ -40,10 +40,8 @@ class Supervisor {
   /// From stopped or fault to idle.
   void clear();
 
-  /// Every millisecond: what the chambers are to do while running.
-  void walk(uint8_t chamber, ChamberState state) {
-    if (state_ == State::kRunning) wanted_.of[chamber] = state;
-  }
+  /// Every millisecond: the outputs of the oscillators, bit i for chamber i; obeyed only while running.
+  void walk(uint8_t outputs);
   /// Every millisecond: moves the valves on towards what is wanted.
   void tick();
 
