@@ -35,7 +35,7 @@ bool Receiver::push(uint8_t byte) {
   put(byte);
   if (stop_matched_ == kOtherFrame) return false;
   stop_matched_ = byte == flash_byte(&kStopFrame[stop_matched_]) ? stop_matched_ + 1 : kOtherFrame;
-  if (stop_matched_ < sizeof kStopFrame) return false;
+  if (stop_matched_ != sizeof kStopFrame) return false;
   stop_matched_ = kOtherFrame;
   return true;
 }
