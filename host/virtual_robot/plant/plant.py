@@ -70,6 +70,16 @@ class Plant:
         """Put an experiment on the stand at rest; `start` has been connected until everything settled."""
         lib.plant_mount(self._plant, EXPERIMENTS.index(experiment), CHAMBERS.index(chamber), STATES.index(start))
 
+    def set_trial(
+        self,
+        friction_factor: float = 1.0,
+        inclination_deg: float = 0.0,
+        ripple_phase_rad: float = 0.0,
+        session_share: float = 0.0,
+    ) -> None:
+        """What differs from trial to trial; takes effect with the next mount."""
+        lib.plant_set_trial(self._plant, friction_factor, inclination_deg, ripple_phase_rad, session_share)
+
     def set_step(self, step_s: float) -> None:
         """Greatest step of the integrator, until the next mount."""
         lib.plant_set_step(self._plant, step_s)
@@ -115,9 +125,9 @@ class Plant:
 
     # --- wired to the Uno -------------------------------------------------------------------------------
 
-    def wire(self, uno: Any, noise_seed: int, noise_psi: float, offset_psi: float = 0.0) -> None:
+    def wire(self, uno: Any, clock_hz: float, noise_seed: int, noise_psi: float) -> None:
         """Connect valves, strobe, sensors and DAC to a board; from now on the board's cycles are time."""
-        lib.plant_wire(self._plant, uno.cycle, noise_seed, noise_psi, offset_psi)
+        lib.plant_wire(self._plant, uno.cycle, clock_hz, noise_seed, noise_psi)
         address = [
             int(ffi.cast("uintptr_t", pointer))
             for pointer in (
@@ -135,6 +145,12 @@ class Plant:
 
     def advance(self, time_s: float) -> None:
         lib.plant_advance(self._plant, time_s)
+
+    def sample(self, time_s: float) -> np.ndarray:
+        """One row of dtype SAMPLE at `time_s`."""
+        row = np.zeros(1, SAMPLE)
+        lib.plant_record(self._plant, time_s, 0.0, 1, ffi.cast("PlantSample *", row.ctypes.data))
+        return row[0]
 
     def break_sensor(self, channel: int, volts: float | None) -> None:
         """Fix a sensor's (0-2) or the regulator monitor's (3) output; None = in order again."""

@@ -77,6 +77,14 @@ void plant_mount(Plant *plant, int experiment, int chamber, int start) {
   plant->origin_tail = plant->y[X_TAIL];
 }
 
+void plant_set_trial(Plant *plant, double friction_factor, double inclination_deg, double ripple_phase_rad,
+                     double session_share) {
+  plant->p.friction_factor = friction_factor;
+  plant->p.inclination_deg = inclination_deg;
+  plant->p.ripple_phase_rad = ripple_phase_rad;
+  plant->p.session_share = session_share;
+}
+
 void plant_set_step(Plant *plant, double step_s) { plant->step = step_s; }
 
 void plant_set_supply(Plant *plant, double positive_psi) { plant->set_point_psi = positive_psi; }

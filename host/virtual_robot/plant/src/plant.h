@@ -84,6 +84,8 @@ void plant_landmarks(const Plant *plant, int small, double *contracted_m, double
 // Puts an experiment on the stand, at rest, `start` connected for as long as it takes to settle; time is 0 again.
 // `chamber` is the actuator under test (BODY or HEAD) of a step or a static loading.
 void plant_mount(Plant *plant, int experiment, int chamber, int start);
+void plant_set_trial(Plant *plant, double friction_factor, double inclination_deg, double ripple_phase_rad,
+                     double session_share);        // before plant_mount()
 void plant_set_step(Plant *plant, double step_s);  // greatest step of the integrator
 void plant_set_supply(Plant *plant, double positive_psi);
 void plant_connect(Plant *plant, double time_s, int chamber, int state);  // command, in order of time
@@ -97,7 +99,8 @@ double plant_energy(const Plant *plant);  // kinetic + spring, J
 double plant_time(const Plant *plant);
 
 // --- wired to the Uno: addresses of these go into UnoWorld ---
-void plant_wire(Plant *plant, uint64_t start_cycle, uint64_t noise_seed, double noise_psi, double offset_psi);
+// `clock_hz` is what the board's 16 MHz really are.
+void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t noise_seed, double noise_psi);
 // Puts another experiment on the stand while the Uno goes on: time is 0 at `cycle`, the valves stay as they are.
 void plant_remount(Plant *plant, int experiment, int chamber, uint64_t cycle);
 void plant_break_sensor(Plant *plant, int channel, double volts);  // NaN = in order again

@@ -7,7 +7,6 @@
 
 #include "parts.h"
 
-#define CLOCK_HZ 16e6
 #define STROBE_PIN 10
 #define SUPPLY_VOLTS 5.0
 #define REGULATOR_SPAN_PSI 130.0  // ITV1050: 0.9 MPa for 5 V in; 1-5 V monitor out
@@ -15,10 +14,11 @@
 
 typedef struct Wires {
   uint64_t start_cycle;
+  double clock_hz;
   uint64_t random;
   double spare_gauss;
   bool has_spare;
-  double noise_psi, offset_psi;
+  double noise_psi;
   double broken_volts[4];
   bool energised[CHAMBERS][2];  // positive, vacuum valve
   int both;
@@ -50,13 +50,13 @@ static double gauss(Wires *wires) {  // Box-Muller
   return radius * cos(angle);
 }
 
-void plant_wire(Plant *plant, uint64_t start_cycle, uint64_t noise_seed, double noise_psi, double offset_psi) {
+void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t noise_seed, double noise_psi) {
   wires_free(plant);
   Wires *wires = calloc(1, sizeof *wires);
   wires->start_cycle = start_cycle;
+  wires->clock_hz = clock_hz;
   wires->random = noise_seed;
   wires->noise_psi = noise_psi;
-  wires->offset_psi = offset_psi;
   for (int i = 0; i < 4; i++) wires->broken_volts[i] = NAN;
   plant->wires = wires;
 }
@@ -85,7 +85,7 @@ void wires_free(Plant *plant) {
 }
 
 static double seconds(const Plant *plant, uint64_t cycle) {
-  return (double)(int64_t)(cycle - plant->wires->start_cycle) / CLOCK_HZ;
+  return (double)(int64_t)(cycle - plant->wires->start_cycle) / plant->wires->clock_hz;
 }
 
 static void on_strobe(Wires *wires, double time) {
@@ -112,7 +112,7 @@ static void pin_changed(void *context, uint64_t cycle, int pin, int level) {
 // ABPDRRV015PDAA5: 10-90 % of the supply over +-15 psi, never beyond 2.5-97.5 %.
 static double sensor_volts(Plant *plant, int chamber) {
   Wires *wires = plant->wires;
-  double psi = reading_psi(plant, plant->time, plant->y, chamber) + wires->offset_psi + wires->noise_psi * gauss(wires);
+  double psi = reading_psi(plant, plant->time, plant->y, chamber) + wires->noise_psi * gauss(wires);
   double share = 0.1 + 0.8 * (psi + 15.0) / 30.0;
   return SUPPLY_VOLTS * fmin(fmax(share, 0.025), 0.975);
 }

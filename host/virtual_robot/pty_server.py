@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bench on a pseudo-terminal in real time, for people and for any serial program.
+
+A pty has no DTR line. So, as opening an Uno's port resets it, the board is reset when the pty is opened, which the
+kernel shows by no longer reporting the other side as hung up.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+_SLICE_S = 0.005
+_STATUS_S = 0.25
+_MAX_LAG_S = 0.5  # after a longer stall (a suspended process) lost time is not made up
+
+
+def serve(
+    rig: Any,
+    on_ready: Callable[[str], None],
+    on_status: Callable[[dict[str, Any]], None],
+    link: Path | None,
+    stop: Callable[[], bool],
+) -> None:
+    """Serve until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path, `on_status` a dict four times a
+    second; `link` is a symbolic link kept to the pty meanwhile."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    path = os.ttyname(slave)
+    os.close(slave)  # so that the kernel tells whether somebody has it open
+    os.set_blocking(master, False)
+    try:
+        if link is not None:
+            _point(link, path)
+        on_ready(path)
+        _Pump(rig, master).run(on_status, stop)
+    finally:
+        os.close(master)
+        if link is not None and link.is_symlink() and os.readlink(link) == path:
+            link.unlink()
+
+
+def _point(link: Path, path: str) -> None:
+    temporary = link.with_name(f".{link.name}.{os.getpid()}")
+    temporary.symlink_to(path)
+    os.replace(temporary, link)
+
+
+class _Pump:
+    """Moves bytes between pty and board and keeps virtual time beside the wall's."""
+
+    def __init__(self, rig: Any, master: int) -> None:
+        self._rig = rig
+        self._master = master
+        self._poll = select.poll()
+        self._poll.register(master, select.POLLIN)
+        self._is_open = False
+        self._unsent = b""
+
+    def run(self, on_status: Callable[[dict[str, Any]], None], stop: Callable[[], bool]) -> None:
+        world = self._rig.world
+        wall_start, virtual_start = time.monotonic(), world.now_s
+        next_status = 0.0
+        while not stop():
+            wall = time.monotonic() - wall_start
+            behind = wall - (world.now_s - virtual_start)
+            if behind > _MAX_LAG_S:
+                wall_start += behind
+                behind = _SLICE_S
+            if behind > 0:
+                world.run(min(behind, 4 * _SLICE_S))
+            self._to_host()
+            if wall >= next_status:
+                next_status = wall + _STATUS_S
+                on_status(self._status())
+            self._from_host(0 if behind > 4 * _SLICE_S else _SLICE_S)
+
+    def _from_host(self, timeout_s: float) -> None:
+        events = self._poll.poll(timeout_s * 1e3)
+        flags = events[0][1] if events else 0
+        is_open = not flags & select.POLLHUP
+        if is_open and not self._is_open:
+            self._rig.uno.reset("external")
+            self._unsent = b""
+        self._is_open = is_open
+        if not is_open:
+            time.sleep(timeout_s)  # poll returns at once while nobody is there
+        elif flags & select.POLLIN:
+            with contextlib.suppress(BlockingIOError, OSError):
+                self._rig.uno.send(os.read(self._master, 4096))
+
+    def _to_host(self) -> None:
+        self._unsent += self._rig.uno.receive()
+        if not self._is_open:
+            self._unsent = b""
+        while self._unsent:
+            try:
+                sent = os.write(self._master, self._unsent[:1024])
+            except (BlockingIOError, OSError):
+                self._unsent = self._unsent[-4096:]  # nobody reads: a real port would lose bytes as well
+                return
+            self._unsent = self._unsent[sent:]
+
+    def _status(self) -> dict[str, Any]:
+        rig = self._rig
+        sample = rig.plant.sample(rig.world.now_s - rig.instruments.mounted_s)
+        return {
+            "time_s": rig.world.now_s,
+            "open": self._is_open,
+            "displacement_mm": 1e3 * float(sample["head_m"]),
+            "pressure_psi": [float(p) for p in sample["pressure_psi"]],
+            "connected": [int(c) for c in sample["connected"]],
+            "resets": rig.uno.resets,
+            "asleep": rig.uno.asleep_s / max(rig.uno.time_s, 1e-9),
+        }

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The virtual bench: the real firmware in a simulated Uno, wired to the plant, with instruments around it.
+
+In process, time is virtual: it passes only in `transport.read` and `clock.sleep`, and the same calls give the
+same bytes. `serve_pty` offers the same bench in real time to any serial program.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from virtual_robot.effects import plant_parameters
+from virtual_robot.errors import FirmwareError, PortClosedError
+from virtual_robot.instruments import Instruments, Noise
+from virtual_robot.plant import Plant, profile
+from virtual_robot.sealed import draw_effects, specimen
+from virtual_robot.uno import CLOCK_HZ, Uno
+
+FIRMWARE = Path(__file__).resolve().parents[2] / ".pio" / "build" / "uno" / "firmware.elf"
+_USB_FRAME_S = 1e-3  # the USB chip hands bytes over once a millisecond
+_CLOCK_ERROR = {"ideal": 0.0, "realistic": 2.3e-3}  # ceramic resonator, +-0.5 %
+_WOBBLE = {"ideal": 0.0, "realistic": 0.01}
+
+
+class World:
+    """Time of the bench: the board's cycles, at what its 16 MHz really are."""
+
+    def __init__(self, uno: Uno, clock_hz: float) -> None:
+        self.uno = uno
+        self.clock_hz = clock_hz
+        self._start_cycle = uno.cycle
+
+    @property
+    def cycle(self) -> int:
+        return self.uno.cycle
+
+    @property
+    def now_s(self) -> float:
+        return (self.uno.cycle - self._start_cycle) / self.clock_hz
+
+    def run(self, duration_s: float, stop_on_output: bool = False) -> bool:
+        """Let time pass; True if it stopped early because the board sent a byte."""
+        # Rounded up, so that waiting for the rest of a cycle gets there.
+        until = self.uno.cycle + max(0, math.ceil(duration_s * self.clock_hz))
+        return self.uno.run_until(until, stop_on_output)
+
+
+class VirtualTransport:
+    """The serial port (bifa's Transport). Opening it has reset the board."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._open = True
+
+    def write(self, data: bytes) -> None:
+        self._check()
+        self._world.uno.send(bytes(data))
+
+    def read(self, timeout_s: float) -> bytes:
+        """What has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
+        self._check()
+        if not self._world.run(timeout_s, stop_on_output=True):
+            return b""
+        if timeout_s > 0:
+            self._world.run(min(_USB_FRAME_S, timeout_s))
+        return self._world.uno.receive()
+
+    def reset(self) -> None:
+        """What DTR does: an external reset; bytes still under way to the host are lost."""
+        self._check()
+        self._world.uno.reset("external")
+        self._world.uno.receive()
+
+    def close(self) -> None:
+        self._open = False
+
+    def _check(self) -> None:
+        if not self._open:
+            raise PortClosedError("the port has been closed")
+        if not self._world.uno.powered:
+            raise PortClosedError("the board has lost its power, and its port with it")
+
+
+class VirtualClock:
+    """Virtual time (bifa's Clock)."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    def now(self) -> float:
+        return self._world.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        self._world.run(duration_s)
+
+
+class VirtualRig:
+    """A bench with everything on it; a context manager.
+
+    `transport`, `clock` and `instruments` are what the host sees; `uno` and `plant` let tests press the emergency
+    stop, break a sensor, cut the power or look inside. `truth` are the plant's parameters.
+    """
+
+    def __init__(self, uno: Uno, plant: Plant, world: World, instruments: Instruments) -> None:
+        self.uno = uno
+        self.plant = plant
+        self.world = world
+        self.transport = VirtualTransport(world)
+        self.clock = VirtualClock(world)
+        self.instruments = instruments
+
+    @property
+    def truth(self) -> dict[str, float]:
+        return dict(self.plant.parameters)
+
+    def break_sensor(self, chamber: str, volts: float | None) -> None:
+        """Fix a pressure sensor's output ("body", "head", "tail", "regulator"); None = in order again."""
+        self.plant.break_sensor(("body", "head", "tail", "regulator").index(chamber), volts)
+
+    def serve_pty(
+        self,
+        on_ready: Callable[[str], None],
+        on_status: Callable[[dict[str, Any]], None] = lambda status: None,
+        link: Path | None = None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Offer the bench on a pty in real time until `stop()` or Ctrl-C; see virtual_robot.pty_server."""
+        from virtual_robot.pty_server import serve
+
+        serve(self, on_ready, on_status, link, stop)
+
+    def close(self) -> None:
+        """Let go of everything; the EEPROM goes to its file. A second call does nothing."""
+        self.transport.close()
+        self.uno.close()
+        self.plant.close()
+
+    def __enter__(self) -> VirtualRig:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_rig(
+    firmware: Path | str | None = None,
+    profile: str = "ideal",
+    seed: int = 0,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    sealed: int | None = None,
+    eeprom: Path | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    keep_events: bool = True,
+) -> VirtualRig:
+    """A virtual bench whose board has just been powered.
+
+    `firmware`: an ELF image (default: the one that `pio run -e uno` builds). `profile`: "ideal" (the paper's
+    equations and sensor noise) or "realistic". `seed`: noise, clocks and run-to-run variation. `effects`:
+    `{"hysteresis": {"force_N": 4.0}}`, several at once. `sealed`: a seed that draws a specimen and an effect
+    that nobody is told of. `eeprom`: a file that outlasts the bench. `parameters`: plant parameters to replace.
+    Raises VirtualRobotError, saying what to do.
+    """
+    random = np.random.default_rng([seed, 0x51D])
+    numbers, curves = _profile(profile), None
+    if sealed is not None:
+        draw = np.random.default_rng(sealed)
+        own, curves = specimen(draw)
+        numbers |= own | plant_parameters(draw_effects("single", draw)[0])
+    numbers |= plant_parameters(effects or {}) | dict(parameters or {})
+    image = Path(firmware) if firmware is not None else FIRMWARE
+    if not image.is_file():
+        raise FirmwareError(image)
+    uno = Uno(image, eeprom=Path(eeprom) if eeprom is not None else None, keep_events=keep_events)
+    # The regulator has no set-point until the firmware gives it one.
+    plant = Plant(numbers | {"supply_positive_psi": 0.0}, curves)
+    plant.parameters = numbers
+    clock_hz = CLOCK_HZ * (1.0 + _CLOCK_ERROR[profile])
+    noise = Noise()
+    plant.wire(uno, clock_hz, int(random.integers(2**63)), noise.pressure_psi)
+    world = World(uno, clock_hz)
+    instruments = Instruments(world, plant, noise, _WOBBLE[profile], random)
+    instruments.mount("locomotion")
+    return VirtualRig(uno, plant, world, instruments)
+
+
+_profile = profile  # open_rig has a parameter of that name
