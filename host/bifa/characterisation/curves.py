@@ -2,7 +2,8 @@
 
 In the monomials of a model file, or in Chebyshev's, the coefficients of K are hopelessly correlated. `StiffnessFit.shapes`
 gives directions in which the static data leave the curve uncertain by one standard deviation each: the coordinates
-`body_shape_01` ... (the least certain one first, mostly the continuation beyond the static range).
+`body_shape_01` ... (the least certain one first, mostly the continuation beyond the static range). Where the actuator
+never moves by itself, the continuation is left out.
 """
 
 from __future__ import annotations
@@ -19,23 +20,26 @@ from bifa.robot.stiffness import StiffnessCurve
 from .stiffness import StiffnessFit
 
 _WIDEST = 60.0  # standard deviations that a shape may move
-_FELT_N = 0.03  # a shape that changes K by less has no say in experiments that move fast
+_FELT_N = 0.01  # a shape that changes K by less does not change a walk that one could measure
 
 
 @dataclass(frozen=True)
 class FittedCurve:
-    """`prefix` names the actuator's parameters: "body" or "small"."""
+    """`prefix` names the actuator's parameters: "body" or "small". `moves`: there are trials in which the actuator moves
+    by itself, and so reaches beyond the static range."""
 
     prefix: str
     fit: StiffnessFit
+    moves: bool = True
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        return tuple(f"{self.prefix}_shape_{i + 1:02d}" for i in range(len(self.fit.coefficients)))
+        return tuple(f"{self.prefix}_shape_{i + 1:02d}" for i in range(len(self.shapes)))
 
     @cached_property
     def shapes(self) -> np.ndarray:
-        return self.fit.shapes()
+        shapes, told = self.fit.shapes()
+        return shapes if self.moves else shapes[told]
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -44,13 +48,15 @@ class FittedCurve:
 
     @cached_property
     def felt(self) -> frozenset[str]:
-        """The shapes that matter beyond static loading."""
-        x = np.linspace(self.fit.lower_m, self.fit.upper_m, 200)
-        z = 2.0 * (x - self.fit.lower_m) / (self.fit.upper_m - self.fit.lower_m) - 1.0
-        change = np.abs(chebyshev.chebval(z, self.shapes.T)).max(axis=1)
-        return frozenset(name for name, size in zip(self.names, change, strict=True) if size > _FELT_N)
+        """The shapes that matter in a walk."""
+        sizes = self._sizes(self.shapes)
+        return frozenset(name for name, size in zip(self.names, sizes, strict=True) if size > _FELT_N)
 
     def curve(self, weights: tuple[float, ...]) -> StiffnessCurve:
         """The curve with each shape added as often as `weights` say."""
         coefficients = self.fit.coefficients + np.asarray(weights) @ self.shapes
         return StiffnessCurve(tuple(chebyshev.cheb2poly(coefficients)), self.fit.lower_m, self.fit.upper_m)
+
+    def _sizes(self, shapes: np.ndarray) -> np.ndarray:
+        """By how many N each shape changes K where it changes it most."""
+        return np.abs(chebyshev.chebval(np.linspace(-1.0, 1.0, 200), shapes.T)).max(axis=1)

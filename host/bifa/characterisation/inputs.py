@@ -9,6 +9,7 @@ import numpy as np
 
 from bifa import simulate
 from bifa.data import Trial
+from bifa.identify.system import Theta
 from bifa.simulate import Plant, Timeline
 
 from .motion import imposed_motion
@@ -27,8 +28,11 @@ class Inputs(Protocol):
     actuator: str | None
     positive_psi: float | None
 
-    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
-        """The channels, each of shape (n,). `zeros_m`: K's contracted zero of body and small actuator."""
+    def simulate(
+        self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float, nuisances: Theta
+    ) -> dict[str, np.ndarray]:
+        """The channels, each of shape (n,). `zeros_m`: K's contracted zero of body and small actuator; `nuisances` may
+        hold what varies from run to run."""
         ...
 
 
@@ -42,11 +46,11 @@ class StaticInputs:
     channels: tuple[str, ...] = ("force_N", "pressure_psi")
     positive_psi: None = None
 
-    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+    def simulate(
+        self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float, nuisances: Theta
+    ) -> dict[str, np.ndarray]:
         path_mm = (self.displacement_m - zeros_m[self.actuator == "small"]) * _MM
-        return dict(
-            simulate.static_loading(plant, self.actuator, self.time_s, path_mm, self.pressure_psi).columns
-        )
+        return dict(simulate.static_loading(plant, self.actuator, self.time_s, path_mm, self.pressure_psi).columns)
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,9 @@ class StepInputs:
     channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
     positive_psi: None = None
 
-    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+    def simulate(
+        self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float, nuisances: Theta
+    ) -> dict[str, np.ndarray]:
         record = simulate.step_response(
             plant, self.actuator, self.time_s, self.commands, self.pressure_psi, tolerance_m
         )
@@ -76,11 +82,34 @@ class PullInputs:
     actuator: None = None
     positive_psi: None = None
 
-    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+    @property
+    def sample_s(self) -> float:
+        return float(np.median(np.diff(self.pulled_s)))
+
+    def simulate(
+        self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float, nuisances: Theta
+    ) -> dict[str, np.ndarray]:
         record = simulate.anchor_pull(
             plant, self.pulled_s, self.rate_mm_s, self.pressure_psi, self.load_cell_N_m, tolerance_m
         )
-        return dict(record.columns)
+        return dict(record.columns) | {"force_N": self._force(record, nuisances.get("slip_late_s", 0.0))}
+
+    def _force(self, record: simulate.Record, late_s: float) -> np.ndarray:
+        """The resistance, passing from the wound-up load cell to sliding over one sample instead of at once.
+
+        A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change
+        of a parameter would move it, and no derivative could find mu_s.
+        """
+        wound, holding, kinetic = record["wound_N"], record["holding_N"], record["kinetic_N"]
+        gives = np.flatnonzero(wound >= holding)
+        if not len(gives):
+            return wound
+        k, before = gives[0], max(gives[0] - 1, 0)
+        excess, rise = holding[before] - wound[before], (wound - holding)[k] - (wound - holding)[before]
+        share = excess / rise if rise > 0.0 else 0.0
+        slip_s = self.pulled_s[before] + share * (self.pulled_s[k] - self.pulled_s[before]) + late_s
+        slid = np.clip((self.pulled_s - slip_s) / self.sample_s + 0.5, 0.0, 1.0)
+        return (1.0 - slid) * wound + slid * kinetic
 
 
 @dataclass(frozen=True)
@@ -92,7 +121,9 @@ class WalkInputs:
     channels: tuple[str, ...]
     actuator: None = None
 
-    def simulate(self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float) -> dict[str, np.ndarray]:
+    def simulate(
+        self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float, nuisances: Theta
+    ) -> dict[str, np.ndarray]:
         record = simulate.walk(
             plant,
             commands=self.commands,

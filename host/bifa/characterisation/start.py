@@ -83,13 +83,14 @@ def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model:
     name = f"{prefix}_area_N_psi"
     area = values.get(name, model.parameters[name].value)
     seen = rests(dataset, fit.actuator)
+    moves = bool(seen or dataset.of("locomotion"))
     if not seen:
-        return FittedCurve(prefix, fit.stiffness)
+        return FittedCurve(prefix, fit.stiffness, moves)
     sd = np.full(len(seen), area * pressure_sd_psi())
     pinned = fit.stiffness.with_equilibria(
         [rest.displacement_m for rest in seen], [area * rest.pressure_psi for rest in seen], sd
     )
-    return FittedCurve(prefix, pinned)
+    return FittedCurve(prefix, pinned, moves)
 
 
 def _known(dataset: Dataset, model: Model) -> dict[str, float]:

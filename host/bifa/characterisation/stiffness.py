@@ -14,7 +14,7 @@ The fit is a Gaussian posterior, so it carries the uncertainty of every point of
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -25,6 +25,7 @@ from .errors import TooLittleDataError
 DEGREE = 15
 CONTINUATION = 0.13  # of the static range, on either side, at most: beyond it the curve goes on straight
 _PRIOR_POINTS = 6  # on either side
+_TOLD = 0.9  # share of the information that stems from static loading
 _MIN_POINTS = 4 * (DEGREE + 1)
 
 
@@ -35,7 +36,8 @@ class StiffnessFit:
     lower_m, upper_m: where the polynomial holds; beyond them the model continues in a straight line.
     covered_m: the displacements that the testing machine covered.
     coefficients: Chebyshev coefficients in z [N], shape (16,).
-    information: the inverse of their covariance [1/N^2], shape (16, 16).
+    information: the inverse of their covariance [1/N^2], shape (16, 16); `static` is the part of it that stems from static
+        loading, the rest from the broad prior on the continuation and from equilibria.
     residual_N: RMS of the data about the curve, hysteresis included.
     """
 
@@ -44,6 +46,7 @@ class StiffnessFit:
     covered_m: tuple[float, float]
     coefficients: np.ndarray
     information: np.ndarray
+    static: np.ndarray
     residual_N: float
 
     def force(self, x: np.ndarray) -> np.ndarray:
@@ -89,19 +92,27 @@ class StiffnessFit:
         information = self.information + rows.T @ rows
         target = self.information @ self.coefficients + rows.T @ (np.asarray(force_N) / np.asarray(sd_N))
         coefficients = _solve_monotone(information, target, self._outside_slopes())
-        return StiffnessFit(self.lower_m, self.upper_m, self.covered_m, coefficients, information, self.residual_N)
+        return replace(self, coefficients=coefficients, information=information)
 
-    def shapes(self) -> np.ndarray:
-        """Ways in which the curve may still change, each by one standard deviation, the least certain one first.
+    def shapes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ways in which the curve may still change, each by one standard deviation.
 
-        Shape (16, 16): row j holds Chebyshev coefficients [N]. Any curve is `coefficients + z @ shapes()`, and the data
-        so far say that z has zero mean and unit covariance: the coordinate for a joint refinement.
+        Returns (16, 16), row j the Chebyshev coefficients [N] of a way, and (16,), True where static loading tells how
+        far. Any curve is `coefficients + z @ shapes`, and what is known so far says that z has zero mean and unit
+        covariance: the coordinates for a joint refinement. Those of the continuation come first, and within each kind
+        the least certain one.
         """
         values, vectors = np.linalg.eigh(self.covariance)
-        shapes = (vectors * np.sqrt(np.maximum(values, 0.0))).T[::-1]
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        told, turned = np.linalg.eigh(root.T @ self.static @ root)
+        shapes = []
+        for subspace in (turned[:, told < _TOLD], turned[:, told >= _TOLD]):
+            _, sizes, directions = np.linalg.svd((root @ subspace).T, full_matrices=False)
+            shapes.append(sizes[:, None] * directions)
+        shapes = np.concatenate(shapes)
         # A sign for each, so that the coordinates do not depend on the linear algebra library.
         signs = np.sign(shapes[np.arange(len(shapes)), np.argmax(np.abs(shapes), axis=1)])
-        return shapes * signs[:, None]
+        return shapes * signs[:, None], np.arange(len(shapes)) >= np.sum(told < _TOLD)
 
     def _rows(self, x: np.ndarray, derivative: int = 0) -> np.ndarray:
         return _rows(x, self.lower_m, self.upper_m, derivative)
@@ -151,7 +162,13 @@ def fit_stiffness(
     coefficients = _solve_monotone(information, target, _rows(outside, lower, upper, derivative=1))
     final = force - rows @ coefficients
     return StiffnessFit(
-        lower, upper, covered, coefficients, information, float(np.sqrt(np.average(final**2, weights=weight)))
+        lower,
+        upper,
+        covered,
+        coefficients,
+        information,
+        scaled.T @ scaled / variance,
+        float(np.sqrt(np.average(final**2, weights=weight))),
     )
 
 

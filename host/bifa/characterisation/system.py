@@ -107,7 +107,7 @@ class RobotSystem(System):
             if friction != 1.0 or inputs.positive_psi is not None:
                 plant = _altered(plant, friction, inputs.positive_psi)
             tolerance_m = (_COARSE_M if coarse else _EXACT_M)[trial.experiment]
-            channels = inputs.simulate(plant, zeros, tolerance_m)
+            channels = inputs.simulate(plant, zeros, tolerance_m, theta)
         except BifaError:  # a curve that is no longer bistable, values out of range
             return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
         channels = sites.corrected_readings(channels, corrections)
@@ -119,11 +119,22 @@ class RobotSystem(System):
     def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
         if trial.experiment not in (ANCHOR, WALK):
             return ()
-        return (
-            Parameter(
-                "friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source="friction differs from run to run"
-            ),
+        friction = Parameter(
+            "friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source="friction differs from run to run"
         )
+        if trial.experiment == WALK:
+            return (friction,)
+        half_s = 0.5 * trial.payload.sample_s
+        late = Parameter(
+            "slip_late_s",
+            "s",
+            0.0,
+            -half_s,
+            half_s,
+            scale=half_s / np.sqrt(3.0),
+            source="the peak lies between samples",
+        )
+        return friction, late
 
     def matters(self, parameter: str, trial: Trial) -> bool:
         actuator = trial.payload.actuator
@@ -134,7 +145,7 @@ class RobotSystem(System):
             return False
         if trial.experiment == ANCHOR and prefix == "body":
             return False
-        return trial.experiment == STATIC or parameter in self.curves[prefix].felt
+        return trial.experiment in (STATIC, STEP) or parameter in self.curves[prefix].felt
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
         """A converter's count is the least that a pressure can be uncertain by."""
@@ -163,7 +174,9 @@ class RobotSystem(System):
             effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
         }
         model = self.model.with_values(values).with_effects(chosen)
-        return _with_curves(model, {prefix: self._curve(prefix, self._weights(prefix, theta)) for prefix in self.curves})
+        return _with_curves(
+            model, {prefix: self._curve(prefix, self._weights(prefix, theta)) for prefix in self.curves}
+        )
 
     def _named(self, name: str) -> Parameter:
         entry = self.model.parameters[name]
