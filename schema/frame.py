@@ -13,9 +13,15 @@ def _reflected_crc16(data: bytes, crc: int) -> int:
     return crc
 
 
+def mask(code: bytes) -> bytes:
+    """`code` under the least mask that leaves neither 0x00 nor `!` in it, with the mask in front."""
+    least = next(m for m in range(1, 256) if m != ord("!") and not {m, m ^ ord("!")} & set(code))
+    return bytes([least]) + bytes(byte ^ least for byte in code)
+
+
 def frame(message: bytes, seed: int) -> bytes:
-    """COBS of the message and its two checks, without the delimiters; `message` is shorter than 250 bytes."""
+    """The message and its two checks as they go to the Uno, without the delimiters; at most 100 bytes."""
     first = binascii.crc_hqx(message, seed & 0xFFFF)
     second = _reflected_crc16(message, seed >> 16)
     body = message + first.to_bytes(2, "little") + second.to_bytes(2, "little")
-    return b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0"))
+    return mask(b"".join(bytes([len(run) + 1]) + run for run in body.split(b"\0")))

@@ -23,6 +23,7 @@ bool is_open(uint8_t message) { return message < static_cast<uint8_t>(MessageId:
 }  // namespace
 
 void FrameDecoder::start() {
+  mask_ = 0;
   length_ = 0;
   run_ = 0;
   zero_follows_ = false;
@@ -30,6 +31,11 @@ void FrameDecoder::start() {
 }
 
 void FrameDecoder::feed(uint8_t byte) {
+  if (mask_ == 0) {
+    mask_ = byte;
+    return;
+  }
+  byte ^= mask_;
   uint8_t decoded = byte;
   if (run_ == 0) {
     const bool had_zero = zero_follows_;

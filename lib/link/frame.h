@@ -1,4 +1,6 @@
 // Frames: number of the message, sequence number, fields, two checks; COBS makes it free of 0x00, which delimits it.
+// In a frame to the Uno the COBS bytes are under a mask (XOR), sent first, that leaves no `!` among them: what a bad line
+// leaves of a frame is never a stop.
 #pragma once
 
 #include "message_table.h"
@@ -32,6 +34,7 @@ class FrameDecoder {
  private:
   Frame frame_;
   uint8_t length_;     ///< bytes decoded
+  uint8_t mask_;       ///< 0: not yet known
   uint8_t run_;        ///< bytes to the next code byte
   bool zero_follows_;  ///< whether the present run ends in a 0x00
   bool bad_;

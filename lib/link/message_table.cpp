@@ -36,7 +36,7 @@ const Inward kInward[] BIFA_FLASH = {
 };
 }  // namespace
 
-const uint8_t kStopFrame[kStopFrameBytes] BIFA_FLASH = {0x02, 0x03, 0x05, 0x5C, 0x48, 0x01, 0x40};
+const uint8_t kStopFrame[kStopFrameBytes] BIFA_FLASH = {0x04, 0x06, 0x07, 0x01, 0x58, 0x4C, 0x05, 0x44};
 
 bool inward_size(uint8_t message, uint8_t& size) {
   for (const Inward& row : kInward) {

@@ -51,7 +51,7 @@ const uint8_t kLongestOutward = 43;  ///< and of the longest from it
 const uint8_t kNameBytes = 12;
 
 /// The real-time stop between its delimiters; the same in every version, and always the same bytes.
-const uint8_t kStopFrameBytes = 7;
+const uint8_t kStopFrameBytes = 8;
 extern const uint8_t kStopFrame[kStopFrameBytes];
 
 /// Exact size of the fields of a message to the Uno; false if there is no such message.

@@ -10,8 +10,8 @@
 
 namespace bifa {
 
-/// Greatest length of a frame to the Uno between its delimiters: number, sequence, fields, two checks, one for COBS.
-const uint8_t kLongestFrame = 1 + 2 + kLongestInward + 4;
+/// Greatest length of a frame to the Uno between its delimiters: mask, COBS, number, sequence, fields, two checks.
+const uint8_t kLongestFrame = 1 + 1 + 2 + kLongestInward + 4;
 
 class Receiver {
  public:

@@ -17,7 +17,7 @@ class Store {
  public:
   explicit Store(Eeprom& eeprom) : eeprom_(eeprom) {}
 
-  /// Looks through the EEPROM; call once at start.
+  /// Looks through the EEPROM; call once at start. A record of which only one copy is good gets its second again.
   void begin();
 
   /// The newest good copy of a parameter set. False: none, or its values are out of range.
@@ -32,41 +32,46 @@ class Store {
 
   /// Start a job; Result::kOk means "started": poll() until busy() is over, then see result().
   Result save(const char* name, const ParameterSet& set);
-  Result save_settings(const uint8_t* payload);
+  Result save_settings(const void* payload);
   Result forget(const char* name);
   Result erase_all();
 
   /// Goes on with the job by at most one byte.
   void poll();
-  bool busy() const { return job_ != Job::kNone && job_ != Job::kRepair; }
+  bool busy() const { return job_ == Job::kSave || job_ == Job::kVoid; }
   /// How the last job ended.
   Result result() const { return result_; }
 
  private:
   enum class Job : uint8_t { kNone, kSave, kRepair, kVoid };
+  /// What is known of a slot; several may be true.
+  enum Mark : uint8_t {
+    kGood = 1,    ///< holds a good record
+    kLive = 2,    ///< which is the newest of its name
+    kTaken = 4,   ///< written by the job, or belongs to a later firmware: not free
+    kDoomed = 8,  ///< is to be voided by the job
+    kFailed = 16  ///< did not keep what the job wrote
+  };
 
-  bool is_live(uint8_t slot) const { return (live_ >> slot) & 1; }
-  bool newest(const char* name, Record& record);
+  bool has(uint8_t slot, uint8_t mark) const { return marks_[slot] & mark; }
   bool is_named(uint8_t slot, const char* name);
-  Result save_record(const char* name, const uint8_t* payload);
-  void look_for_single_copies();
-  bool take_free_slot();
+  bool newest(const char* name, Record& record);
+  void scan();
+  void repair();
+  Result save_record(const char* name, const void* payload);
+  void doom(const char* name);
   void next_copy();
   void step_write();
   void step_void();
   void finish(Result result);
-  bool put(uint16_t address, uint8_t value);
 
   Eeprom& eeprom_;
-  uint32_t live_ = 0;      ///< bit per slot: holds a newest copy
+  uint8_t marks_[kSlotCount];
   uint32_t sequence_ = 0;  ///< of the newest record of all
   uint8_t cursor_ = 0;     ///< where to look for the next free slot
   Job job_ = Job::kNone;
   Result result_ = Result::kOk;
-  Record record_;         ///< being written
-  uint32_t written_ = 0;  ///< slots that the job has completed
-  uint32_t doomed_ = 0;   ///< slots to be voided at the end
-  uint32_t failed_ = 0;   ///< slots that did not keep what was written during this job
+  Record record_;  ///< being written
   uint8_t slot_ = 0;
   uint8_t at_ = 0;      ///< byte of the record to be written next
   uint8_t copies_ = 0;  ///< still to be written

@@ -1,0 +1,29 @@
+"""The link to the Uno: transport, frames, session, clock relation, and `Uno`, which the rest of the host uses."""
+
+from bifa.link.clock import Clock, WallClock
+from bifa.link.clock_relation import ClockRelation, HostTime
+from bifa.link.errors import LinkError, MismatchError, NoAnswerError, RefusedError, RestartedError
+from bifa.link.session import Counters, Hello
+from bifa.link.transport import PortGoneError, Transport
+from bifa.link.units import ParameterError
+from bifa.link.uno import Sample, Status, Uno
+
+__all__ = [
+    "Clock",
+    "ClockRelation",
+    "Counters",
+    "Hello",
+    "HostTime",
+    "LinkError",
+    "MismatchError",
+    "NoAnswerError",
+    "ParameterError",
+    "PortGoneError",
+    "RefusedError",
+    "RestartedError",
+    "Sample",
+    "Status",
+    "Transport",
+    "Uno",
+    "WallClock",
+]

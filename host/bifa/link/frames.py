@@ -58,10 +58,20 @@ def cobs_decode(data: bytes) -> bytes | None:
     return b"\0".join(runs)
 
 
+def mask(code: bytes) -> bytes:
+    """`code` under the least mask that leaves neither 0x00 nor `!` in it, with the mask in front.
+
+    So what a bad line leaves of a frame is never taken for a stop.
+    """
+    present = set(code)
+    least = next(m for m in range(1, 256) if m != ord("!") and m not in present and m ^ ord("!") not in present)
+    return bytes([least]) + bytes(byte ^ least for byte in code)
+
+
 def encode(message: Message, sequence: int, values: tuple, seed: int) -> bytes:
-    """A message as it goes over the line. The doubled first delimiter ends what may hang open at the receiver."""
+    """A message as it goes to the Uno. The doubled first delimiter ends what may hang open at the receiver."""
     body = bytes([message.number, sequence]) + struct.pack(message.layout, *values)
-    return b"\0\0" + cobs_encode(body + checks(body, seed)) + b"\0"
+    return b"\0\0" + mask(cobs_encode(body + checks(body, seed))) + b"\0"
 
 
 def encode_name(name: str) -> bytes:

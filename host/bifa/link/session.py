@@ -21,6 +21,7 @@ WINDOW = 4
 RESEND_AFTER_S = 0.03
 PROBE_AFTER_S = 0.5  # without progress: ask whether the Uno is still the same
 GREET_EVERY_S = 0.1
+LEAST_WAIT_S = 1e-4  # so that time goes on, however finely a clock counts
 
 
 @dataclass
@@ -140,7 +141,7 @@ class Session:
 
     def poll(self, timeout_s: float = 0.0) -> None:
         """Take in what has arrived, waiting at most `timeout_s` for something."""
-        data = self.transport.read(timeout_s)
+        data = self.transport.read(max(timeout_s, LEAST_WAIT_S) if timeout_s > 0 else 0.0)
         now = self.clock.now()
         for kind, content in self._splitter.feed(data):
             if kind == "line":

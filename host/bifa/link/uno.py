@@ -18,6 +18,7 @@ from bifa.link.units import ParameterError, from_wire, index_of, pack_set, to_wi
 
 EEPROM_TIMEOUT_S = 10.0
 CLOCK_EVERY_S = 1.0
+CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
 _WRAP_US = 1 << 32
 
@@ -111,7 +112,7 @@ class Uno:
         """One more measurement for `clock_relation`."""
         answer = self.session.call_timed("read_clock")
         uno_s = self._unwrap(answer.report["time_us"]) / 1e6
-        self.clock_relation.add(answer.sent_s, uno_s, answer.received_s)
+        self.clock_relation.add(answer.sent_s - CLOCK_TICK_S, uno_s, answer.received_s)
         self._next_exchange_s = self._clock.now() + self._exchange_every_s
 
     def keep_alive(self) -> None:
