@@ -1,0 +1,6 @@
+"""Rigs: what `--port` opens."""
+
+from bifa.rig.ports import SerialPort, serial_ports, uno_ports
+from bifa.rig.rig import Rig, RigError, SerialRig, find_port, open_rig
+
+__all__ = ["Rig", "RigError", "SerialPort", "SerialRig", "find_port", "open_rig", "serial_ports", "uno_ports"]

@@ -1,0 +1,83 @@
+"""What is at the other end of `--port`: an Uno on a serial port, or a whole rig that a package offers by name."""
+
+from importlib.metadata import entry_points
+from typing import Any, Protocol, runtime_checkable
+
+from bifa.errors import BifaError
+from bifa.link.clock import Clock, WallClock
+from bifa.link.transport import Transport
+from bifa.rig.ports import serial_ports, uno_ports
+from bifa.rig.serial_transport import SerialTransport
+
+ENTRY_POINTS = "bifa.rigs"
+
+
+class RigError(BifaError):
+    """No rig at the port asked for."""
+
+
+@runtime_checkable
+class Rig(Protocol):
+    """A transport and a clock that belong together, and the bench's instruments where there are any."""
+
+    transport: Transport
+    clock: Clock
+    instruments: Any | None
+
+    def close(self) -> None:
+        """Let go of everything; a second call does nothing."""
+
+    def __enter__(self) -> "Rig": ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+class SerialRig:
+    """An Uno on a serial port, in the computer's time; no instruments."""
+
+    instruments = None
+
+    def __init__(self, device: str) -> None:
+        self.transport: Transport = SerialTransport(device)
+        self.clock: Clock = WallClock()
+
+    def close(self) -> None:
+        """See Rig."""
+        self.transport.close()
+
+    def __enter__(self) -> "SerialRig":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def find_port() -> str:
+    """The one Uno that is plugged in, by its USB identity; RigError with what there is otherwise."""
+    unos = uno_ports()
+    if len(unos) == 1:
+        return unos[0].device
+    if unos:
+        names = ", ".join(f"{port.device} ({port.board})" for port in unos)
+        raise RigError(f"there are several Unos: {names}; choose one with --port")
+    others = ", ".join(f"{port.device} ({port.description})" for port in serial_ports()) or "none"
+    raise RigError(
+        f"no Uno is plugged in (USB serial ports: {others}); plug it in, name its port with --port, "
+        "or use the virtual robot: --port virtual"
+    )
+
+
+def open_rig(port: str | None = None, **options: Any) -> Rig:
+    """Open what `port` names: a rig registered under the entry points `bifa.rigs`, a serial port, or, if None, the Uno
+    found by its USB identity.
+
+    `options` go to the registered rig. Raises RigError or PortGoneError with what to do.
+    """
+    rigs = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    if port in rigs:
+        return rigs[port].load()(**options)
+    if port is not None and "/" not in port and not port.upper().startswith("COM"):
+        raise RigError(f"there is no rig called {port!r} (there are: {', '.join(rigs) or 'none'}), and it is no device")
+    if options:
+        raise RigError(f"{', '.join(options)}: only a virtual rig takes that")
+    return SerialRig(port if port is not None else find_port())

@@ -1,0 +1,57 @@
+"""A serial port as the link's transport."""
+
+import time
+
+import serial
+
+from bifa.link.transport import PortGoneError
+
+BAUD = 250_000
+RESET_PULSE_S = 0.05
+
+
+class SerialTransport:
+    """A port opened exclusively, so that no other program takes half of the bytes. Opening it resets an Uno."""
+
+    def __init__(self, device: str) -> None:
+        self.device = device
+        try:
+            self._port = serial.Serial(device, BAUD, timeout=0, write_timeout=2.0, exclusive=True)
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise PortGoneError(
+                f"cannot open {device}: {error}; is it plugged in, is another program using it, "
+                "and may you use serial ports (group dialout)?"
+            ) from error
+
+    def write(self, data: bytes) -> None:
+        """See Transport."""
+        try:
+            self._port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from error
+
+    def read(self, timeout_s: float) -> bytes:
+        """See Transport."""
+        try:
+            self._port.timeout = timeout_s
+            first = self._port.read(1)
+            return first + self._port.read(self._port.in_waiting) if first else b""
+        except (serial.SerialException, OSError, TypeError) as error:  # pyserial: TypeError when closed meanwhile
+            raise self._gone(error) from error
+
+    def reset(self) -> None:
+        """Pulse DTR, which is wired to the Uno's reset; where there is no DTR (a pty), do nothing."""
+        try:
+            self._port.dtr = False
+            time.sleep(RESET_PULSE_S)
+            self._port.reset_input_buffer()
+            self._port.dtr = True
+        except OSError:
+            return
+
+    def close(self) -> None:
+        """See Transport."""
+        self._port.close()
+
+    def _gone(self, error: Exception) -> PortGoneError:
+        return PortGoneError(f"{self.device} is gone ({error}); plug the Uno in again and repeat the command")
