@@ -23,6 +23,10 @@ bifa::HostPort port(controller, cells, uart);
 
 const uint16_t kSupplyEvery_ms = 100;
 
+/// Something has happened that the main loop may have to attend to. Conversions and sent bytes are not: they would wake
+/// it some thousand times a second for nothing.
+volatile bool attend = true;
+
 /// Tells the regulator its set-point when that has changed, and again from time to time.
 void tell_supply() {
   static uint16_t told = 0xFFFF;
@@ -38,10 +42,12 @@ void tell_supply() {
 }  // namespace
 
 bool board::on_tick(bool emergency_stop_pressed) {
+  attend = true;
   port.tick_in_interrupt();
   return controller.tick(emergency_stop_pressed);
 }
 void board::on_byte(uint8_t byte) {
+  attend = true;
   if (port.byte_in_interrupt(byte)) controller.stop_in_interrupt();
 }
 void board::on_emergency_stop() { controller.stop_in_interrupt(); }
@@ -60,8 +66,10 @@ void setup() {
 }
 
 void loop() {
+  while (!attend) sleep_mode();  // an interrupt between the two costs a millisecond at most
+  attend = false;
   board::watchdog_feed();
   port.poll();
   tell_supply();
-  if (!port.has_input()) sleep_mode();
+  if (port.has_input()) attend = true;
 }

@@ -14,16 +14,16 @@ const uint8_t kMonitorChannel = 3;
 const uint8_t kReferenceAvcc = 1 << REFS0;
 const uint8_t kStart = 1 << ADEN | 1 << ADSC | 1 << ADIE | 1 << ADPS2 | 1 << ADPS1 | 1 << ADPS0;  // 125 kHz
 
-// There and back again, so that the means of the three sensors belong to the same instant. Then the monitor.
+// There and back again (0 1 2 2 1 0 ...), so that the means of the three sensors belong to the same instant. Then the
+// monitor.
 const uint8_t kConversions = bifa::kChamberCount * bifa::kOversampling;
-const uint8_t kThereAndBack[] = {0, 1, 2, 2, 1, 0};
-
 bifa::RawRound round;
 uint8_t conversion;
-uint8_t place;  // in kThereAndBack
+uint8_t channel;
+int8_t direction;
 
-void convert(uint8_t channel) {
-  ADMUX = kReferenceAvcc | channel;
+void convert(uint8_t input) {
+  ADMUX = kReferenceAvcc | input;
   ADCSRA = kStart;
 }
 
@@ -37,8 +37,9 @@ void converter_begin() {
 void converter_begin_round() {
   for (uint8_t i = 0; i < bifa::kChamberCount; ++i) round.sum[i] = 0;
   conversion = 0;
-  place = 0;
-  convert(kThereAndBack[0]);
+  channel = 0;
+  direction = 1;
+  convert(channel);
 }
 
 }  // namespace board
@@ -52,9 +53,13 @@ ISR(ADC_vect) {
     on_round(round);
     return;
   }
-  const uint8_t channel = kThereAndBack[place];
+  const uint8_t converted = channel;
   ++conversion;
-  place = place + 1 == sizeof kThereAndBack ? 0 : place + 1;
-  convert(conversion == kConversions ? kMonitorChannel : kThereAndBack[place]);
-  round.sum[channel] += result;
+  if (conversion % bifa::kChamberCount != 0) {
+    channel += direction;
+  } else {
+    direction = -direction;  // the same channel once more, on the way back
+  }
+  convert(conversion == kConversions ? kMonitorChannel : channel);
+  round.sum[converted] += result;
 }

@@ -68,7 +68,7 @@ void Commands::use(const ParameterSet& set) {
 }
 
 Result Commands::take_over_soon(const ParameterSet& set) {
-  if (controller_.status().state != State::kRunning) {
+  if (controller_.state() != State::kRunning) {
     use(set);
   } else {
     wanted_ = set;

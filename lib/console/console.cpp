@@ -184,11 +184,11 @@ void Console::finish_later(Result started) {
 
 void Console::poll(const LinkCounters& counters) {
   counters_ = counters;
-  const Status status = commands_.controller().status();
-  if (status.state != last_state_) {
-    last_state_ = status.state;
-    if (status.state == State::kStopped) print(out_, BIFA_TEXT("[stopped: all valves off until clear\n"));
-    if (status.state == State::kFault) print_fault(status.fault);
+  const State state = commands_.controller().state();
+  if (state != last_state_) {
+    last_state_ = state;
+    if (state == State::kStopped) print(out_, BIFA_TEXT("[stopped: all valves off until clear\n"));
+    if (state == State::kFault) print_fault(commands_.controller().status().fault);
   }
   if (!waiting_ || commands_.store().busy()) return;
   waiting_ = false;

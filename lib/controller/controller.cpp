@@ -63,7 +63,9 @@ Verdict Controller::clear() {
 
 void Controller::apply(const ParameterSet& set) {
   const Gait gait = gait_of(set);
+  const SupplyCode code = SupplyCode::of(set.pressure_mpsi);
   const Critical guard;
+  wanted_code_ = code;
   oscillators_.use(gait);
   wanted_mpsi_ = set.pressure_mpsi;
   host_timeout_ms_ = set.host_timeout_ms;
@@ -139,7 +141,7 @@ void Controller::host_heard() {
 
 SupplyCode Controller::supply() const {
   const Critical guard;
-  return SupplyCode::of(set_point_mpsi());
+  return supervisor_.state() == State::kFault ? SupplyCode() : wanted_code_;
 }
 
 void Controller::supply_told(bool answered) {

@@ -72,6 +72,7 @@ class Controller {
   /// The next sample, if there is a new one.
   bool take_sample(Sample& sample);
   Status status() const;
+  State state() const { return supervisor_.state(); }
   uint32_t uptime_ms() const;
 
   /// Call it whenever the host has said something that makes sense.
@@ -119,6 +120,7 @@ class Controller {
   volatile bool emergency_stop_ = false;
 
   uint16_t wanted_mpsi_ = 0;
+  SupplyCode wanted_code_;
   uint16_t host_timeout_ms_ = 0;
   uint16_t host_silence_ms_ = 0;
 

@@ -36,14 +36,14 @@ void Oscillators::place(uint32_t body, uint32_t head, uint32_t tail) {
   body_ = body;
   head_error_ = head - body - gait_.psi12;
   tail_error_ = tail - body - gait_.psi13;
-  begin_anew();
+  last_.body = kNoLast;
 }
 
 void Oscillators::settle() {
   body_ = 0;
   head_error_ = kHalfStep;
   tail_error_ = kHalfStep;
-  begin_anew();
+  last_.body = kNoLast;
 }
 
 uint32_t Oscillators::phase(uint8_t chamber) const {
@@ -65,28 +65,13 @@ BIFA_INLINE uint32_t Oscillators::advance(int16_t pull, int16_t last) const {
   return static_cast<uint32_t>((static_cast<int32_t>(extrapolated) * gait_.gain) >> 8);
 }
 
-BIFA_INLINE void Oscillators::compare() {
-  uint8_t outputs = 0;
-  if (is_positive(body_, gait_.threshold[0])) outputs |= 1;
-  if (is_positive(body_ + gait_.psi12 + head_error_, gait_.threshold[1])) outputs |= 2;
-  if (is_positive(body_ + gait_.psi13 + tail_error_, gait_.threshold[2])) outputs |= 4;
-  outputs_ = outputs;
-}
-
-void Oscillators::begin_anew() {
-  last_ = pulls(upper(head_error_), upper(tail_error_));
-  compare();
-}
-
-BIFA_FAST void Oscillators::step() {
+/// Lets the oscillators pull at each other for a step; returns by how much that moves the body.
+BIFA_INLINE uint32_t Oscillators::couple() {
   const uint16_t head_error = upper(head_error_);
   const uint16_t tail_error = upper(tail_error_);
-  if ((head_error | tail_error | last_.body | last_.head) == 0) {
-    body_ += gait_.increment;  // settled: nothing pulls
-    compare();
-    return;
-  }
+  if ((head_error | tail_error | last_.body | last_.head) == 0) return 0;  // settled: nothing pulls
   const Pulls now = pulls(head_error, tail_error);
+  if (last_.body == kNoLast) last_ = now;
   uint32_t body = advance(now.body, last_.body);
   uint32_t head = advance(now.head, last_.head);
   last_ = now;
@@ -97,8 +82,16 @@ BIFA_FAST void Oscillators::step() {
   // The pulls add up to nothing, so the tail's is -(body + head), and the mean of the phases runs at exactly f.
   head_error_ += head - body;
   tail_error_ -= head + body + body;
-  body_ += gait_.increment + body;
-  compare();
+  return body;
+}
+
+BIFA_FAST void Oscillators::step() {
+  body_ += gait_.increment + couple();
+  uint8_t outputs = 0;
+  if (is_positive(body_, gait_.threshold[0])) outputs |= 1;
+  if (is_positive(body_ + gait_.psi12 + head_error_, gait_.threshold[1])) outputs |= 2;
+  if (is_positive(body_ + gait_.psi13 + tail_error_, gait_.threshold[2])) outputs |= 4;
+  outputs_ = outputs;
 }
 
 }  // namespace bifa

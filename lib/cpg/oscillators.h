@@ -35,15 +35,17 @@ class Oscillators {
     int16_t head;
   };
 
+  /// Instead of last_.body: there is none, begin with a step of Euler. (No sum of sines comes near.)
+  static const int16_t kNoLast = INT16_MIN;
+
   static Pulls pulls(uint16_t head_error, uint16_t tail_error);
   uint32_t advance(int16_t pull, int16_t last) const;
-  void begin_anew();
-  void compare();
+  uint32_t couple();
 
   uint32_t body_ = 0;
   uint32_t head_error_ = kHalfStep;
   uint32_t tail_error_ = kHalfStep;
-  Pulls last_ = {0, 0};  ///< of the step before; after a change what they would have been
+  Pulls last_ = {0, 0};  ///< of the step before
   uint8_t outputs_ = 0;
   Gait gait_ = {};
 };

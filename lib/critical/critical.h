@@ -3,19 +3,21 @@
 
 #include <stdint.h>
 
+#define BIFA_AT_ONCE inline __attribute__((always_inline))
+
 namespace bifa {
 
 /// Keeps interrupts off for as long as it lives; nests. Keep it short: a stop byte waits meanwhile.
 class Critical {
  public:
 #ifdef __AVR__
-  Critical() : status_(status()) { __builtin_avr_cli(); }
-  ~Critical() { status() = status_; }
+  BIFA_AT_ONCE Critical() : status_(status()) { __builtin_avr_cli(); }
+  BIFA_AT_ONCE ~Critical() { status() = status_; }
   Critical(const Critical&) = delete;
   Critical& operator=(const Critical&) = delete;
 
  private:
-  static volatile uint8_t& status() { return *reinterpret_cast<volatile uint8_t*>(0x5F); }  // SREG
+  BIFA_AT_ONCE static volatile uint8_t& status() { return *reinterpret_cast<volatile uint8_t*>(0x5F); }  // SREG
   const uint8_t status_;
 #else
   Critical() {}

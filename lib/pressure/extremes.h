@@ -5,7 +5,7 @@
 
 namespace bifa {
 
-/// Keeps the extremes of the last five fifths of a second and of the one that is under way.
+/// Keeps the extremes of the last three thirds of a second and of the one that is under way.
 class LastSecond {
  public:
   /// A new sample, 100 a second.
@@ -15,8 +15,8 @@ class LastSecond {
   int16_t highest_mpsi(uint8_t chamber) const;
 
  private:
-  static const uint8_t kParts = 6;
-  static const uint8_t kSamplesInPart = 20;
+  static const uint8_t kParts = 4;
+  static const uint8_t kSamplesInPart = 34;
 
   struct Part {
     int16_t lowest[kChamberCount];

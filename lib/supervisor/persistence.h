@@ -10,7 +10,7 @@ namespace bifa {
 class Persistence {
  public:
   /// Returns whether the condition has now been met `needed` times in a row.
-  bool met(bool condition, uint16_t needed) {
+  bool met(bool condition, uint8_t needed) {
     if (!condition) {
       count_ = 0;
     } else if (count_ < needed) {
@@ -22,7 +22,7 @@ class Persistence {
   void reset() { count_ = 0; }
 
  private:
-  uint16_t count_ = 0;
+  uint8_t count_ = 0;
 };
 
 }  // namespace bifa

@@ -12,7 +12,7 @@ const uint8_t kDacAttempts = 3;
 
 /// The monitor's count is 0.16 psi, the regulator's linearity 1 % of 130 psi.
 const int16_t kMonitorTolerance_mpsi = 3000;
-const uint16_t kMonitorTime_ms = 5000;
+const uint16_t kMonitorTime_ms = 2500;
 
 class DacWatch {
  public:
