@@ -18,6 +18,7 @@ from typing import Any
 
 _SLICE_S = 0.005
 _STATUS_S = 0.25
+_BOOTLOADER_S = 0.5
 _MAX_LAG_S = 0.5  # after a longer stall (a suspended process) lost time is not made up
 
 
@@ -86,7 +87,9 @@ class _Pump:
         flags = events[0][1] if events else 0
         is_open = not flags & select.POLLHUP
         if is_open and not self._is_open:
-            self._rig.uno.reset("external")
+            # The bootloader's time lets the host flush its buffers first, as with a real board.
+            self._rig.uno.reset("external", bootloader_s=_BOOTLOADER_S)
+            self._rig.uno.receive()
             self._unsent = b""
         self._is_open = is_open
         if not is_open:

@@ -24,6 +24,7 @@ from virtual_robot.uno import CLOCK_HZ, Uno
 FIRMWARE = Path(__file__).resolve().parents[2] / ".pio" / "build" / "uno" / "firmware.elf"
 _USB_FRAME_S = 1e-3  # the USB chip hands bytes over once a millisecond
 _CLOCK_ERROR = {"ideal": 0.0, "realistic": 2.3e-3}  # ceramic resonator, +-0.5 %
+_BOOTLOADER_S = {"ideal": 0.0, "realistic": 1.0}  # optiboot waits after an external reset
 _WOBBLE = {"ideal": 0.0, "realistic": 0.01}
 
 
@@ -53,8 +54,9 @@ class World:
 class VirtualTransport:
     """The serial port (bifa's Transport). Opening it has reset the board."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, bootloader_s: float) -> None:
         self._world = world
+        self._bootloader_s = bootloader_s
         self._open = True
 
     def write(self, data: bytes) -> None:
@@ -73,7 +75,7 @@ class VirtualTransport:
     def reset(self) -> None:
         """What DTR does: an external reset; bytes still under way to the host are lost."""
         self._check()
-        self._world.uno.reset("external")
+        self._world.uno.reset("external", self._bootloader_s)
         self._world.uno.receive()
 
     def close(self) -> None:
@@ -106,11 +108,13 @@ class VirtualRig:
     stop, break a sensor, cut the power or look inside. `truth` are the plant's parameters.
     """
 
-    def __init__(self, uno: Uno, plant: Plant, world: World, instruments: Instruments) -> None:
+    def __init__(
+        self, uno: Uno, plant: Plant, world: World, instruments: Instruments, bootloader_s: float = 0.0
+    ) -> None:
         self.uno = uno
         self.plant = plant
         self.world = world
-        self.transport = VirtualTransport(world)
+        self.transport = VirtualTransport(world, bootloader_s)
         self.clock = VirtualClock(world)
         self.instruments = instruments
 
@@ -185,7 +189,7 @@ def open_rig(
     world = World(uno, clock_hz)
     instruments = Instruments(world, plant, noise, _WOBBLE[profile], random)
     instruments.mount("locomotion")
-    return VirtualRig(uno, plant, world, instruments)
+    return VirtualRig(uno, plant, world, instruments, _BOOTLOADER_S[profile])
 
 
 _profile = profile  # open_rig has a parameter of that name

@@ -181,3 +181,21 @@ def test_an_image_that_is_not_one_is_refused(tmp_path):
     text.write_text("no ELF")
     with pytest.raises(FirmwareError, match="not an AVR ELF image"):
         Uno(text)
+
+
+def test_a_bootloader_holds_the_program_and_swallows_what_is_sent(board):
+    uno = board("int main(void) { serial(); put('B'); for (;;) { while (!(UCSR0A & 0x80)) {} put(UDR0); } }")
+    uno.run_for(0.01)
+    uno.receive()
+    reset_at = uno.cycle
+    uno.reset("external", bootloader_s=0.5)
+    uno.send(b"lost")
+    uno.run_for(0.49)
+    assert uno.receive() == b""
+    uno.run_for(0.1)
+    ((cycle, byte),) = uno.receive_stamped()
+    assert byte == ord("B")
+    assert 0.5 < (cycle - reset_at) / CLOCK_HZ < 0.501
+    uno.send(b"ok")
+    uno.run_for(0.01)
+    assert uno.receive() == b"ok"

@@ -127,9 +127,13 @@ class Uno:
 
     # --- resets, power, EEPROM --------------------------------------------------------------------------
 
-    def reset(self, cause: str = "external") -> None:
-        """ "power-on", "external" (the button, DTR) or "brown-out"; a watchdog reset comes by itself."""
+    def reset(self, cause: str = "external", bootloader_s: float = 0.0) -> None:
+        """ "power-on", "external" (the button, DTR) or "brown-out"; a watchdog reset comes by itself.
+
+        The program starts `bootloader_s` later (a real Uno waits about a second after an external reset).
+        """
         lib.uno_reset(self._uno, _RESET_CAUSES.index(cause))
+        lib.uno_hold(self._uno, round(bootloader_s * CLOCK_HZ))
 
     def power_off(self) -> None:
         lib.uno_power_off(self._uno)

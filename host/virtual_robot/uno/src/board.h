@@ -135,6 +135,7 @@ struct Uno {
   UnoWorld world;
   avr_int_vector_t *vector[VECTOR_COUNT];
   uint64_t until_cycle;
+  uint64_t held_until;
   uint64_t asleep_cycles;
   bool powered, crashed, stop_on_output, stop_now;
   uint8_t mcusr;

@@ -195,6 +195,10 @@ int uno_run(Uno *uno, uint64_t until_cycle, int stop_on_output) {
   uno->until_cycle = until_cycle;
   uno->stop_on_output = stop_on_output;
   uno->stop_now = stop_on_output && uno->usart.line_out.size > 0;
+  if (uno->powered && avr->cycle < uno->held_until) {
+    avr->cycle = uno->held_until < until_cycle ? uno->held_until : until_cycle;
+    avr_cycle_timer_process(avr);  // bytes that arrive now meet a receiver that is off
+  }
   while (uno->powered && !uno->crashed && !uno->stop_now && avr->cycle < until_cycle) {
     int state = avr_run(avr);
     if (state == cpu_Crashed || state == cpu_Done || state == cpu_Stopped) {
@@ -221,6 +225,8 @@ void uno_reset(Uno *uno, int cause) {
   uno->crashed = false;
   avr_reset(uno->avr);
 }
+
+void uno_hold(Uno *uno, uint64_t cycles) { uno->held_until = uno->avr->cycle + cycles; }
 
 void uno_power_off(Uno *uno) {
   uno->powered = false;

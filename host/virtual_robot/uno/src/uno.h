@@ -51,6 +51,8 @@ int uno_run(Uno *uno, uint64_t until_cycle, int stop_on_output);
 void uno_status(const Uno *uno, UnoStatus *status);
 
 void uno_reset(Uno *uno, int cause);
+// As a bootloader does after an external reset: no program runs for so long, and what is sent meanwhile is lost.
+void uno_hold(Uno *uno, uint64_t cycles);
 void uno_power_off(Uno *uno);
 
 int uno_uart_send(Uno *uno, const uint8_t *bytes, int size, double baud);

@@ -1,0 +1,80 @@
+"""`bifa rig`: the virtual bench on a pseudo-terminal in real time, for people and for any serial program."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bifa.errors import BifaError
+
+EPILOG = """[bold]Examples[/bold]
+
+bifa rig                              offer a pty and print its path; Ctrl-C ends
+
+bifa rig --link /tmp/uno              the same under a lasting name
+
+bifa console --port /tmp/uno          in another terminal (or picocom -b 250000 /tmp/uno)
+
+bifa rig --profile realistic --effect hysteresis:force_N=4 --effect leak:rate_per_s=0.05
+"""
+
+
+class RigOptionError(BifaError):
+    """An option of `bifa rig` cannot be understood."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog=EPILOG)
+    def rig(
+        profile: Annotated[str, typer.Option(help="ideal or realistic")] = "ideal",
+        effect: Annotated[
+            list[str] | None, typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; may be given several times")
+        ] = None,
+        sealed: Annotated[int | None, typer.Option(help="seed of a robot and an effect that nobody is told of")] = None,
+        seed: Annotated[int, typer.Option(help="seed of noise, clocks and run-to-run variation")] = 0,
+        firmware: Annotated[Path | None, typer.Option(help="ELF image instead of the one that is built")] = None,
+        eeprom: Annotated[Path | None, typer.Option(help="file that keeps the EEPROM between runs")] = None,
+        link: Annotated[Path | None, typer.Option(help="symbolic link to the pty while it is served")] = None,
+    ) -> None:
+        """Offer the virtual robot, with the real firmware, as a serial port in real time.
+
+        Opening the port resets the board, as with a real Uno. 250000 baud; any serial program will do.
+        """
+        from rich.console import Console
+
+        from bifa.rig import open_rig
+
+        console = Console()
+        effects = dict(_effect(text) for text in effect or [])
+        options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}
+        with (
+            open_rig("virtual", **options, firmware=firmware, eeprom=eeprom, keep_events=False) as bench,
+            console.status("starting", spinner="dots") as status,
+        ):
+
+            def ready(path: str) -> None:
+                console.print(f"[bold]{link or path}[/bold]  250000 baud; Ctrl-C ends")
+
+            try:
+                bench.serve_pty(ready, lambda now: status.update(_line(now)), link=link)
+            except KeyboardInterrupt:
+                console.print("stopped")
+
+
+def _effect(text: str) -> tuple[str, dict[str, float]]:
+    name, _, rest = text.partition(":")
+    try:
+        values = {key: float(value) for key, value in (part.split("=") for part in rest.split(",") if part)}
+    except ValueError:
+        raise RigOptionError(f"--effect {text}: write NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE") from None
+    return name, values
+
+
+def _line(now: dict) -> str:
+    chambers = "  ".join(
+        f"{name} {psi:+5.1f} psi" for name, psi in zip(("body", "head", "tail"), now["pressure_psi"], strict=True)
+    )
+    port = "port open" if now["open"] else "port closed"
+    return f"{now['time_s']:7.1f} s  {port}  {now['displacement_mm']:8.1f} mm  {chambers}  asleep {now['asleep']:.0%}"
