@@ -1,0 +1,199 @@
+"""The console: one answer a line, strict numbers, nothing changes on a bad line."""
+
+import random
+import string
+
+import pytest
+from board import Board
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS
+from bifa.link.units import from_wire
+
+SHOWN = [f"[{p.name} {from_wire(p.name, p.default):g}" for p in PARAMETERS]
+
+
+@pytest.fixture
+def board() -> Board:
+    board = Board()
+    board.type("")
+    return board
+
+
+def answers(lines: list[str]) -> list[str]:
+    return [line for line in lines if line.startswith(("ok", "error"))]
+
+
+def test_the_first_thing_one_sees_says_what_to_type():
+    board = Board()
+    board.sleep(0.01)
+    assert board.receive().decode().splitlines()[-1] == "[type help"
+
+
+def test_help_names_every_command_and_parameter(board):
+    text = "\n".join(board.type("help"))
+    for name, usage, help_text in CONSOLE_COMMANDS:
+        assert usage in text
+        assert help_text in text
+        assert board.type(f"help {name}") == [f"[{usage}  {help_text}", "ok"]
+    for parameter in PARAMETERS:
+        assert parameter.name in text
+        about = board.type(f"help {parameter.name}")
+        assert parameter.help in about[0]
+        assert about[1].startswith(f"[range {from_wire(parameter.name, parameter.minimum):g} to ")
+
+
+def test_show_prints_what_set_was_told(board):
+    assert board.type("show") == [*SHOWN, "ok"]
+    for name, value in [("period_s", "2.72"), ("psi12_deg", "204.5"), ("duty_body", "0.6535"), ("coupling_per_s", "0")]:
+        assert board.type(f"set {name} {value}") == ["ok"]
+        assert board.type(f"show {name}") == [f"[{name} {value}", "ok"]
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
+def test_values_at_and_beyond_the_bounds(board, parameter):
+    low, high = (from_wire(parameter.name, bound) for bound in (parameter.minimum, parameter.maximum))
+    for good in (f"{low:g}", f"{high:g}", f"+{high:g}.000000000000", f"00{high:g}"):
+        assert board.type(f"set {parameter.name} {good}") == ["ok"], good
+    before = board.type("show")
+    bad = [f"{high:g}.00000000001", f"{high + 1:g}", "-1", "-0.0000001", "99999999999999999999"]
+    nonsense = ["nan", "NaN", "inf", "-inf", "1e1", "0x5", "1,5", "5..7", "--5", ".", "", "-", "five", "5s", "1_0", "٣"]
+    for value in bad + nonsense + ([f"{low - 0.0001:g}", "0"] if low > 0 else []):
+        (answer,) = board.type(f"set {parameter.name} {value}")
+        assert answer.startswith("error"), value
+        assert not value or " " in value or not value.isascii() or f"to {high:g}" in answer, answer
+    assert board.type("show") == before
+
+
+@pytest.mark.parametrize("line", ["fly", "run fast", "set", "set period_s", "set speed 3", "set period_s 3 4", "show x y",
+                                  "hold", "hold neck vacuum", "hold body suck", "stream", "stream maybe", "load", "load x",
+                                  "defaults", "defaults yes", "Run", "run\x01", "x" * 64, "save " + "n" * 13, "save B"])  # fmt: skip
+def test_bad_lines_are_refused_and_change_nothing(board, line):
+    before = board.type("show")
+    got = board.type(line)
+    assert len(answers(got)) == 1
+    assert got[-1].startswith("error ")
+    assert (board.type("show"), board.state, board.valves) == (before, "idle", 0)
+
+
+WORDS = [name for name, _, _ in CONSOLE_COMMANDS] + [p.name for p in PARAMETERS]
+WORDS += ["body", "head", "tail", "on", "off", "positive", "vacuum", "confirm", "5.7", "0.5", "1e9", "-3", "baseline"]
+LINES = st.lists(st.sampled_from(WORDS), max_size=4).map(" ".join) | st.text(st.characters(codec="latin1"), max_size=80)
+
+
+@given(st.lists(LINES, max_size=8))
+@example(["echo on", "status"])
+@settings(max_examples=150, deadline=None)
+def test_every_line_is_answered_exactly_once(lines):
+    board = Board()
+    board.type("")
+    sent = [line.translate({ord(c): None for c in "\0!\r\n"}) for line in lines]
+    sent = [line for line in sent if not line.startswith(("echo", "stream", "plot"))]
+    for line in sent:
+        board.write(line.encode("latin1") + b"\n")
+        board.sleep(0.9)
+        assert len(answers(board.receive().decode("latin1").splitlines())) == 1, line
+
+
+def test_lines_sent_at_once_are_answered_in_order(board):
+    board.write(b"save one\nfly\nset period_s 3\nsave two\nshow period_s\n")
+    board.sleep(3)
+    assert board.receive().decode().splitlines() == [
+        "ok", "error no such command; type help", "ok", "ok", "[period_s 3", "ok"]  # fmt: skip
+
+
+def test_echo_and_backspace_for_a_bare_terminal(board):
+    assert board.type("shox\bw period_s") == ["[period_s 5.7", "ok"]
+    assert board.type("shox\x7fw period_s") == ["[period_s 5.7", "ok"]
+    board.type("echo on")
+    board.write(b"shox\bw period_s\r\n")
+    board.sleep(0.02)
+    assert board.receive() == b"shox\b \bw period_s\n[period_s 5.7\nok\n"
+    board.write(b"version\r")  # the Enter key of most terminals
+    board.sleep(0.02)
+    assert board.receive().endswith(b"ok\n")
+
+
+def test_a_stop_byte_between_letters_stops_and_the_line_goes_on(board):
+    board.type("run")
+    assert board.state == "running"
+    got = board.type("sh!ow period_s")
+    assert (board.state, board.valves) == ("stopped", 0)
+    assert got == ["[stopped: all valves off until clear", "[period_s 5.7", "ok"]
+    assert board.type("run") == ["error stopped: type clear first"]
+    assert board.type("hold head vacuum") == ["error stopped: type clear first"]
+    assert board.type("clear") == ["ok"]
+    assert board.type("run") == ["ok"]
+
+
+def test_hold_runs_through_the_states(board):
+    assert board.type("hold head positive") == ["ok"]
+    board.sleep(0.05)
+    assert (board.state, board.valves) == ("holding", 0b000100)
+    assert board.type("hold body vacuum") == ["ok"]
+    board.sleep(0.05)
+    assert board.valves == 0b000110
+    board.type("hold head off")
+    board.type("hold body off")
+    assert (board.state, board.valves) == ("idle", 0)
+
+
+def test_presets(board):
+    assert board.type("load obstacle") == ["ok"]
+    assert board.type("show period_s") == ["[period_s 6", "ok"]
+    board.type("set period_s 3.3")
+    assert board.type("save mine") == ["ok"]
+    assert board.type("save") == ["ok"]
+    assert board.type("presets") == ["[baseline factory", "[obstacle factory", "[mine saved", "[startup saved", "ok"]
+    board.reset()
+    board.type("")
+    assert board.type("show period_s") == ["[period_s 3.3", "ok"]
+    assert board.type("forget startup") == ["ok"]
+    assert board.type("defaults confirm") == ["ok"]
+    assert board.type("presets") == ["[baseline factory", "[obstacle factory", "ok"]
+    assert board.type("show") == [*SHOWN, "ok"]
+
+
+def test_telemetry_as_text(board):
+    board.type("stream on")
+    board.sleep(1.0)
+    lines = [line for line in board.receive().decode().splitlines() if line.startswith(">")]
+    assert 99 <= len(lines) <= 103
+    assert all(len(line.split(",")) == 12 for line in lines)
+    board.type("stream off")
+    board.type("plot on")
+    board.sleep(0.1)
+    plotted = board.receive().decode().splitlines()
+    assert len(plotted) >= 9
+    for line in plotted:
+        assert [pair.split(":")[0] for pair in line.split("\t")] == ["body_psi", "head_psi", "tail_psi"]
+        assert all(abs(float(pair.split(":")[1])) < 1 for pair in line.split("\t"))
+
+
+def test_text_and_frames_share_the_port(board):
+    """Whatever frames come in between, each line is answered, and the other way round."""
+    from bifa.link import Uno
+
+    uno = Uno(board, board, seed=1)
+    uno.connect()
+    rng = random.Random(4)
+    for i in range(100):
+        line = "show period_s"
+        cut = rng.randrange(len(line) + 1)
+        board.write(line[:cut].encode())
+        uno.set("period_s", 1 + i / 10)
+        uno.session.lines.clear()
+        board.write(line[cut:].encode() + b"\n")
+        uno.status()
+        for _ in range(5):
+            uno.session.poll(0.002)
+        assert list(uno.session.lines) == [f"[period_s {1 + i / 10:g}", "ok"]
+    assert uno.counters.bad == 0
+
+
+def test_a_flood_is_told_and_survived(board):
+    board.write(("".join(random.Random(1).choices(string.ascii_letters, k=100)) + "\n").encode() * 300)
+    board.sleep(3)
+    board.receive()
+    assert board.type("show period_s") == ["[period_s 5.7", "ok"]

@@ -1,0 +1,134 @@
+"""Uploads over a line that damages bytes, with restarts of the Uno in the middle: the old set or the new one, never another.
+
+`make soak` prints the table of docs/protocol.md (test_a_thousand_uploads).
+"""
+
+import random
+
+import pytest
+from board import Board
+from chip import Chip
+from faulty_line import FaultyLine
+
+from bifa.link import LinkError, NoAnswerError, RestartedError, Uno
+from bifa.link.table import PARAMETERS
+from bifa.link.units import from_wire, to_wire
+
+RATES = (1e-4, 1e-3, 1e-2, 1e-1)
+BASELINE = {p.name: p.default for p in PARAMETERS}
+
+
+def random_set(rng: random.Random) -> dict[str, float]:
+    """A set in which every parameter is changed, except the one that would vent the robot."""
+    values = {p.name: from_wire(p.name, rng.randint(p.minimum, p.maximum)) for p in PARAMETERS}
+    return {**values, "host_timeout_s": 0.0}
+
+
+class Restarts:
+    """Restarts the Uno in the middle of what is sent, now and then."""
+
+    def __init__(self, board, rng: random.Random, probability: float) -> None:
+        self.board, self.rng, self.probability, self.count = board, rng, probability, 0
+
+    def write(self, data: bytes) -> None:
+        if self.rng.random() >= self.probability:
+            self.board.write(data)
+            return
+        self.count += 1
+        self.board.write(data[: self.rng.randrange(len(data))])
+        self.board.sleep(0.001)
+        self.board.reset()
+
+    def __getattr__(self, name: str):
+        return getattr(self.board, name)
+
+
+def wanted_set(board) -> dict[str, int]:
+    """What the Uno would say over a clean line: typed on its console."""
+    board.sleep(0.05)  # what hangs open of a frame ends
+    board.write(b"\n")
+    board.sleep(0.2)
+    board.read(0)
+    board.write(b"show\n")
+    board.sleep(0.2)
+    lines = [line[1:].split() for line in board.read(0).decode("latin1").splitlines() if line.startswith("[")]
+    return {words[0]: to_wire(words[0], float(words[1])) for words in lines if words[0] in BASELINE}
+
+
+def upload_many(board, rate: float, uploads: int, seed: int, restarts: float = 0.0) -> dict[str, float]:
+    """Uploads until each is done or given up; checks after each one. Times in seconds, virtual."""
+    rng = random.Random(seed)
+    restarting = Restarts(board, rng, restarts)
+    line = FaultyLine(restarting, rate, seed)
+    uno = Uno(line, board, seed=seed)
+    done, given_up, total_s, longest_s = 0, 0, 0.0, 0.0
+    connected = False
+    before = dict(BASELINE)
+    for _ in range(uploads):
+        parameters = random_set(rng)
+        wanted = {name: to_wire(name, value) for name, value in parameters.items()}
+        started_s = board.now()
+        possible = [before, wanted]
+        finished = False
+        for _attempt in range(5):
+            try:
+                if not connected:
+                    uno.connect(timeout_s=20)
+                    connected = True
+                uno.upload(parameters)
+                finished = True
+                break
+            except RestartedError:
+                connected = False
+            except NoAnswerError:
+                connected = False
+            except LinkError:
+                break
+        took_s = board.now() - started_s
+        after = wanted_set(board)
+        if restarting.count:
+            possible.append(BASELINE)
+            restarting.count = 0
+        assert after in possible, (rate, seed)
+        assert not finished or after == wanted
+        done, given_up = done + finished, given_up + (not finished)
+        total_s, longest_s = total_s + took_s, max(longest_s, took_s)
+        before = after
+    return {
+        "uploads": uploads,
+        "done": done,
+        "given_up": given_up,
+        "mean_s": total_s / uploads,
+        "longest_s": longest_s,
+        "faults": line.faults,
+        "resent": uno.counters.resent,
+    }
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_uploads_over_a_faulty_line(rate):
+    result = upload_many(Board(), rate, uploads=40, seed=round(1 / rate))
+    if rate <= 1e-2:
+        assert result["done"] == 40
+
+
+@pytest.mark.parametrize("rate", [0.0, 1e-3, 1e-2])
+def test_restarts_in_the_middle(rate):
+    result = upload_many(Board(), rate, uploads=60, seed=round(rate * 1e4) + 7, restarts=0.01)
+    assert result["done"] == 60
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize("rate", [1e-3, 1e-2])
+def test_uploads_to_the_image_over_a_faulty_line(rate):
+    assert upload_many(Chip(), rate, uploads=12, seed=3)["done"] == 12
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(("board", "rate"), [("native", rate) for rate in RATES] + [("image", r) for r in RATES])
+def test_a_thousand_uploads(board, rate, capsys):
+    result = upload_many({"native": Board, "image": Chip}[board](), rate, uploads=1000, seed=11, restarts=1e-4)
+    with capsys.disabled():
+        print(f"\n{board} {rate:g}: " + ", ".join(f"{name} {value:.4g}" for name, value in result.items()))
+    if rate <= 1e-2:
+        assert result["done"] == 1000
