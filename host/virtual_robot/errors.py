@@ -5,6 +5,8 @@
 class VirtualRobotError(Exception):
     """The root of every error that the virtual bench expects."""
 
+    for_the_user = True  # its text says all; a host that does not know this class may show it as it is
+
 
 class NotBuiltError(VirtualRobotError):
     """A C part has not been compiled."""

@@ -55,7 +55,7 @@ def register(app: typer.Typer) -> None:
         ):
 
             def ready(path: str) -> None:
-                console.print(f"[bold]{link or path}[/bold]  250000 baud; Ctrl-C ends")
+                console.print(f"{link or path}  250000 baud; Ctrl-C ends", highlight=False, soft_wrap=True)
 
             try:
                 bench.serve_pty(ready, lambda now: status.update(_line(now)), link=link)
@@ -73,8 +73,7 @@ def _effect(text: str) -> tuple[str, dict[str, float]]:
 
 
 def _line(now: dict) -> str:
-    chambers = "  ".join(
-        f"{name} {psi:+5.1f} psi" for name, psi in zip(("body", "head", "tail"), now["pressure_psi"], strict=True)
-    )
-    port = "port open" if now["open"] else "port closed"
-    return f"{now['time_s']:7.1f} s  {port}  {now['displacement_mm']:8.1f} mm  {chambers}  asleep {now['asleep']:.0%}"
+    chambers = " ".join(f"{psi:+.1f}" for psi in now["pressure_psi"])
+    port = "open" if now["open"] else "closed"
+    place = f"{now['displacement_mm']:.1f} mm"
+    return f"{now['time_s']:.1f} s  port {port}  {place}  {chambers} psi  asleep {now['asleep']:.0%}"

@@ -75,7 +75,12 @@ def open_rig(port: str | None = None, **options: Any) -> Rig:
     """
     rigs = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
     if port in rigs:
-        return rigs[port].load()(**options)
+        try:
+            return rigs[port].load()(**options)
+        except Exception as error:
+            if getattr(error, "for_the_user", False):  # a rig cannot know BifaError
+                raise RigError(str(error)) from error
+            raise
     if port is not None and "/" not in port and not port.upper().startswith("COM"):
         raise RigError(f"there is no rig called {port!r} (there are: {', '.join(rigs) or 'none'}), and it is no device")
     if options:
