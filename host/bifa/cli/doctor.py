@@ -1,0 +1,36 @@
+"""`bifa doctor`: what is installed, which port, which firmware, what is missing and how to get it."""
+
+from typing import Annotated
+
+import typer
+
+EXAMPLES = "Examples:  bifa doctor   |   bifa doctor --port /dev/ttyACM0   |   bifa doctor --port virtual"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EXAMPLES)(doctor)
+
+
+def doctor(
+    port: Annotated[str | None, typer.Option(help="Ask the board at this port as well (it restarts).")] = None,
+) -> None:
+    """Say what is installed, which port and firmware there are, what is missing and how to get it.
+
+    Ends with status 1 where something necessary is missing.
+    """
+    from rich.console import Console
+
+    from bifa.toolchain.checks import MISSING, run_checks
+
+    colours = {"ok": "green", "missing": "red", "optional": "yellow"}
+    console = Console(highlight=False)
+    missing = False
+    for finding in run_checks(port):
+        missing |= finding.state == MISSING
+        console.print(f"[{colours[finding.state]}]{finding.state:9}[/] {finding.what:22} ", end="")
+        console.out(finding.found)
+        if finding.remedy:
+            console.out(f"{'':10}to do: {finding.remedy}")
+    if missing:
+        raise typer.Exit(1)

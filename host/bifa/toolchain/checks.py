@@ -1,0 +1,125 @@
+"""What `bifa doctor` looks at: each check says what was found, and how to get what is missing."""
+
+import importlib.metadata
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from bifa import __version__
+from bifa.errors import BifaError
+from bifa.link import Uno
+from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
+from bifa.rig import open_rig
+from bifa.rig.ports import serial_ports
+from bifa.toolchain.project import image_path, platformio_program, project_folder
+
+OK, MISSING, OPTIONAL = "ok", "missing", "optional"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """state: "ok", "missing" (something will not work) or "optional" (something that not everybody needs)."""
+
+    what: str
+    state: str
+    found: str
+    remedy: str = ""
+
+
+def run_checks(port: str | None) -> Iterator[Finding]:
+    """Make every check; the board's last, because opening its port resets it."""
+    yield Finding("bifa", OK, f"bifa {__version__}, Python {sys.version.split()[0]}")
+    yield _guarded("PlatformIO", _platformio)
+    yield _guarded("PlatformIO's packages", _packages)
+    yield _guarded("firmware image", _image)
+    yield _guarded("virtual robot", _virtual_rig)
+    yield _guarded("serial ports", _ports)
+    for program, purpose in OPTIONAL_TOOLS:
+        yield _optional_tool(program, purpose)
+    yield _guarded("firmware on the board", lambda what: _board(what, port))
+
+
+def _guarded(what: str, check: Callable[[str], Finding]) -> Finding:
+    """An expected error is a finding as well: its text says what to do."""
+    try:
+        return check(what)
+    except BifaError as error:
+        return Finding(what, MISSING, "not in order", str(error))
+
+
+def _platformio(what: str) -> Finding:
+    program = platformio_program()
+    done = subprocess.run([program, "--version"], capture_output=True, text=True, check=False)
+    if done.returncode:
+        return Finding(what, MISSING, f"{program} does not run", "run `make setup`")
+    return Finding(what, OK, done.stdout.strip())
+
+
+def _packages(what: str) -> Finding:
+    try:
+        source = json.loads((project_folder() / ".platformio" / "provisioned.json").read_text())["source"]
+    except (OSError, ValueError, KeyError):
+        return Finding(what, OPTIONAL, "not provisioned", "run `make setup`, or let PlatformIO download them")
+    if source == "stand-ins" and not shutil.which("avr-gcc"):
+        return Finding(what, MISSING, "avr-gcc is gone", "sudo apt-get install gcc-avr avr-libc binutils-avr")
+    return Finding(what, OK, {"registry": "from its registry"}.get(source, "stand-ins from PyPI and Debian"))
+
+
+def _image(what: str) -> Finding:
+    project = project_folder()
+    image = image_path(project)
+    if not image.is_file():
+        return Finding(what, MISSING, "not built", "run `pio run -e uno` or `make setup`")
+    if _newest(project / "firmware", project / "lib") > image.stat().st_mtime:
+        return Finding(what, OPTIONAL, "older than its sources", "run `pio run -e uno`")
+    return Finding(what, OK, str(image.relative_to(project)))
+
+
+def _newest(*folders: Path) -> float:
+    return max((path.stat().st_mtime for folder in folders for path in folder.rglob("*.[ch]*")), default=0.0)
+
+
+def _virtual_rig(what: str) -> Finding:
+    if not importlib.metadata.entry_points(group="bifa.rigs", name="virtual"):
+        return Finding(what, OPTIONAL, "not installed", "run `make setup`, or pip install -e host/virtual_robot")
+    try:
+        open_rig("virtual").close()
+    except Exception as error:  # a rig of another package: whatever it raises is the finding
+        return Finding(what, MISSING, "does not start", str(error))
+    return Finding(what, OK, "starts, and the image runs in it")
+
+
+def _ports(what: str) -> Finding:
+    ports = serial_ports()
+    if not ports:
+        return Finding(what, OPTIONAL, "none", "plug the Uno in; without one, use `--port virtual`")
+    listed = ", ".join(f"{port.device} ({port.board or port.description})" for port in ports)
+    return Finding(what, OK, listed)
+
+
+OPTIONAL_TOOLS = (
+    ("clang-format", "make lint"),
+    ("cppcheck", "make lint"),
+    ("clang++", "the fuzzers of make soak"),
+)
+
+
+def _optional_tool(program: str, purpose: str) -> Finding:
+    found = shutil.which(program)
+    if found:
+        return Finding(program, OK, found)
+    return Finding(program, OPTIONAL, "not installed", f"needed by {purpose}, which installs it")
+
+
+def _board(what: str, port: str | None) -> Finding:
+    """Ask the board who it is; only where a port is named or an Uno is plugged in."""
+    if port is None and not any(candidate.board for candidate in serial_ports()):
+        return Finding(what, OPTIONAL, "no board to ask", "plug the Uno in, or name its port: --port")
+    with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
+        hello = uno.connect()
+    ours = f"protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}"
+    return Finding(what, OK, f"firmware {hello.firmware}, {ours}, last restart: {hello.start_cause}")

@@ -1,0 +1,83 @@
+"""Build the image and write it to the board, through PlatformIO."""
+
+import errno
+import re
+import subprocess
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+import serial
+
+from bifa.rig import find_port
+from bifa.toolchain.errors import ToolchainError
+from bifa.toolchain.project import ENVIRONMENT, image_path, platformio_program
+
+LINES_KEPT = 12
+
+# What PlatformIO, avrdude or the system say -> what to do about it; `{port}` is filled in.
+REMEDIES = (
+    (r"not in sync|not responding", "no bootloader answers on {port}: is it the Uno? Close other programs that use "
+     "the port, press its reset button just as the upload begins, or try another cable"),
+    (r"permission denied", "{port} may not be opened: sudo usermod -aG dialout $USER, then log in again"),
+    (r"device or resource busy", "{port} is in use: close the serial monitor or the other program"),
+    (r"HTTPClientError|InternetConnectionError", "PlatformIO lacks a package and cannot download it: run `make setup`"),
+)  # fmt: skip
+
+
+def choose_port(port: str | None) -> str:
+    """Return the port to write to: the one named, or the only Uno there is; it must open."""
+    if port is None:
+        port = find_port()
+    _open_once(port)
+    return port
+
+
+def _open_once(port: str) -> None:
+    try:
+        serial.Serial(port, exclusive=True).close()
+    except (serial.SerialException, OSError) as error:
+        reason = {
+            errno.ENOENT: f"there is no port {port}; `bifa doctor` lists the ports",
+            errno.EACCES: REMEDIES[1][1].format(port=port),
+            errno.EBUSY: REMEDIES[2][1].format(port=port),
+            errno.EAGAIN: REMEDIES[2][1].format(port=port),
+        }.get(getattr(error, "errno", None))
+        raise ToolchainError(reason or f"{port} does not open: {error}") from error
+
+
+def build_image(project: Path, on_line: Callable[[str], None]) -> Path:
+    """Build the image for the Uno; return its path. `on_line` gets PlatformIO's output as it comes."""
+    _run_platformio(project, ["run", "--environment", ENVIRONMENT], "", on_line)
+    return image_path(project)
+
+
+def upload_image(project: Path, port: str, on_line: Callable[[str], None]) -> None:
+    """Build if needed and write the image to the Uno at `port`; the upload itself resets the board."""
+    arguments = ["run", "--environment", ENVIRONMENT, "--target", "upload", "--upload-port", port]
+    _run_platformio(project, arguments, port, on_line)
+
+
+def _run_platformio(project: Path, arguments: list[str], port: str, on_line: Callable[[str], None]) -> None:
+    command = [platformio_program(), *arguments]
+    last: deque[str] = deque(maxlen=LINES_KEPT)
+    with subprocess.Popen(
+        command, cwd=project, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        try:
+            for line in process.stdout:
+                last.append(line.rstrip())
+                on_line(line.rstrip())
+        except KeyboardInterrupt:
+            process.wait()
+            raise
+    if process.returncode:
+        raise ToolchainError(_sentence(list(last), port))
+
+
+def _sentence(lines: list[str], port: str) -> str:
+    output = "\n".join(lines)
+    for pattern, remedy in REMEDIES:
+        if re.search(pattern, output, re.IGNORECASE):
+            return remedy.format(port=port or "the port")
+    return f"PlatformIO failed; its last lines:\n{output}"

@@ -1,0 +1,32 @@
+"""Where the project, its image and PlatformIO are."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import bifa
+from bifa.toolchain.errors import ToolchainError
+
+ENVIRONMENT = "uno"
+
+
+def project_folder() -> Path:
+    """Return the clone this package belongs to, else the one around the working directory."""
+    here = Path.cwd()
+    for folder in (Path(bifa.__file__).resolve().parents[2], here, *here.parents):
+        if (folder / "platformio.ini").is_file() and (folder / "firmware").is_dir():
+            return folder
+    raise ToolchainError("no platformio.ini and firmware/ here; go to a clone of the project")
+
+
+def platformio_program() -> Path:
+    """Return PlatformIO's command: the one of this Python environment, else the one on PATH."""
+    found = shutil.which("pio", path=str(Path(sys.executable).parent)) or shutil.which("pio")
+    if not found:
+        raise ToolchainError("PlatformIO is not installed; run `make setup`, or `pip install platformio`")
+    return Path(found)
+
+
+def image_path(project: Path) -> Path:
+    """Return where PlatformIO puts the image for the Uno (which need not exist)."""
+    return project / ".pio" / "build" / ENVIRONMENT / "firmware.elf"

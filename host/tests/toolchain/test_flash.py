@@ -1,0 +1,107 @@
+"""`bifa flash`: the port is found and checked first, PlatformIO does the work, and failures become sentences."""
+
+import errno
+import os
+import sys
+
+import pytest
+import serial
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.rig import ports
+from bifa.toolchain import ToolchainError, flash, project
+
+
+@pytest.fixture
+def platformio(tmp_path, monkeypatch):
+    """A program in PlatformIO's place: it notes its arguments, says something, and ends with a status."""
+
+    def pretend(says: str = "", status: int = 0):
+        program = tmp_path / "pio"
+        program.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/calls\ncat <<END\n{says}\nEND\nexit {status}\n')
+        program.chmod(0o755)
+        monkeypatch.setattr(flash, "platformio_program", lambda: program)
+
+    pretend.calls = lambda: (tmp_path / "calls").read_text()
+    return pretend
+
+
+def test_a_port_found_by_itself_is_opened_before_anything_is_built(monkeypatch):
+    monkeypatch.setattr(flash, "find_port", lambda: "/dev/not-there")
+    with pytest.raises(ToolchainError, match="there is no port /dev/not-there"):
+        flash.choose_port(None)
+
+
+def test_a_port_that_is_not_there_is_said_before_anything_is_built(platformio):
+    platformio()
+    with pytest.raises(ToolchainError, match="there is no port /dev/not-there"):
+        flash.choose_port("/dev/not-there")
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"), [(errno.EACCES, "usermod -aG dialout"), (errno.EBUSY, "close the serial monitor")]
+)
+def test_a_port_that_does_not_open_says_why(monkeypatch, number, advice):
+    def refuse(*_, **__):
+        raise serial.SerialException(number, os.strerror(number))
+
+    monkeypatch.setattr(serial, "Serial", refuse)
+    with pytest.raises(ToolchainError, match=advice):
+        flash.choose_port("/dev/ttyACM0")
+
+
+def test_the_upload_is_platformios_own(platformio, tmp_path):
+    platformio("Uploading", 0)
+    lines = []
+    flash.upload_image(tmp_path, "/dev/ttyACM0", lines.append)
+    assert platformio.calls() == "run --environment uno --target upload --upload-port /dev/ttyACM0\n"
+    assert lines == ["Uploading"]
+
+
+@pytest.mark.parametrize(
+    ("says", "sentence"),
+    [
+        ("avrdude error: programmer is not responding", "no bootloader answers on /dev/ttyACM0"),
+        ("avrdude: stk500_getsync(): not in sync: resp=0x00", "no bootloader answers on /dev/ttyACM0"),
+        ("can't open device: Permission denied", "usermod -aG dialout"),
+        ("can't open device: Device or resource busy", "/dev/ttyACM0 is in use"),
+        ("HTTPClientError: ", "run `make setup`"),
+        ("firmware/main.cpp:3:1: error: expected ';'", "PlatformIO failed; its last lines:\nfirmware/main.cpp:3:1"),
+    ],
+)
+def test_a_failed_upload_says_what_to_do(platformio, tmp_path, says, sentence):
+    platformio(says, 1)
+    with pytest.raises(ToolchainError) as failure:
+        flash.upload_image(tmp_path, "/dev/ttyACM0", lambda line: None)
+    assert sentence in str(failure.value)
+
+
+def test_without_platformio_the_sentence_names_the_remedy(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ToolchainError, match="make setup"):
+        project.platformio_program()
+
+
+def test_outside_a_clone_is_said(monkeypatch, tmp_path):
+    monkeypatch.setattr(project.bifa, "__file__", str(tmp_path / "site-packages" / "bifa" / "__init__.py"))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ToolchainError, match="go to a clone of the project"):
+        project.project_folder()
+
+
+def test_the_command_ends_in_the_sentence_and_not_in_a_traceback():
+    done = CliRunner().invoke(app, ["flash", "--port", "/dev/not-there"])
+    assert isinstance(done.exception, ToolchainError)
+
+
+def test_usb_identities_sort_originals_first(monkeypatch):
+    class Found:
+        def __init__(self, device, vid, pid):
+            self.device, self.vid, self.pid, self.description = device, vid, pid, "n/a"
+
+    found = [Found("b", 0x1A86, 0x7523), Found("c", 0x1234, 1), Found("a", 0x2A03, 0x0043), Found("s", None, None)]
+    monkeypatch.setattr(ports.list_ports, "comports", lambda: found)
+    assert [port.device for port in ports.serial_ports()] == ["a", "b", "c"]
+    assert [port.device for port in ports.uno_ports()] == ["a", "b"]
