@@ -1,14 +1,15 @@
 """The simulator: every experiment of the paper, with any set of effects, fast enough to fit and to optimise.
 
-from bifa import robot, simulate
-record = simulate.walk(robot.nominal(), robot.BASELINE, cycles=10)
-record["displacement_head_mm"]
+>>> from bifa import robot, simulate
+>>> record = simulate.walk(robot.nominal(), robot.BASELINE, cycles=10)
+>>> record["displacement_head_mm"]
 """
 
 from bifa.simulate.gaits import Progress, cores, gait_rows, speed, speeds
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.records import Record, anchor_pull, static_loading, step_response, walk
 from bifa.simulate.rigs import SimulationError
+from bifa.simulate.terrain import Obstacle, Supports, arcs, passed_at_m, subtunnels, terrain, tunnel
 from bifa.simulate.timeline import (
     Timeline,
     TimelineError,
@@ -21,18 +22,22 @@ from bifa.simulate.timeline import (
 )
 
 __all__ = [
+    "Obstacle",
     "Plant",
     "Progress",
     "Record",
     "SimulationError",
+    "Supports",
     "Timeline",
     "TimelineError",
     "anchor_pull",
+    "arcs",
     "cores",
     "gait_rows",
     "of_gait",
     "of_phases",
     "of_samples",
+    "passed_at_m",
     "plant",
     "recorded_commands",
     "refine",
@@ -40,6 +45,9 @@ __all__ = [
     "speeds",
     "static_loading",
     "step_response",
+    "subtunnels",
+    "terrain",
     "timeline",
+    "tunnel",
     "walk",
 ]

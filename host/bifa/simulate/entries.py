@@ -1,6 +1,6 @@
 """The compiled functions that Python calls, with an on-disk cache that notices a change of any source.
 
-The one file with a cache is generated: three lines a function, and in its name the hash of all sources of the
+The one file with a cache is generated: three lines a function, and in its name the hash of all compiled sources of the
 simulator and of the effects.
 """
 
@@ -21,9 +21,14 @@ _ENTRIES = {
 }
 
 
+# Never compiled: a change there needs no new compilation.
+_PLAIN = {"__init__.py", "entries.py", "gaits.py", "records.py", "rigs.py", "terrain.py"}
+
+
 def _sources() -> list[str]:
     folders = (Path(__file__).parent, Path(bifa.effects.__path__[0]))
-    return [path.read_text("utf-8") for folder in folders for path in sorted(folder.glob("*.py"))]
+    paths = [path for folder in folders for path in sorted(folder.glob("*.py")) if path.name not in _PLAIN]
+    return [path.read_text("utf-8") for path in paths]
 
 
 def _entry_source() -> str:

@@ -33,6 +33,7 @@ from bifa.simulate.stepper import (
 LONGEST_S = 0.05
 SHORTEST_S = 1e-5
 _FIRST_S = 1e-3
+_ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
 # Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
 _WEIGHTS = np.array(
@@ -145,12 +146,12 @@ def march(plant, rig, run, until, tolerance):
         error = 0.0
         for i in range(STATES):
             error = max(error, abs(halves[i] - whole[i]) / _WEIGHTS[i])
-        error /= tolerance
+        smooth = kind == kind_first and kind == kind_second
+        error /= tolerance if smooth else _ABRUPT * tolerance
         if error > 1.0 and h > SHORTEST_S:
             clock[1] = h * max(0.2, 0.9 / math.sqrt(error))
             continue
         run.slip[0] += _both_slide(y, first) + _both_slide(first, halves)
-        smooth = kind == kind_first and kind == kind_second
         _accept(plant, run, smooth)
         clock[0] += h
         if plant.active & chains.SENSOR:

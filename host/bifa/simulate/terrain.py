@@ -1,0 +1,106 @@
+"""Obstacles in the pipe and the supports that buckle under them (paper, sections II.B and VI.B).
+
+A support is pushed into a narrower place by a force up to its buckling force, over the length of its lip; inside it
+drags with a small friction; behind, it springs back to its shape without helping or hindering. The head's and the
+tail's supports meet each obstacle in turn. Where the pipe is narrower, the small actuators reach its wall earlier.
+The paper tuned its supports by trial and gives no forces: those here are assumptions, named as such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.simulate.rigs import SimulationError
+
+PIPE_DIAMETER_M = 0.147
+NARROWEST_M = 0.097
+CONTRACTED_LENGTH_M = 0.186  # 240 mm extended, less the stroke: distance of the two rings of supports
+_SPACING_M = 1e-3
+_MARGIN_M = 0.05
+
+
+@dataclass(frozen=True)
+class Supports:
+    """A ring of supports. `buckling_N`: to push all of them in; reached at `buckled_m` of narrowing in radius."""
+
+    buckling_N: float = 27.0
+    friction_N: float = 2.0
+    lip_m: float = 0.02
+    buckled_m: float = 0.01
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A narrower piece of pipe from `start_m` ahead of the head on. `around`: share of the circumference it takes."""
+
+    start_m: float
+    length_m: float
+    diameter_m: float
+    around: float = 1.0
+
+    @property
+    def narrowing_m(self) -> float:
+        """In radius."""
+        return 0.5 * (PIPE_DIAMETER_M - self.diameter_m)
+
+
+def tunnel(start_m: float = 0.1) -> tuple[Obstacle, ...]:
+    """The paper's tunnel: 97 mm wide, 50 mm long."""
+    return (Obstacle(start_m, 0.050, 0.097),)
+
+
+def subtunnels(start_m: float = 0.1) -> tuple[Obstacle, ...]:
+    """The paper's three sub-tunnels of 137, 97 and 117 mm over 150 mm."""
+    return tuple(Obstacle(start_m + 0.05 * i, 0.05, d) for i, d in enumerate((0.137, 0.097, 0.117)))
+
+
+def arcs(start_m: float = 0.1) -> tuple[Obstacle, ...]:
+    """The paper's arcs of 5, 15 and 25 mm height; each is met by one of three supports."""
+    heights = (0.005, 0.015, 0.025)
+    return tuple(
+        Obstacle(start_m + 0.12 * i, 0.02, PIPE_DIAMETER_M - 2.0 * h, 1.0 / 3.0) for i, h in enumerate(heights)
+    )
+
+
+def terrain(
+    obstacles: Sequence[Obstacle],
+    supports: Supports = Supports(),
+    robot_length_m: float = CONTRACTED_LENGTH_M,
+) -> np.ndarray:
+    """(7, n) table for `walk(..., terrain=...)`, over position.
+
+    Row 0: start, 1 / spacing; rows 1-4: force in N against head forward, head backward, tail forward, tail backward;
+    rows 5, 6: narrowing of the pipe's radius at head and tail, m. SimulationError for what the robot cannot enter.
+    """
+    for obstacle in obstacles:
+        if not NARROWEST_M - 1e-9 <= obstacle.diameter_m <= PIPE_DIAMETER_M or obstacle.length_m <= 0.0:
+            raise SimulationError(
+                f"an obstacle of {obstacle.diameter_m * 1e3:g} mm: the robot passes 97 to 147 mm, over more than 0 mm"
+            )
+    end = max((o.start_m + o.length_m for o in obstacles), default=0.0) + robot_length_m + _MARGIN_M
+    x = np.arange(-_MARGIN_M, end, _SPACING_M)
+    rows = np.zeros((7, x.size))
+    rows[0, :2] = x[0], 1.0 / _SPACING_M
+    for first, shift in ((1, 0.0), (3, robot_length_m)):
+        for obstacle in obstacles:
+            _add(rows[first : first + 2], rows[5 + first // 2], x - shift, obstacle, supports)
+    return rows
+
+
+def passed_at_m(obstacles: Sequence[Obstacle], robot_length_m: float = CONTRACTED_LENGTH_M) -> float:
+    """Displacement of the tail at which the whole robot is behind the last obstacle."""
+    return max(o.start_m + o.length_m for o in obstacles) + robot_length_m
+
+
+def _add(forces: np.ndarray, narrowing: np.ndarray, x: np.ndarray, obstacle: Obstacle, supports: Supports) -> None:
+    bent = min(obstacle.narrowing_m / supports.buckled_m, 1.0) * obstacle.around
+    past = x - obstacle.start_m
+    inside = (past >= 0.0) & (past < obstacle.length_m)
+    lip = (past >= 0.0) & (past < supports.lip_m)
+    forces[0, lip] = np.maximum(forces[0, lip], supports.buckling_N * bent)
+    forces[:, inside] = np.maximum(forces[:, inside], supports.friction_N * bent)
+    if obstacle.around == 1.0:
+        narrowing[inside] = np.maximum(narrowing[inside], obstacle.narrowing_m)
