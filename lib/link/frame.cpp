@@ -67,7 +67,7 @@ void send_frame(Sink& sink, MessageId message, uint8_t sequence, const void* fie
   uint8_t body[kHeadBytes + kLongestOutward + kCheckBytes];
   body[0] = static_cast<uint8_t>(message);
   body[1] = sequence;
-  memcpy(body + kHeadBytes, fields, size);
+  if (size > 0) memcpy(body + kHeadBytes, fields, size);
   const uint32_t check = checks(body, kHeadBytes + size, seed);
   memcpy(body + kHeadBytes + size, &check, sizeof check);
   const uint8_t length = kHeadBytes + size + kCheckBytes;
