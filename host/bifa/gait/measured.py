@@ -6,6 +6,8 @@ import numpy as np
 
 from bifa.errors import BifaError
 
+SETTLE_CYCLES = 2  # a walk from rest is periodic from its third cycle on
+
 
 @dataclass(frozen=True)
 class MeasuredSpeed:
@@ -22,7 +24,7 @@ class MeasuredSpeed:
 
 
 def measured_speed(
-    time_s: np.ndarray, displacement_mm: np.ndarray, period_s: float, settle_cycles: int = 1
+    time_s: np.ndarray, displacement_mm: np.ndarray, period_s: float, settle_cycles: int = SETTLE_CYCLES
 ) -> MeasuredSpeed:
     """Speed of a walk that begins at `time_s[0]`, without its first `settle_cycles` cycles.
 

@@ -41,10 +41,11 @@ def draw_walks(walks: Sequence[Walk], path: Path | BytesIO, cycles: int = 5, dar
         for column, walk in zip(axes.T, walks, strict=True):
             _draw_column(column, walk, cycles, palette)
         axes[0, 0].set_yticks([0.4, 1.6, 2.8], CHAMBERS)
+        for label in axes[0, 0].get_yticklabels():  # the legend of the pressures, too
+            label.set_color(CHAMBER_COLOURS[label.get_text()])
         axes[0, 0].set_ylabel("CPG output")
         axes[1, 0].set_ylabel("pressure [psi]")
         axes[2, 0].set_ylabel("head displacement [mm]")
-        axes[1, 0].legend(loc="upper right", ncols=3, handlelength=1.2, columnspacing=1.0)
         axes[2, 0].legend(loc="upper left")
         figure.align_ylabels()
         figure.tight_layout()

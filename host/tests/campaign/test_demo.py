@@ -1,0 +1,61 @@
+"""The demonstration: the real image walks the virtual robot; killed at any moment it leaves nothing half-written."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from bifa.campaign.walks import measure_walks, speeds
+from bifa.data import read_dataset
+from bifa.rig import open_rig
+from bifa.robot.gait import BASELINE
+
+pytestmark = pytest.mark.uno
+
+
+def test_the_baseline_walks_as_fast_as_in_the_paper():
+    with open_rig("virtual") as rig:
+        dataset = measure_walks(rig, {"baseline": BASELINE}, cycles=4)
+    (speed,) = speeds(dataset)["baseline"]
+    assert speed.mean_mm_s == pytest.approx(10.8, abs=0.4)
+    (trial,) = dataset.trials
+    assert trial.rate_hz == pytest.approx(100.0)
+    assert set(trial.columns) >= {"displacement_tail_mm", "pressure_tail_psi", "command_tail"}
+
+
+def run_demo(folder):
+    command = [sys.executable, "-m", "bifa", "demo", "--cycles", "4", "--out", str(folder)]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_killed_in_the_middle_it_leaves_no_process_and_no_artefact(tmp_path, how):
+    folder = tmp_path / "demo"
+    process = run_demo(folder)
+    while not folder.exists() and process.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(how)
+    process.communicate(timeout=30)
+    assert process.returncode != 0
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+    assert [path.name for path in folder.iterdir() if not path.name.startswith(".")] == []
+
+
+def test_the_demo_leaves_data_set_figure_and_speeds_and_resumes(tmp_path):
+    folder = tmp_path / "demo"
+    output, _ = run_demo(folder).communicate()
+    assert "baseline gait" in output
+    assert {trial.file for trial in read_dataset(folder / "walks").trials} == {"baseline_1.csv", "optimised_1.csv"}
+    measured = json.loads((folder / "walks.json").read_text())
+    assert measured["optimised"][0]["mean_mm_s"] > measured["baseline"][0]["mean_mm_s"] + 5
+    assert (folder / "walks.png").stat().st_size > 20_000
+    again, _ = run_demo(folder).communicate()
+    assert "up to date" in again
