@@ -15,7 +15,6 @@ from bifa.link.table import CHAMBER_STATES, CHAMBERS, FAULTS, STATES
 from bifa.link.transport import Transport
 from bifa.link.units import ParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
 
-
 EEPROM_TIMEOUT_S = 10.0
 CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
@@ -202,7 +201,7 @@ class Uno:
         self.session.call("defaults", timeout_s=EEPROM_TIMEOUT_S)
 
     def zero(self, factory: bool = False) -> None:
-        """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; or go back to the data sheet."""
+        """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; or undo it (`factory`)."""
         self.session.call("zero", int(factory), timeout_s=EEPROM_TIMEOUT_S)
 
     # -- motion -----------------------------------------------------------------------------------------------
@@ -216,7 +215,7 @@ class Uno:
         self.session.call("stop")
 
     def stop(self) -> None:
-        """The real-time stop: all valves off, latched until clear(). Sent as a frame and as `!`; no answer is awaited."""
+        """The real-time stop: all valves off, latched until clear(). Sent as frame and as `!`; awaits no answer."""
         self.session.transport.write(frames.STOP_FRAME + b"!")
 
     def clear(self) -> None:

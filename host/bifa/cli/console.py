@@ -1,0 +1,47 @@
+"""`bifa console`: the Uno's text console with history, completion and a status line."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+EPILOG = (
+    """Examples:  bifa console   |   bifa console --port virtual   |   echo show | bifa console --port /dev/ttyACM0"""
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EPILOG)(console)
+
+
+def console(
+    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+) -> None:
+    """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D leaves, with all valves off.
+
+    With its input from a pipe it sends the lines one by one, prints the answers, and ends with status 1 if one was an
+    error.
+    """
+    from bifa.link import Uno
+    from bifa.rig import open_rig
+
+    with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        if sys.stdin.isatty():
+            from bifa.live.interactive import converse
+
+            converse(uno, rig)
+        elif not _pipe(uno, rig):
+            raise typer.Exit(1)
+
+
+def _pipe(uno, rig) -> bool:
+    from bifa.link.terminal import type_line
+
+    good = True
+    for line in sys.stdin:
+        lines = type_line(uno, line.rstrip("\r\n"), rig.clock)
+        typer.echo("\n".join(lines))
+        good = good and lines[-1].startswith("ok")
+    return good

@@ -1,0 +1,26 @@
+"""Console lines over the port of a session: text out, text back, telemetry and clock beside them."""
+
+from bifa.link.errors import NoAnswerError
+from bifa.link.uno import Uno
+
+LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
+
+
+def is_answer(line: str) -> bool:
+    """Whether a line ends the answer to what was typed."""
+    return line.startswith(("ok", "error"))
+
+
+def type_line(uno: Uno, line: str, clock) -> list[str]:
+    """Send one console line; returns the lines up to its answer, that included. Frames go on meanwhile."""
+    uno.session.lines.clear()
+    uno.session.transport.write(line.encode("ascii", "replace") + b"\n")
+    deadline = clock.now() + LONGEST_ANSWER_S
+    lines: list[str] = []
+    while clock.now() < deadline:
+        uno.session.poll(0.02)
+        while uno.session.lines:
+            lines.append(uno.session.lines.popleft())
+            if is_answer(lines[-1]):
+                return lines
+    raise NoAnswerError(f"no answer to {line!r}; check the cable, then connect again")

@@ -1,0 +1,1 @@
+"""What people see of a running Uno: the interactive console and the live monitor."""

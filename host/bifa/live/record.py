@@ -1,0 +1,117 @@
+"""Recording: walks on a rig with instruments, telemetry on a bare Uno."""
+
+import csv
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from bifa.errors import BifaError
+from bifa.link import Counters, LinkError, Sample, Uno
+from bifa.link.gait_file import read_gait_file
+from bifa.link.table import CHAMBERS
+
+RETRY_S = 1.0
+HEADER = [
+    "time_s",
+    "host_time_s",
+    "sequence",
+    "state",
+    *(f"command_{name}" for name in CHAMBERS),
+    *(f"pressure_{name}_psi" for name in CHAMBERS),
+    *(f"phase_{name}_rad" for name in CHAMBERS),
+]
+
+
+class RecordError(BifaError):
+    """A recording cannot be made there."""
+
+
+def _link_text(counters: Counters) -> str:
+    return f"samples {counters.samples}  lost {counters.lost}  bad frames {counters.bad}  sent again {counters.resent}"
+
+
+def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
+    """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
+    from bifa.characterisation.locomotion import record_walk
+    from bifa.data import DatasetWriter, Trial
+    from bifa.robot.gait import BASELINE, load_gait
+
+    gait = load_gait(gait_file) if gait_file else BASELINE
+    writer = DatasetWriter(out, f"walks, {time.strftime('%Y-%m-%d')}", resume=True)
+    with Uno(rig.transport, rig.clock) as uno, Progress(console=console) as progress:
+        hello = uno.connect()
+        uno.clear()
+        for repeat in range(1, repeats + 1):
+            trial = Trial(f"walk_{repeat}.csv", "locomotion", {}, gait=gait.as_dict(), repeat=repeat)
+            if writer.has(trial):
+                continue
+            task = progress.add_task(f"walk {repeat} of {repeats}", total=1.0)
+            walk = record_walk(rig, uno, gait, cycles, lambda share, task=task: progress.update(task, completed=share))
+            writer.add(
+                Trial(trial.file, "locomotion", walk.columns, gait=trial.gait, repeat=repeat, session_order=repeat)
+            )
+            progress.console.print(f"walk {repeat}: {_link_text(uno.counters)}")
+    writer.finish()
+    console.print(
+        f"{out}: {repeats} walks of {cycles} cycles, firmware {hello.firmware}; look at it with: bifa check {out}"
+    )
+
+
+def record_telemetry(
+    open_rig: Callable, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
+) -> None:
+    """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
+    parameters = read_gait_file(gait_file) if gait_file else {}
+    if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
+        raise RecordError(f"{out} holds something else; name a new folder")
+    out.mkdir(parents=True, exist_ok=True)
+    end_s = None if duration_s is None else time.monotonic() + duration_s
+    try:
+        while end_s is None or time.monotonic() < end_s:
+            path = out / f"telemetry_{1 + len(list(out.glob('telemetry_*.csv')))}.csv"
+            try:
+                _record_until_gone(open_rig, path, parameters, end_s, console)
+            except (ConnectionError, LinkError) as error:
+                console.print(f"{error}\nwhat was recorded is in {out}; waiting for the Uno (Ctrl-C ends)")
+                time.sleep(RETRY_S)
+    except KeyboardInterrupt:
+        console.print("ended; valves off")
+    console.print(f"{out} holds the telemetry; a data set needs the displacement from your own instrument beside it")
+
+
+def _record_until_gone(
+    open_rig: Callable, path: Path, parameters: dict[str, float], end_s: float | None, console: Console
+) -> None:
+    with open_rig() as rig, Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        if parameters:
+            uno.upload(parameters)
+        uno.stream(True)
+        if parameters:
+            uno.run()
+        with path.open("x", newline="") as file, console.status("recording") as status:
+            writer = csv.writer(file)
+            writer.writerow(HEADER)
+            while end_s is None or time.monotonic() < end_s:
+                writer.writerows(_row(uno, sample) for sample in uno.samples(0.5))
+                file.flush()
+                status.update(f"recording  {_link_text(uno.counters)}")
+        console.print(f"{path}: {_link_text(uno.counters)}")
+
+
+def _row(uno: Uno, sample: Sample) -> list:
+    time_s = sample.time_us / 1e6
+    # An empty field where a chamber is off: neither positive nor vacuum.
+    commands = ["" if command != command else f"{command:g}" for command in sample.command]
+    return [
+        f"{time_s:.3f}",
+        f"{uno.clock_relation.estimate(time_s):.6f}",
+        sample.sequence,
+        sample.state,
+        *commands,
+        *(f"{pressure:.3f}" for pressure in sample.pressure_psi),
+        *(f"{phase:.4f}" for phase in sample.phase_rad),
+    ]
