@@ -112,12 +112,10 @@ class Session:
                 f"this is bifa {__version__} (protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}); "
                 "bring the Uno up to date with: bifa flash"
             )
-        while True:
-            key = self._random.randrange(1, 0x10000)
-            values = (hello.boot_nonce, key)
-            hello = self._greet("connect", values, deadline)
-            if hello.session_key == key:
-                break
+        # One key for all attempts: a hello that was already under way answers an earlier one.
+        key = self._random.randrange(1, 0x10000)
+        while hello.session_key != key:
+            hello = self._greet("connect", (hello.boot_nonce, key), deadline)
         self._key = key
         self._sequence = 0
         self._outstanding.clear()

@@ -6,13 +6,18 @@ from virtual_robot.uno import CLOCK_HZ, Uno
 
 FIRMWARE = Path(__file__).parents[3] / ".pio/build/uno/firmware.elf"
 AT_REST_V = 2.5  # the sensors' reading of no pressure
+CYCLES_A_BYTE = 10 * CLOCK_HZ // 250_000
+VALVES = range(4, 10)
 
 
 class Chip:
     """A bare Uno (no robot) that is transport and clock at once."""
 
-    def __init__(self) -> None:
-        self.uno = Uno(FIRMWARE, keep_events=False)
+    def __init__(self, keep_events: bool = False, eeprom: bytes | None = None) -> None:
+        self.uno = Uno(FIRMWARE, keep_events=keep_events)
+        if eeprom is not None:
+            self.uno.eeprom = eeprom
+            self.uno.reset("power-on")
         for channel in range(3):
             self.uno.set_analog(channel, AT_REST_V)
 
@@ -28,7 +33,7 @@ class Chip:
         self.uno.reset("external")
 
     def close(self) -> None:
-        pass
+        self.uno.close()
 
     def now(self) -> float:
         return self.uno.time_s
@@ -38,4 +43,18 @@ class Chip:
 
     def valves(self) -> int:
         """Levels of D4 to D9, one bit each."""
-        return sum((self.uno.pin(4 + i) or 0) << i for i in range(6))
+        return sum((self.uno.pin(pin) or 0) << i for i, pin in enumerate(VALVES))
+
+    def stop_latency_s(self, before: bytes, stop: bytes, after: bytes) -> float:
+        """From the last bit of `stop`, sent between `before` and `after` without a pause, to the last valve's fall.
+
+        The line must be idle and at least one valve on.
+        """
+        assert self.valves() != 0
+        known = sum(1 for _ in self.uno.iter_events())
+        arrived = self.uno.cycle + (len(before) + len(stop)) * CYCLES_A_BYTE
+        self.uno.send(before + stop + after)
+        self.uno.run_until(arrived + len(after) * CYCLES_A_BYTE + CLOCK_HZ // 100)
+        falls = [e.cycle for e in self.uno.iter_events(known) if e.kind == "pin" and e.index in VALVES and e.value == 0]
+        assert self.valves() == 0
+        return (max(falls) - arrived) / CLOCK_HZ
