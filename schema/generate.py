@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cpp_commands
 import cpp_parameters
+import doc_tables
 import py_tables
 from tables import WIRE_BYTES, command_table, parameter_table, table_hash
 
@@ -20,7 +21,9 @@ def generated() -> dict[Path, str]:
     commands = command_table()
     set_size = sum(WIRE_BYTES[p.wire] for p in parameters.parameters)
     agreed = table_hash(parameters, commands)
+    protocol = ROOT / "docs/protocol.md"
     return {
+        protocol: doc_tables.page(protocol.read_text(), parameters, commands),
         ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
         ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters),
         ROOT / "lib/commands/command_table.h": cpp_commands.command_header(commands),

@@ -1,0 +1,134 @@
+// Damages frames by the million and counts what the Uno's receiver and decoder take for something that was not sent.
+#include <vector>
+
+#include "crc.h"
+#include "frame.h"
+#include "receiver.h"
+
+namespace {
+
+struct Random {
+  uint64_t state;
+  uint32_t next() {
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return static_cast<uint32_t>(state >> 16);
+  }
+  uint32_t below(uint32_t n) { return static_cast<uint32_t>((static_cast<uint64_t>(next()) * n) >> 32); }
+};
+
+// Flips, replaces, drops, doubles and inserts; more of them as `rate_e4` grows; returns whether anything changed.
+bool damage(Random& random, std::vector<uint8_t>& bytes, uint32_t rate_e4) {
+  std::vector<uint8_t> out;
+  uint32_t burst = 0;
+  for (uint8_t byte : bytes) {
+    if (burst == 0 && random.below(10000) >= rate_e4) {
+      out.push_back(byte);
+      continue;
+    }
+    burst = burst > 0 ? burst - 1 : random.below(20) == 0 ? random.below(10) : 0;
+    switch (random.below(5)) {
+      case 0:
+        out.push_back(byte ^ (1 << random.below(8)));
+        break;
+      case 1:
+        out.push_back(byte ^ (1 + random.below(255)));
+        break;
+      case 2:
+        out.push_back(byte);
+        out.push_back(byte);
+        break;
+      case 3:
+        out.push_back(byte);
+        out.push_back(random.below(256));
+        break;
+      default:
+        break;
+    }
+  }
+  const bool changed = out != bytes;
+  bytes = out;
+  return changed;
+}
+
+}  // namespace
+
+extern "C" {
+
+uint16_t harness_crc(const uint8_t* data, size_t size, uint16_t crc) {
+  for (size_t i = 0; i < size; ++i) crc = bifa::crc16_update(crc, data[i]);
+  return crc;
+}
+uint16_t harness_reflected(const uint8_t* data, size_t size, uint16_t crc) {
+  for (size_t i = 0; i < size; ++i) crc = bifa::crc16_reflected_update(crc, data[i]);
+  return crc;
+}
+
+// Decodes one frame as it stands between its delimiters; returns the size of its fields, or -1.
+int harness_decode(const uint8_t* data, size_t size, uint32_t session, uint8_t* frame) {
+  bifa::FrameDecoder decoder;
+  decoder.start();
+  for (size_t i = 0; i < size; ++i) decoder.feed(data[i]);
+  if (!decoder.finish(session)) return -1;
+  uint8_t fields = 0;
+  bifa::inward_size(decoder.frame().message, fields);
+  memcpy(frame, &decoder.frame(), 2 + fields);
+  return fields;
+}
+
+size_t harness_encode(uint8_t message, uint8_t sequence, const uint8_t* fields, uint8_t size, uint32_t seed, uint8_t* to) {
+  struct Collect : bifa::Sink {
+    void write(uint8_t byte) override { bytes.push_back(byte); }
+    uint8_t room() const override { return 255; }
+    std::vector<uint8_t> bytes;
+  } sink;
+  bifa::send_frame(sink, static_cast<bifa::MessageId>(message), sequence, fields, size, seed);
+  memcpy(to, sink.bytes.data(), sink.bytes.size());
+  return sink.bytes.size();
+}
+
+// Damages `count` copies of good frames (in `pool`, each of `stride` bytes, its size in the first) and pushes them
+// through the receiver. What comes out must be one of the two last frames sent, unless the damage left one of them
+// as it was. results: damaged, accepted as sent, accepted wrongly, stops.
+void harness_damage(const uint8_t* pool, size_t frames, size_t stride, uint32_t session, uint64_t seed, uint64_t count,
+                    uint64_t* results) {
+  Random random = {seed * 2654435761u + 88172645463325252ull};
+  bifa::Receiver receiver;
+  bifa::FrameDecoder decoder;
+  bool in_frame = false;
+  std::vector<uint8_t> sent[2];
+  for (uint64_t i = 0; i < count;) {
+    const uint8_t* entry = pool + stride * random.below(frames);
+    std::vector<uint8_t> bytes(entry + 1, entry + 1 + entry[0]);
+    sent[0] = sent[1];
+    sent[1].assign(entry + stride - 24, entry + stride);  // the message that it holds, padded with zeros
+    const uint32_t rates[] = {300, 1000, 3000};
+    const bool damaged = damage(random, bytes, rates[random.below(3)]);
+    i += damaged;
+    for (uint8_t byte : bytes) {
+      if (receiver.push(byte)) ++results[3];
+      uint8_t out;
+      while (receiver.pop(out)) {
+        if (out != 0) {
+          if (in_frame) decoder.feed(out);
+          continue;
+        }
+        in_frame = !in_frame;
+        if (in_frame) {
+          decoder.start();
+          continue;
+        }
+        if (!decoder.finish(session)) continue;
+        uint8_t size = 0;
+        bifa::inward_size(decoder.frame().message, size);
+        std::vector<uint8_t> got(24, 0);
+        memcpy(got.data(), &decoder.frame(), 2 + size);
+        const bool known = got == sent[0] || got == sent[1];
+        ++results[known ? 1 : 2];
+      }
+    }
+  }
+  results[0] = count;
+}
+}

@@ -1,0 +1,50 @@
+"""Writes the tables in docs/protocol.md, between the markers `<!-- table NAME -->` and `<!-- end -->`."""
+
+import re
+from decimal import Decimal
+
+from tables import CommandTable, Message, ParameterTable
+
+
+def _number(value: int, decimals: int) -> str:
+    return f"{float(Decimal(value).scaleb(-decimals)):g}"
+
+
+def _parameters(table: ParameterTable) -> str:
+    lines = ["| name | range | default | on the wire | meaning |", "|---|---|---|---|---|"]
+    for p in table.parameters:
+        bounds = f"{_number(p.minimum, p.decimals)} to {_number(p.maximum, p.decimals)} {p.unit}".rstrip()
+        wire = f"{p.wire}, value * 10^{p.decimals}"
+        lines.append(f"| `{p.name}` | {bounds} | {_number(p.default, p.decimals)} | {wire} | {p.help} |")
+    return "\n".join(lines)
+
+
+def _messages(messages: list[Message], usages: dict[str, str | None]) -> str:
+    lines = ["| number | name | kind | fields | console | meaning |", "|---|---|---|---|---|---|"]
+    for m in messages:
+        fields = ", ".join(f"{f.name}: {f.wire}{f'[{f.count}]' if f.count > 1 else ''}" for f in m.fields) or "-"
+        usage = f"`{usages[m.name]}`".replace("|", "\\|") if usages.get(m.name) else "-"
+        lines.append(f"| 0x{m.number:02X} | `{m.name}` | {m.kind} | {fields} | {usage} | {m.help} |")
+    return "\n".join(lines)
+
+
+def page(text: str, parameters: ParameterTable, commands: CommandTable) -> str:
+    """`text` with its tables as they are now."""
+    usages = {c.name: c.usage for c in commands.commands}
+    results = [f"| {i} | `{name}` | {words} |" for i, (name, words) in enumerate(commands.results)]
+    tables = {
+        "parameters": _parameters(parameters),
+        "commands": _messages([c.message for c in commands.commands if c.message], usages),
+        "reports": _messages(list(commands.reports), {}),
+        "results": "\n".join(["| number | name | words |", "|---|---|---|", *results]),
+        "words": "\n".join(
+            f"- {name}: " + ", ".join(f"{i} {word}" for i, word in enumerate(words))
+            for name, words in commands.words.items()
+        ),
+    }
+    for name, table in tables.items():
+        pattern = rf"(<!-- table {name} -->\n).*?(<!-- end -->)"
+        text, count = re.subn(pattern, lambda m, table=table: f"{m[1]}{table}\n{m[2]}", text, flags=re.S)
+        if count != 1:
+            raise ValueError(f"docs/protocol.md: expected one place for the table {name}, found {count}")
+    return text
