@@ -10,11 +10,12 @@ namespace bifa {
 const uint32_t kHalfStep = 0x8000;
 
 struct Gait {
-  uint32_t increment;                 ///< of every phase a step: 2^32 f / 1000; rounded, within 7 ppm at 60 s
-  uint16_t gain;                      ///< what a sine of 1 / kSineOne adds in a step, in 1/256 of the phases' unit
-  bool strong;                        ///< the gain is in 1/64 instead
-  uint32_t psi12;                     ///< less kHalfStep
-  uint32_t psi13;                     ///< less kHalfStep
+  uint32_t increment;          ///< of every phase a step: 2^32 f / 1000
+  uint8_t increment_fraction;  ///< and 1/256 of that unit: the period is within 0.06 ppm
+  uint16_t gain;               ///< what a sine of 1 / kSineOne adds in a step, in 2^doublings / 256 of the phases' unit
+  int8_t doublings;            ///< 2 or less; so that the gain's highest bit is set
+  uint32_t psi12;              ///< less kHalfStep
+  uint32_t psi13;              ///< less kHalfStep
   uint32_t threshold[kChamberCount];  ///< duties d_i: positive beyond this phase; 1 is 2^32 - 1
 };
 

@@ -26,30 +26,33 @@ BIFA_INLINE bool is_positive(uint32_t phase, uint32_t threshold) { return (phase
 }  // namespace
 
 void Oscillators::use(const Gait& gait) {
+  const uint32_t body = phase(0);
   const uint32_t head = phase(1);
   const uint32_t tail = phase(2);
   gait_ = gait;
-  place(body_, head, tail);
+  place(body, head, tail);
 }
 
 void Oscillators::place(uint32_t body, uint32_t head, uint32_t tail) {
-  body_ = body;
+  body_ = body + gait_.increment / 2;
   head_error_ = head - body - gait_.psi12;
   tail_error_ = tail - body - gait_.psi13;
   last_.body = kNoLast;
+  fraction_ = 0;
 }
 
 void Oscillators::settle() {
-  body_ = 0;
+  body_ = gait_.increment / 2;
   head_error_ = kHalfStep;
   tail_error_ = kHalfStep;
   last_.body = kNoLast;
 }
 
 uint32_t Oscillators::phase(uint8_t chamber) const {
-  if (chamber == 1) return body_ + gait_.psi12 + head_error_;
-  if (chamber == 2) return body_ + gait_.psi13 + tail_error_;
-  return body_;
+  const uint32_t body = body_ - gait_.increment / 2;
+  if (chamber == 1) return body + gait_.psi12 + head_error_;
+  if (chamber == 2) return body + gait_.psi13 + tail_error_;
+  return body;
 }
 
 BIFA_INLINE Oscillators::Pulls Oscillators::pulls(uint16_t head_error, uint16_t tail_error) {
@@ -75,9 +78,13 @@ BIFA_INLINE uint32_t Oscillators::couple() {
   uint32_t body = advance(now.body, last_.body);
   uint32_t head = advance(now.head, last_.head);
   last_ = now;
-  if (gait_.strong) {
-    body <<= 2;
-    head <<= 2;
+  for (int8_t n = gait_.doublings; n > 0; --n) {
+    body += body;
+    head += head;
+  }
+  for (int8_t n = gait_.doublings; n < 0; ++n) {
+    body = static_cast<uint32_t>(static_cast<int32_t>(body) >> 1);
+    head = static_cast<uint32_t>(static_cast<int32_t>(head) >> 1);
   }
   // The pulls add up to nothing, so the tail's is -(body + head), and the mean of the phases runs at exactly f.
   head_error_ += head - body;
@@ -86,7 +93,11 @@ BIFA_INLINE uint32_t Oscillators::couple() {
 }
 
 BIFA_FAST void Oscillators::step() {
+  const uint8_t fraction = fraction_ + gait_.increment_fraction;
+  const bool carry = fraction < fraction_;
+  fraction_ = fraction;
   body_ += gait_.increment + couple();
+  if (carry) ++body_;
   uint8_t outputs = 0;
   if (is_positive(body_, gait_.threshold[0])) outputs |= 1;
   if (is_positive(body_ + gait_.psi12 + head_error_, gait_.threshold[1])) outputs |= 2;

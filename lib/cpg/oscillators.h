@@ -10,6 +10,7 @@ namespace bifa {
 ///
 /// What is kept are the body's phase and how far head and tail are off the phases that they are to have towards it:
 /// only the sines of these are needed, and settled they rest. They carry kHalfStep, so that their upper half is rounded.
+/// The body's phase is kept half a millisecond ahead: an output holds for a millisecond and is decided for its middle.
 class Oscillators {
  public:
   /// Takes a new gait; the phases go on from where they are.
@@ -42,10 +43,11 @@ class Oscillators {
   uint32_t advance(int16_t pull, int16_t last) const;
   uint32_t couple();
 
-  uint32_t body_ = 0;
+  uint32_t body_ = 0;  ///< half a step ahead
   uint32_t head_error_ = kHalfStep;
   uint32_t tail_error_ = kHalfStep;
-  Pulls last_ = {0, 0};  ///< of the step before
+  Pulls last_ = {0, 0};   ///< of the step before
+  uint8_t fraction_ = 0;  ///< of body_, 1/256 of its unit
   uint8_t outputs_ = 0;
   Gait gait_ = {};
 };
