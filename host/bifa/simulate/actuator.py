@@ -91,8 +91,8 @@ def remember(plant, actuator, z, z_new, x_new, travel, h):
 
 
 @merged
-def read_pressure(plant, block, pressure, v, source):
-    """Pressure where the sensor sits; inside, p = (F - b v) / a (section III.A)."""
+def read_pressure(plant, block, pressure, x, v, source):
+    """Pressure where the sensor sits; inside, p = (F - b v) / a (section III.A), a that of the stroke."""
     q, active = plant.q, plant.active
-    inside = pressure - q[block + layout.DAMPING] * v / q[block + layout.AREA]
+    inside = pressure - q[block + layout.DAMPING] * v / area_at(plant, block, x)
     return chains.sensed(active, q, inside, source)

@@ -100,9 +100,11 @@ def start_effects(plant, rig, run):
 def pressures(plant, run):
     """What the sensors' places see, into `run.read`."""
     y, read, source = run.y, run.read, run.source
-    read[0] = read_pressure(plant, layout.BODY, y[P_BODY], y[V_HEAD] - y[V_TAIL], source[0])
+    stroke, opening = y[X_HEAD] - y[X_TAIL], y[V_HEAD] - y[V_TAIL]
+    read[0] = read_pressure(plant, layout.BODY, y[P_BODY], stroke, opening, source[0])
     for i in (1, 2):
-        read[i] = read_pressure(plant, layout.SMALL, y[P_BODY + 3 * i], y[V_SMALL_HEAD + 3 * (i - 1)], source[i])
+        x, v = y[X_HEAD + 2 + 3 * i], y[V_SMALL_HEAD + 3 * (i - 1)]
+        read[i] = read_pressure(plant, layout.SMALL, y[P_BODY + 3 * i], x, v, source[i])
 
 
 @merged
