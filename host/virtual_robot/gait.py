@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from virtual_robot.plant.plant import CHAMBERS
+
 
 @dataclass(frozen=True)
 class Gait:
@@ -19,12 +21,28 @@ class Gait:
     duty_head: float
     duty_tail: float
 
+    def _ahead_and_duty(self) -> list[tuple[float, float]]:
+        ahead = (0.0, self.psi12_deg / 360.0, self.psi13_deg / 360.0)
+        return list(zip(ahead, (self.duty_body, self.duty_head, self.duty_tail), strict=True))
+
+    def switches(self, duration_s: float) -> list[tuple[float, str, str]]:
+        """(time_s, chamber, "positive" | "vacuum") in the order of time; the body's phase is 0 at time 0."""
+        rows = []
+        for chamber, (ahead, duty) in zip(CHAMBERS, self._ahead_and_duty(), strict=True):
+            rows.append((0.0, chamber, "positive" if (ahead + 1e-12) % 1.0 >= duty else "vacuum"))
+            for cycle in range(int(duration_s / self.period_s) + 2):
+                rows += [
+                    ((cycle + turn - ahead) * self.period_s, chamber, state)
+                    for turn, state in ((duty, "positive"), (1.0, "vacuum"))
+                ]
+        return sorted((row for row in rows if 0.0 <= row[0] <= duration_s), key=lambda row: row[0])
+
     def commands(self, time_s: np.ndarray) -> np.ndarray:
-        """1 = positive, 0 = vacuum, shape (n, 3) for body, head, tail; the body's phase is 0 at time 0."""
-        ahead = np.array([0.0, self.psi12_deg, self.psi13_deg]) / 360.0
-        duty = np.array([self.duty_body, self.duty_head, self.duty_tail])
-        phase = np.mod(time_s[:, None] / self.period_s + ahead + 1e-9, 1.0)
-        return (phase >= duty).astype(int)
+        """1 = positive, 0 = vacuum, shape (n, 3) for body, head, tail, as a recorder at `time_s` sees them."""
+        seen = np.zeros((len(time_s), 3), int)
+        for time, chamber, state in self.switches(float(time_s[-1]) + 1.0):
+            seen[time_s >= time - 1e-9, CHAMBERS.index(chamber)] = state == "positive"
+        return seen
 
     def as_dict(self) -> dict[str, float]:
         return asdict(self)

@@ -127,10 +127,8 @@ def _walk(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> di
     time = np.arange(round(plan.cycles * plan.gait.period_s * _WALK_HZ) + 1) / _WALK_HZ
     commands = plan.gait.commands(time)
     plant.mount("locomotion")
-    # The controller switches on the grid of the samples, so the commands recorded are the whole truth.
-    changed = np.vstack([np.ones((1, 3), bool), np.diff(commands, axis=0) != 0])
-    for k, c in zip(*np.nonzero(changed), strict=True):
-        plant.connect(time[k], ("body", "head", "tail")[c], "positive" if commands[k, c] else "vacuum")
+    for switch in plan.gait.switches(float(time[-1])):
+        plant.connect(*switch)
     rows = plant.record(time)
     return {
         "time_s": time,

@@ -9,16 +9,13 @@ from virtual_robot.plant import NOMINAL, ParameterError, Plant, nominal_curves, 
 
 
 def walk(gait: Gait, cycles: int, parameters=NOMINAL, step_s: float | None = None) -> np.ndarray:
-    """Record at 100 Hz; the valves switch at the exact times of the gait."""
+    """Record at 100 Hz."""
     plant = Plant(parameters)
     plant.mount("locomotion")
     if step_s is not None:
         plant.set_step(step_s)
-    fine = np.arange(0.0, cycles * gait.period_s, 1e-3)
-    commands = gait.commands(fine)
-    changed = np.vstack([np.ones((1, 3), bool), np.diff(commands, axis=0) != 0])
-    for k, c in zip(*np.nonzero(changed), strict=True):
-        plant.connect(fine[k], ("body", "head", "tail")[c], "positive" if commands[k, c] else "vacuum")
+    for switch in gait.switches(cycles * gait.period_s):
+        plant.connect(*switch)
     return plant.record(np.arange(round(cycles * gait.period_s * 100) + 1) / 100)
 
 
@@ -67,12 +64,12 @@ def test_friction_holds_a_half_exactly_still():
 
 
 def test_anchoring_force_is_that_of_the_paper():
-    for pressure, force in ((8.5, 33.0), (0.0, 5.0)):  # "around 33 N" and "about 5 N" (section IV.B)
+    for pressure, force in ((8.5, 33.0), (0.0, 5.0)):
         plant = Plant(NOMINAL | {"supply_positive_psi": pressure})
         plant.mount("anchor_pull", "head", "positive" if pressure else "off")
         plant.move(0.0, 0.03, 0.02, there_and_back=False)
         pulled = plant.record(np.arange(3000) / 2000)["force_N"]
-        assert pulled.max() == pytest.approx(force, abs=0.5)
+        assert pulled.max() == pytest.approx(force, abs=0.1)
         assert pulled[-1] == pytest.approx(pulled.max() * NOMINAL["mu_k"] / NOMINAL["mu_s"], abs=0.1)
 
 

@@ -15,6 +15,7 @@ class ParameterError(VirtualRobotError, ValueError):
 NOMINAL: dict[str, float] = {
     "head_mass_kg": 0.175,
     "tail_mass_kg": 0.175,
+    "head_segment_mass_kg": 0.1,
     "body_damping_Ns_m": 130.0,
     "body_area_N_psi": 9.0,
     "body_alpha_n_per_s": 2.0,

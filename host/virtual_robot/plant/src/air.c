@@ -105,11 +105,12 @@ static double alpha_per_s(const Plant *plant, const double *y, int chamber, doub
   return bulged ? p->body_alpha_s_per_s : p->body_alpha_n_per_s;
 }
 
-// Share of the body's volume that a chamber takes up (one end's three actuators together).
+// Share of the body's volume that a chamber takes up: three actuators at an end of the robot, one on the stand.
 static double volume_share(const Plant *plant, int chamber) {
   if (chamber == BODY) return 1.0;
+  double count = plant->experiment == STEP_RESPONSE || plant->experiment == STATIC_LOADING ? 1.0 : SMALL_PER_END;
   const Spring *body = &plant->spring[0], *small = &plant->spring[1];
-  return SMALL_PER_END * plant->p.small_area_N_psi * (small->extended - small->contracted) /
+  return count * plant->p.small_area_N_psi * (small->extended - small->contracted) /
          (plant->p.body_area_N_psi * (body->extended - body->contracted));
 }
 
@@ -184,22 +185,6 @@ void air_derivative(const Plant *plant, double time, const double *y, double *dy
       dy[SENSED + chamber] = (sensed_psi(plant, time, y, chamber) - y[SENSED + chamber]) / p->sensor_lag_time_s;
     }
   }
-}
-
-// Where the pressure ends up if nothing changes any more, for a chamber at rest and contracted.
-double settled_psi(const Plant *plant, int chamber) {
-  const PlantParameters *p = &plant->p;
-  double source = unloaded_psi(plant, 0.0, plant->y, plant->source[chamber]);
-  double rate = alpha_per_s(plant, plant->y, chamber, source), low = fmin(source, 0), high = fmax(source, 0);
-  for (int i = 0; i < 60; i++) {
-    double middle = 0.5 * (low + high);
-    if (filling_psi_per_s(plant, rate, source, middle) > lost_psi_per_s(p, middle)) {
-      low = middle;
-    } else {
-      high = middle;
-    }
-  }
-  return 0.5 * (low + high);
 }
 
 // --- sensors ----------------------------------------------------------------------------------------------------

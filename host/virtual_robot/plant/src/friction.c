@@ -11,12 +11,14 @@ static double pipe_angle(const Plant *plant) {
   return (plant->p.inclination_deg + plant->p.inclination_angle_deg) * M_PI / 180.0;
 }
 
-static double mass_of(const PlantParameters *p, int end) { return end ? p->tail_mass_kg : p->head_mass_kg; }
+static double mass_of(const Plant *plant, int end) {
+  if (plant->experiment == ANCHOR_PULL) return plant->p.head_segment_mass_kg;
+  return end ? plant->p.tail_mass_kg : plant->p.head_mass_kg;
+}
 
 double normal_force(const Plant *plant, const double *y, int end) {
-  const PlantParameters *p = &plant->p;
   double angle = pipe_angle(plant);
-  double weight = mass_of(p, end) * GRAVITY * (angle == 0 ? 1.0 : cos(angle));
+  double weight = mass_of(plant, end) * GRAVITY * (angle == 0 ? 1.0 : cos(angle));
   return SMALL_PER_END * wall_force(plant, y, end) + weight;
 }
 
@@ -57,8 +59,7 @@ double kinetic_grip(const Plant *plant, const double *y, int end, double directi
 
 // Eq. (6) with the weight's part along the pipe.
 double pull_without_friction(const Plant *plant, const double *y, int end) {
-  const PlantParameters *p = &plant->p;
   double push = internal_force(plant, y, BODY);
   double angle = pipe_angle(plant);
-  return (end ? -push : push) - mass_of(p, end) * GRAVITY * (angle == 0 ? 0.0 : sin(angle));
+  return (end ? -push : push) - mass_of(plant, end) * GRAVITY * (angle == 0 ? 0.0 : sin(angle));
 }

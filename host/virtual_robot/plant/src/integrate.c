@@ -101,7 +101,11 @@ static void step(Plant *plant, double h) {
       h -= share * h;
     }
     if (first <= SLIDE_TAIL) {
+      // Both halves of a symmetric robot break away together, not one before the other.
+      bool together = first == SLIDE_HEAD && after[SLIDE_TAIL] < 0 && plant->slide[0] == STICK &&
+                      plant->slide[1] == STICK && fabs(before[SLIDE_TAIL] - before[SLIDE_HEAD]) < 1e-9;
       stop_or_break_away(plant, first);
+      if (together) plant->slide[1] = plant->slide[0] == STICK ? STICK : -plant->slide[0];
     } else {
       cut[first] = true;
     }
@@ -154,7 +158,6 @@ void integrate(Plant *plant, double duration) {
     }
     plant->time = until;
   }
-  plant->time = end;
-  switch_valves(plant);
+  plant->time = end;  // a valve that switches now is not seen yet
   follow_crosshead(plant);
 }

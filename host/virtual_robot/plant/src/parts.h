@@ -86,7 +86,6 @@ double reading_psi(const Plant *plant, double time, const double *y, int chamber
 double next_switching(const Plant *plant);
 void switch_valves(Plant *plant);
 void queue_switching(SwitchingQueue *queue, Switching item);
-double settled_psi(const Plant *plant, int chamber);
 
 // mechanics.c
 double crosshead_m(const Plant *plant, double time, double *rate);

@@ -6,7 +6,7 @@
 
 #include "parts.h"
 
-#define SETTLE_S 3.0
+#define SETTLE_S 10.0       // twenty times the chambers' time constant
 #define STEP_S 1e-4         // the small actuators' fastest rate is 2.4e3 1/s
 #define STATIC_STEP_S 2e-3  // only air moves by itself
 
@@ -39,6 +39,7 @@ void plant_landmarks(const Plant *plant, int small, double *contracted_m, double
   *extended_m = plant->spring[small].extended;
 }
 
+// Vented and still; then `start` is connected, and integrating shows where that leads.
 static void put_at_rest(Plant *plant, int start) {
   memset(plant->y, 0, sizeof plant->y);
   double *y = plant->y;
@@ -50,12 +51,7 @@ static void put_at_rest(Plant *plant, int start) {
     plant->source[chamber] = VENT;
     if (!chamber_in_use(plant, chamber)) continue;
     plant->source[chamber] = start;
-    y[PRESSURE + chamber] = settled_psi(plant, chamber);
-    y[LINE + chamber] = supply_psi(plant, 0, y, start);
     plant->play[chamber] = stroke_m(y, chamber, NULL);
-  }
-  for (int chamber = 0; chamber < CHAMBERS; chamber++) {
-    if (chamber_in_use(plant, chamber)) y[SENSED + chamber] = sensed_psi(plant, 0, y, chamber);
   }
 }
 

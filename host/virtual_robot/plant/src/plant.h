@@ -14,6 +14,7 @@ enum { LOCOMOTION = 0, STEP_RESPONSE, STATIC_LOADING, ANCHOR_PULL };  // what is
 typedef struct PlantParameters {
   // The paper's model, eqs. (1)-(8).
   double head_mass_kg, tail_mass_kg;
+  double head_segment_mass_kg;  // of the anchor pull: a head alone, without its half of the body
   double body_damping_Ns_m, body_area_N_psi, body_alpha_n_per_s, body_alpha_s_per_s;
   double small_mass_kg, small_damping_Ns_m, small_area_N_psi, small_alpha_n_per_s, small_alpha_s_per_s;
   double wall_offset_m, wall_stiffness_N_m, wall_damping_Ns_m;

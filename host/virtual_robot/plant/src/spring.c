@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The bistable spring as a table with a natural cubic spline through it, straight beyond its ends.
+// The bistable spring as a table with a cubic spline through it (parabolic run-out), straight beyond its ends.
 #include <math.h>
 #include <string.h>
 
@@ -39,24 +39,28 @@ void spring_make(Spring *spring, const double *force, int count, double first, d
   spring->first = first;
   spring->step = step;
   memcpy(spring->force, force, count * sizeof *force);
-  // Thomas algorithm for the second derivatives, zero at both ends.
+  // Thomas algorithm for the second derivatives; at the ends they equal their neighbours'.
   double upper[MAX_SPRING] = {0}, right[MAX_SPRING] = {0};
   for (int i = 1; i + 1 < count; i++) {
     double bend = 6.0 * (force[i + 1] - 2.0 * force[i] + force[i - 1]) / (step * step);
-    double pivot = 4.0 - upper[i - 1];
+    double diagonal = i == 1 || i == count - 2 ? 5.0 : 4.0;
+    double pivot = diagonal - upper[i - 1];
     upper[i] = 1.0 / pivot;
     right[i] = (bend - right[i - 1]) / pivot;
   }
-  memset(spring->curvature, 0, sizeof spring->curvature);
-  for (int i = count - 2; i > 0; i--) spring->curvature[i] = right[i] - upper[i] * spring->curvature[i + 1];
+  double *curvature = spring->curvature;
+  curvature[count - 1] = 0;
+  for (int i = count - 2; i > 0; i--) curvature[i] = right[i] - (i == count - 2 ? 0 : upper[i] * curvature[i + 1]);
+  curvature[0] = curvature[1];
+  curvature[count - 1] = curvature[count - 2];
   find_landmarks(spring);
 }
 
 static double end_slope(const Spring *spring, int upper_end) {
   int i = upper_end ? spring->count - 2 : 0;
   double chord = (spring->force[i + 1] - spring->force[i]) / spring->step;
-  double inner = spring->curvature[upper_end ? i : i + 1];
-  return chord + (upper_end ? 1.0 : -1.0) * spring->step * inner / 6.0;
+  double at_end = spring->curvature[upper_end ? i + 1 : i], inside = spring->curvature[upper_end ? i : i + 1];
+  return chord + (upper_end ? 1.0 : -1.0) * spring->step * (2.0 * at_end + inside) / 6.0;
 }
 
 double spring_force(const Spring *spring, double x) {
