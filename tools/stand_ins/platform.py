@@ -8,7 +8,16 @@ import filecmp
 import shutil
 from pathlib import Path
 
+from platformio import __version__
+from platformio.exception import UserSideException
+from platformio.package.manager.core import get_core_package_dir
 from platformio.platform.base import PlatformBase
+
+
+class OtherPlatformIO(UserSideException):
+    """Said at once; PlatformIO itself would try for a minute to download the SCons of its own version."""
+
+    MESSAGE = "the stand-ins were laid out for another PlatformIO than {0}; use .venv/bin/pio (or run `make setup`)"
 
 
 class StandInPlatform(PlatformBase):
@@ -17,6 +26,8 @@ class StandInPlatform(PlatformBase):
     def configure_project_packages(self, env, targets=None):
         """Copy the libraries kept beside the platforms into the environment's library folder."""
         super().configure_project_packages(env, targets)
+        if get_core_package_dir("tool-scons", auto_install=False) is None:
+            raise OtherPlatformIO(__version__)
         core_dir = Path(self.config.get("platformio", "core_dir"))
         destination = Path(self.config.get("platformio", "libdeps_dir")) / env
         for kept in sorted((core_dir / "stand_in_libraries" / self.name).iterdir()):

@@ -1,5 +1,6 @@
 """With the stand-ins, PlatformIO's plain commands need no network, also after a full clean."""
 
+import json
 import os
 import pty
 import shutil
@@ -70,12 +71,24 @@ def test_a_suite_passes_and_can_fail(small_project, environment):
     assert "Expected 3 Was 2" in failed.stdout + failed.stderr
 
 
-def test_an_upload_hands_the_image_and_the_port_to_avrdude(small_project, tmp_path):
-    core = small_project / ".platformio"
+def own_stand_ins(project: Path) -> Path:
+    """Give the small project stand-ins of its own, to be damaged."""
+    core = project / ".platformio"
     shared = core.resolve()
     core.unlink()
-    shutil.copytree(shared, core, symlinks=True)
-    avrdude = core / "packages" / "tool-avrdude" / "bin" / "avrdude"
+    return shutil.copytree(shared, core, symlinks=True)
+
+
+def test_another_platformio_is_told_so_at_once(small_project):
+    label = own_stand_ins(small_project) / "packages" / "tool-scons" / ".piopm"
+    label.write_text(json.dumps(json.loads(label.read_text()) | {"version": "4.1.0"}))
+    done = pio(small_project, "run", "-e", "uno")
+    assert done.returncode == 1
+    assert "OtherPlatformIO: the stand-ins were laid out for another PlatformIO" in done.stderr
+
+
+def test_an_upload_hands_the_image_and_the_port_to_avrdude(small_project, tmp_path):
+    avrdude = own_stand_ins(small_project) / "packages" / "tool-avrdude" / "bin" / "avrdude"
     avrdude.unlink()
     avrdude.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/call\n')
     avrdude.chmod(0o755)
