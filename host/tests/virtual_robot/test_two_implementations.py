@@ -1,0 +1,91 @@
+"""The host's simulator and the virtual robot's plant share no code and agree on every effect of the contract.
+
+The one is linearly implicit with a polynomial spring, the other explicit with event location and a spline; so what
+they agree on is the equations. Given the true parameters, the simulator must predict the plant's noiseless records
+to a fraction of the sensors' noise.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bifa import robot, simulate
+from bifa.robot.gait import Gait
+from bifa.robot.stiffness import StiffnessCurve
+from virtual_robot.effects import EFFECTS, LIBRARY, plant_parameters
+from virtual_robot.gait import BASELINE, EASY
+from virtual_robot.instruments.sensors import Noise
+from virtual_robot.plant import NOMINAL, Curve, nominal_curves
+from virtual_robot.trials import Lab, Plan
+
+NOISE = {"force_N": 0.15, "displacement": 0.1, "pressure": 0.06}
+PLANS = (
+    Plan("static_loading", "static", "body", 4.0, 0.008),
+    Plan("step_response", "step", "body", 8.5),
+    Plan("step_response", "step", "head", 8.5),
+    Plan("anchor_pull", "anchor", "head", 8.5, 0.020),
+    Plan("locomotion", "baseline", gait=BASELINE, cycles=2),
+    Plan("locomotion", "easy", gait=EASY, cycles=2),
+)
+
+
+class Nothing:
+    """A random generator without chance: no wobble, phases of 0."""
+
+    def standard_normal(self, shape=()):
+        return np.zeros(shape)
+
+    def uniform(self, *_):
+        return 0.0
+
+
+def polynomial(curve: Curve) -> StiffnessCurve:
+    z = np.linspace(-1.0, 1.0, len(curve.force_N))
+    fitted = np.polynomial.Polynomial.fit(z, curve.force_N, 15, domain=[-1, 1], window=[-1, 1])
+    return StiffnessCurve(tuple(fitted.coef), curve.displacement_m[0], curve.displacement_m[-1])
+
+
+@pytest.fixture(scope="module")
+def model():
+    body, small = map(polynomial, nominal_curves())
+    nominal = replace(robot.nominal(), body_stiffness=body, small_stiffness=small)
+    return nominal.with_values({name: value for name, value in NOMINAL.items() if name in nominal.parameters})
+
+
+def predicted(model, plan: Plan, seen: dict) -> simulate.Record:
+    time_s = seen["time_s"]
+    match plan.experiment:
+        case "static_loading":
+            return simulate.static_loading(model, plan.actuator, time_s, seen["displacement_mm"], plan.pressure_psi)
+        case "step_response":
+            command = seen["command"].astype(float)
+            return simulate.step_response(model, plan.actuator, time_s, command, plan.pressure_psi)
+        case "anchor_pull":
+            return simulate.anchor_pull(model, time_s, plan.rate_m_s * 1e3, plan.pressure_psi)
+        case _:
+            return simulate.walk(model, Gait(**plan.gait.as_dict()), time_s=time_s, tolerance_m=1e-7)
+
+
+@pytest.mark.parametrize("effect", ["none", *LIBRARY])
+def test_agreement_to_a_fraction_of_the_noise(model, effect, monkeypatch):
+    monkeypatch.setattr("virtual_robot.trials.converted_psi", lambda psi, *_: psi)
+    effects = {} if effect == "none" else {effect: EFFECTS[effect].defaults()}
+    lab = Lab(NOMINAL | plant_parameters(effects), noise=Noise(0, 0, 0, 0))
+    right = model.with_effects(effects)
+    for plan in PLANS:
+        seen = lab.run(plan, 0.0, Nothing())
+        record = predicted(right, plan, seen)
+        for channel, values in seen.items():
+            kind = channel if channel in NOISE else channel.split("_")[0]
+            if kind in NOISE:
+                error = np.sqrt(np.mean((values - record[channel]) ** 2)) / NOISE[kind]
+                assert error < 0.5, (plan.name, channel)
+
+
+def test_the_wrong_effect_does_not_agree(model):
+    """The comparison above can fail: without its effect the simulator misses the record by far."""
+    lab = Lab(NOMINAL | plant_parameters({"hysteresis": {}}), noise=Noise(0, 0, 0, 0))
+    seen = lab.run(PLANS[0], 0.0, Nothing())
+    miss = seen["force_N"] - predicted(model, PLANS[0], seen)["force_N"]
+    assert np.sqrt(np.mean(miss**2)) / NOISE["force_N"] > 10
