@@ -1,16 +1,20 @@
 """Run the Unity suites of one PlatformIO environment, and fail where PlatformIO would not notice.
 
 PlatformIO calls a suite that printed no result "skipped" and is content; here each suite must pass at least one
-test, and the suite must have come to its end.
+test. It waits for ever for a chip that hangs or restarts again and again; here there is a limit.
 """
 
+import contextlib
 import json
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parent.parent
 PIO = Path(sys.executable).with_name("pio")
+LIMIT_S = 1200
 
 
 def main(environment: str) -> int:
@@ -18,13 +22,27 @@ def main(environment: str) -> int:
     report = PROJECT / "build" / f"unity-{environment}.json"
     report.parent.mkdir(exist_ok=True)
     report.unlink(missing_ok=True)
-    done = subprocess.run([PIO, "test", "-e", environment, "--json-output-path", report], cwd=PROJECT)
-    if done.returncode:
+    try:
+        if run_limited([PIO, "test", "-e", environment, "--json-output-path", report], LIMIT_S):
+            return 1
+    except subprocess.TimeoutExpired:
+        print(f"error: the suites in {environment} did not end within {LIMIT_S} s; the last one hangs", file=sys.stderr)
         return 1
     complaints = unproven(json.loads(report.read_text()), environment)
     for complaint in complaints:
         print(f"error: {complaint}", file=sys.stderr)
     return 1 if complaints else 0
+
+
+def run_limited(command: list, limit_s: float) -> int:
+    """Run `command`; return its status. On TimeoutExpired or an interrupt no process of it is left behind."""
+    with subprocess.Popen(command, cwd=PROJECT, start_new_session=True) as process:
+        try:
+            return process.wait(limit_s)
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
 
 
 def unproven(report: dict, environment: str) -> list[str]:

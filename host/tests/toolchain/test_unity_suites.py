@@ -1,6 +1,11 @@
 """A Unity suite that printed nothing must not count as passed."""
 
-from unity_suites import unproven
+import os
+import select
+import subprocess
+
+import pytest
+from unity_suites import run_limited, unproven
 
 
 def report(*suites):
@@ -27,3 +32,21 @@ def test_no_suite_at_all_is_an_error():
     assert unproven(report(("uno", "test_cpg", "SKIPPED", None)), "native") == [
         "no suite was run in environment native"
     ]
+
+
+def test_a_hanging_chip_is_stopped_with_all_its_processes(tmp_path):
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    reader = os.open(fifo, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        with pytest.raises(subprocess.TimeoutExpired):
+            run_limited(["sh", "-c", f"sh -c 'echo started; exec sleep 600' > {fifo} & wait"], limit_s=1.0)
+        assert os.read(reader, 100) == b"started\n"
+        [closed], _, _ = select.select([reader], [], [], 60)
+        assert os.read(closed, 100) == b"", "the grandchild still holds its output open"
+    finally:
+        os.close(reader)
+
+
+def test_the_status_of_platformio_is_passed_on():
+    assert run_limited(["sh", "-c", "exit 3"], limit_s=60) == 3
