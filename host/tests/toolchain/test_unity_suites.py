@@ -40,7 +40,7 @@ def test_a_hanging_chip_is_stopped_with_all_its_processes(tmp_path):
     reader = os.open(fifo, os.O_RDONLY | os.O_NONBLOCK)
     try:
         with pytest.raises(subprocess.TimeoutExpired):
-            run_limited(["sh", "-c", f"sh -c 'echo started; exec sleep 600' > {fifo} & wait"], limit_s=1.0)
+            run_limited(["sh", "-c", f"sh -c 'echo started; exec sleep 600' > {fifo} & wait"], limit_s=5.0)
         assert os.read(reader, 100) == b"started\n"
         [closed], _, _ = select.select([reader], [], [], 60)
         assert os.read(closed, 100) == b"", "the grandchild still holds its output open"
