@@ -1,9 +1,9 @@
 """The stiffness curve while it is being fitted: the static fit plus whitened changes of its shape.
 
-In the monomials of a model file, or in Chebyshev's, the coefficients of K are hopelessly correlated. `StiffnessFit.shapes`
-gives directions in which the static data leave the curve uncertain by one standard deviation each: the coordinates
-`body_shape_01` ... (the least certain one first, mostly the continuation beyond the static range). Where the actuator
-never moves by itself, the continuation is left out.
+In the monomials of a model file, or in Chebyshev's, the coefficients of K are hopelessly correlated.
+`StiffnessFit.shapes` gives directions in which the static data leave the curve uncertain by one standard deviation
+each: the coordinates `body_shape_01` ... (the least certain one first, mostly the continuation beyond the static
+range). Where the actuator never moves by itself, the continuation is left out.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from bifa.robot.stiffness import StiffnessCurve
 from .stiffness import StiffnessFit
 
 _WIDEST = 60.0  # standard deviations that a shape may move
+_SCALE = 150.0  # derivatives step by 0.3 to 3 standard deviations: well above the integrator's own error
 _FELT_N = 0.01  # a shape that changes K by less does not change a walk that one could measure
 
 
 @dataclass(frozen=True)
 class FittedCurve:
-    """`prefix` names the actuator's parameters: "body" or "small". `moves`: there are trials in which the actuator moves
-    by itself, and so reaches beyond the static range."""
+    """`prefix` names the actuator's parameters: "body" or "small". `moves`: there are trials in which the actuator
+    moves by itself, and so reaches beyond the static range."""
 
     prefix: str
     fit: StiffnessFit
@@ -44,7 +45,7 @@ class FittedCurve:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         source = "one standard deviation of the static fit each"
-        return tuple(Parameter(n, "sd", 0.0, -_WIDEST, _WIDEST, scale=1.0, source=source) for n in self.names)
+        return tuple(Parameter(n, "sd", 0.0, -_WIDEST, _WIDEST, scale=_SCALE, source=source) for n in self.names)
 
     @cached_property
     def felt(self) -> frozenset[str]:

@@ -13,7 +13,7 @@ from bifa.identify.system import Theta
 from bifa.simulate import Plant, Timeline
 
 from .motion import imposed_motion
-from .switches import step_timeline, walk_timeline
+from .switches import elapsed_s, step_timeline, walk_timeline
 
 STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
 _MM = 1e3
@@ -141,11 +141,11 @@ def inputs_of(trial: Trial) -> Inputs:
 
 def _static(trial: Trial) -> StaticInputs:
     x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
-    return StaticInputs(trial.actuator, trial.time_s - trial.time_s[0], x, direction, trial.pressure_psi)
+    return StaticInputs(trial.actuator, elapsed_s(trial), x, direction, trial.pressure_psi)
 
 
 def _step(trial: Trial) -> StepInputs:
-    return StepInputs(trial.actuator, trial.time_s - trial.time_s[0], step_timeline(trial), trial.pressure_psi)
+    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), trial.pressure_psi)
 
 
 def _pull(trial: Trial) -> PullInputs:
@@ -153,7 +153,7 @@ def _pull(trial: Trial) -> PullInputs:
     backward = trial.extra.get("direction") == "backward"
     pulled_mm = np.abs(trial.columns["displacement_mm"])
     return PullInputs(
-        pulled_s=_pulled_time(trial.time_s - trial.time_s[0], pulled_mm, rate),
+        pulled_s=_pulled_time(elapsed_s(trial), pulled_mm, rate),
         rate_mm_s=-rate if backward else rate,
         pressure_psi=trial.pressure_psi,
         load_cell_N_m=float(trial.extra.get("load_cell_N_m", simulate.records.LOAD_CELL_N_M)),
@@ -175,7 +175,7 @@ def _walk(trial: Trial) -> WalkInputs:
     pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
     displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
     return WalkInputs(
-        time_s=trial.time_s - trial.time_s[0],
+        time_s=elapsed_s(trial),
         commands=walk_timeline(trial),
         inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
         positive_psi=trial.pressure_psi,

@@ -36,8 +36,8 @@ class StiffnessFit:
     lower_m, upper_m: where the polynomial holds; beyond them the model continues in a straight line.
     covered_m: the displacements that the testing machine covered.
     coefficients: Chebyshev coefficients in z [N], shape (16,).
-    information: the inverse of their covariance [1/N^2], shape (16, 16); `static` is the part of it that stems from static
-        loading, the rest from the broad prior on the continuation and from equilibria.
+    information: the inverse of their covariance [1/N^2], shape (16, 16); `static` is the part of it that stems from
+        static loading, the rest from the broad prior on the continuation and from equilibria.
     residual_N: RMS of the data about the curve, hysteresis included.
     """
 

@@ -20,9 +20,16 @@ _ROUND_S = 0.05  # scripted steps begin at multiples of this
 _SPARE_S = 1e-6  # for times that fall on a sample
 
 
+def elapsed_s(trial: Trial) -> np.ndarray:
+    """Time since the trial began: its own time axis if that begins at 0, give or take a sample, else the time since the
+    first sample."""
+    begin_s, sample_s = trial.time_s[0], np.median(np.diff(trial.time_s))
+    return trial.time_s if 0.0 <= begin_s < 1.5 * sample_s else trial.time_s - begin_s
+
+
 def step_timeline(trial: Trial) -> Timeline:
-    """Of a step response, as chamber 0; times from the trial's first sample on."""
-    time_s = trial.time_s - trial.time_s[0]
+    """Of a step response, as chamber 0; times as `elapsed_s` gives them."""
+    time_s = elapsed_s(trial)
     state = (trial.columns["command"] > 0.5).astype(int)
     at = np.flatnonzero(np.diff(state)) + 1
     noted = trial.extra.get("switch_time_s")
@@ -36,8 +43,8 @@ def step_timeline(trial: Trial) -> Timeline:
 
 
 def walk_timeline(trial: Trial) -> Timeline:
-    """Of a walk; times from the trial's first sample on."""
-    time_s = trial.time_s - trial.time_s[0]
+    """Of a walk; times as `elapsed_s` gives them."""
+    time_s = elapsed_s(trial)
     commands = recorded_commands(trial.columns)
     recorded = of_samples(time_s, commands)
     noted = trial.extra.get("switch_time_s")

@@ -1,0 +1,73 @@
+"""What an identification found, as tables for the terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+
+from bifa.identify.uncertainty import effective_samples
+
+from .identification import Identification
+
+_CORRELATED = 0.9
+
+
+def print_report(console: Console, found: Identification) -> None:
+    """Parameters with their intervals, correlations, what is open, errors against the noise floor."""
+    console.print(_parameters(found))
+    for line in remarks(found):
+        console.print(line)
+    console.print(_errors(found))
+
+
+def _parameters(found: Identification) -> Table:
+    table = Table(title="Parameters (90 % intervals)")
+    for column in ("parameter", "value", "interval", "unit", "remark"):
+        table.add_column(column, justify="right" if column in ("value", "interval") else "left")
+    estimates = {e.name: e for e in found.uncertainty.estimates}
+    for name, parameter in found.model.parameters.items():
+        interval = found.intervals.get(name)
+        if interval is None:
+            remark = "known" if name in found.system.dataset.known else "not determined: see below"
+            table.add_row(name, f"{parameter.value:.5g}", "", parameter.unit, remark)
+            continue
+        estimate = estimates[name]
+        remark = "AT ITS BOUND" if estimate.at_bound else ""
+        if estimate.implausible:
+            low, high = parameter.plausible
+            remark = f"{remark} implausible (expected {low:g} to {high:g})".strip()
+        width = f"{interval.lower:.5g} to {interval.upper:.5g}"
+        table.add_row(name, f"{interval.value:.5g}", width, parameter.unit, remark)
+    return table
+
+
+def remarks(found: Identification) -> list[str]:
+    """Sentences on the curves, correlations, and what the data leave open."""
+    lines = []
+    for actuator, static in found.statics.items():
+        curve = static.stiffness
+        lines.append(
+            f"Stiffness of the {actuator} actuator: unstable point at {curve.unstable_m() * 1e3:.2f} mm, hysteresis "
+            f"+-{abs(static.hysteresis_N):.2f} N, static residual {curve.residual_N:.2f} N RMS."
+        )
+    named = set(found.system.fitted)
+    for first, second, r in found.uncertainty.correlations(_CORRELATED):
+        if first in named and second in named:
+            lines.append(f"{first} and {second} are known together rather than apart (correlation {r:+.2f}).")
+    for missing in found.open:
+        value = "" if missing.value != missing.value else f"; {missing.value:.4g} stands in"
+        lines.append(f"Not determined by this data: {missing.name}{value}. What gives it: {missing.needs}.")
+    if not found.fit.solution.converged:
+        lines.append("The joint refinement had not converged when it ended: take the intervals with care.")
+    return lines
+
+
+def _errors(found: Identification) -> Table:
+    table = Table(title=f"Error (RMS; {effective_samples(found.fit):.0f} independent samples)")
+    for column in ("experiment", "channel", "in units of the noise", "noise floor", "floor from"):
+        table.add_column(column, justify="left" if column in ("experiment", "channel", "floor from") else "right")
+    for (experiment, channel), error in found.error.items():
+        noise = found.fit.problem.floor.channels[experiment, channel]
+        origin = f"{noise.repeats} pairs of repeats" if noise.repeats else "the record's own fast noise"
+        table.add_row(experiment, channel, f"{error:.2f}", f"{noise.sd:.3g}", origin)
+    return table

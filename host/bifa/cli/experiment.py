@@ -1,0 +1,140 @@
+"""`bifa experiment`: the paper's characterisation experiments on a rig, written as a data set."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = """Examples:  bifa experiment all --port virtual --out out/bench   |
+bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
+bifa experiment locomotion --inclination 10 --port virtual --out out/uphill   |
+bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 8.5 --out out/pull"""
+
+
+class Experiment(StrEnum):
+    """What can be run."""
+
+    STATIC_LOADING = "static_loading"
+    STEP_RESPONSE = "step_response"
+    ANCHOR_PULL = "anchor_pull"
+    LOCOMOTION = "locomotion"
+    ALL = "all"
+
+
+class Actuator(StrEnum):
+    """Which actuator."""
+
+    LARGE = "large"
+    SMALL = "small"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EPILOG)(experiment)
+
+
+def experiment(
+    name: Annotated[Experiment, typer.Argument(help="Which experiment; `all` is the paper's section IV, and walks.")],
+    out: Annotated[Path, typer.Option(help="Folder of the data set, new, or of an interrupted session.")],
+    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+    actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
+    pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
+    rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed, mm/s.")] = None,
+    gait: Annotated[list[Path] | None, typer.Option(help="Gait file to walk; otherwise two gaits.")] = None,
+    cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk.")] = 5,
+    inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
+    repeats: Annotated[int, typer.Option(min=1, help="How often each condition is run.")] = 3,
+    quick: Annotated[bool, typer.Option(help="Fewer conditions, faster, twice: to try things out.")] = False,
+    profile: Annotated[str | None, typer.Option(help="Of a virtual rig: ideal or realistic.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of a virtual rig: its noise.")] = None,
+    instrument: Annotated[Path | None, typer.Option(help="CSV of your own instrument, instead of a rig's.")] = None,
+    telemetry: Annotated[Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).")] = None,
+) -> None:
+    """Run a characterisation experiment and write what it measured as a data set.
+
+    Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments have
+    clocks of their own and are lined up with the Uno's by its sampling strobe (D10); how well is noted with each
+    trial. An interrupted session goes on where it was when the command is given again. Ctrl-C leaves the valves off.
+    """
+    from rich.console import Console
+
+    from bifa.characterisation import plan
+
+    console = Console()
+    gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK]
+    trials = plan.session(
+        plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
+        actuators=(actuator.value,) if actuator else plan.ACTUATORS,
+        repeats=repeats,
+        pressures_psi=pressure or None,
+        rate_mm_s=rate,
+        gaits=gaits,
+        cycles=cycles,
+        settings={"inclination_deg": inclination} if inclination else None,
+        quick=quick,
+    )
+    if instrument is not None:
+        _import(console, instrument, telemetry, trials[0], out)
+        return
+    options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
+    _run(console, port, options, out, trials, name.value)
+
+
+def _load(path: Path):
+    from bifa.robot.gait import load_gait
+
+    return load_gait(path)
+
+
+def _run(console, port, options, out, trials, name) -> None:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from bifa.characterisation.session import provenance, run_session
+    from bifa.rig import open_rig
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    errors = []
+    with open_rig(port, **options) as rig, Progress(*columns, console=console) as progress:
+        task = progress.add_task(name, total=len(trials))
+
+        def show(event) -> None:
+            progress.update(task, description=event.planned.file, completed=event.number - 1 + event.share)
+            if event.clock_error_s is not None:
+                errors.append(event.clock_error_s)
+
+        dataset = run_session(
+            rig,
+            out,
+            trials,
+            name=f"{name} on the bench",
+            known={},
+            provenance=provenance(port, options),
+            on_event=show,
+        )
+    console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them recorded now.")
+    if errors:
+        console.print(
+            f"Instruments lined up with the Uno's clock to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
+        )
+    console.print(f"Look at it with: bifa check {out}   Fit the model with: bifa fit {out} --out model.toml")
+
+
+def _import(console, instrument, telemetry, planned, out) -> None:
+    from bifa.characterisation.instrument_csv import import_trial
+
+    if telemetry is None:
+        raise typer.BadParameter(
+            "--instrument needs --telemetry: the Uno's record of the same time, from `bifa record`"
+        )
+    dataset, clock = import_trial(instrument, telemetry, planned, out)
+    trial = dataset.trials[-1]
+    console.print(
+        f"{out}: {trial.file}, {len(trial.time_s)} samples; lined up over {clock.edges} sync edges to "
+        f"{1e3 * clock.rms_s:.2f} ms RMS, drift {1e6 * (clock.rate - 1):+.0f} ppm."
+    )
