@@ -55,6 +55,7 @@ void board::on_round(const bifa::RawRound& round) { controller.converted_in_inte
 
 void setup() {
   TIMSK0 = 0;
+  TCCR0B = TCCR2B = 0;  // Arduino starts them for PWM, which nothing here uses
   pins.begin();
   uart.begin();
   const bifa::StartCause cause = board::start_cause();

@@ -13,11 +13,18 @@ const uint32_t kTimeout_us = 2000;  // a transfer takes 0.1 ms
 Adafruit_MCP4725 dac;
 bool begun = false;
 
-// Arduino's clock runs only while Wire needs it for its time-outs: its thousand interrupts a second cost sleep.
+// Arduino's clock (timer 0 at F_CPU / 64) runs only while Wire needs it for its time-outs: its thousand interrupts a
+// second cost sleep.
 class ArduinoClock {
  public:
-  ArduinoClock() { TIMSK0 |= 1 << TOIE0; }
-  ~ArduinoClock() { TIMSK0 &= ~(1 << TOIE0); }
+  ArduinoClock() {
+    TCCR0B = 1 << CS01 | 1 << CS00;
+    TIMSK0 |= 1 << TOIE0;
+  }
+  ~ArduinoClock() {
+    TIMSK0 &= ~(1 << TOIE0);
+    TCCR0B = 0;
+  }
 };
 
 }  // namespace
