@@ -1,0 +1,98 @@
+"""`bifa simulate`: walk a model with a gait; or the paper's figures beside the model's."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Offer the command `simulate`."""
+
+    @app.command(
+        epilog="Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --plot walk.png"
+        "   |   bifa simulate --inclination 90 --cycles 20   |   bifa simulate --paper"
+    )
+    def simulate(
+        model: Annotated[Path | None, typer.Option(help="Model file; the nominal model if left out.")] = None,
+        gait: Annotated[Path | None, typer.Option(help="Gait file; the paper's baseline if left out.")] = None,
+        cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = 10,
+        inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
+        plot: Annotated[Path | None, typer.Option(help="Picture of commands, pressures, displacement.")] = None,
+        csv: Annotated[Path | None, typer.Option(help="All channels at 100 Hz, as a data set's locomotion.")] = None,
+        paper: Annotated[bool, typer.Option("--paper", help="Table: the paper's figures beside the model's.")] = False,
+    ) -> None:
+        """Simulate a walk and say how far each cycle carried the robot.
+
+        The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
+        """
+        from rich.console import Console
+
+        from bifa import robot
+
+        console = Console()
+        chosen = robot.load_model(model) if model else robot.nominal()
+        steps = robot.load_gait(gait) if gait else robot.BASELINE
+        if paper:
+            _print_paper(console, chosen)
+            return
+        with console.status("simulating"):
+            from bifa.simulate import gait_rows, speeds, walk
+
+            record = walk(chosen, steps, cycles, inclination_deg=inclination)
+            progress = speeds(chosen, gait_rows([steps]), cycles, 1e-6, inclination_deg=inclination)
+        _print_walk(console, chosen, steps, progress)
+        if csv:
+            _write_csv(csv, record.columns)
+            console.print(f"channels: {csv}", highlight=False)
+        if plot:
+            from bifa.report.walks import Walk, draw_walks
+
+            title = f"{chosen.name}, {float(progress.speed_mm_s[0]):.1f} mm/s"
+            draw_walks([Walk(title, steps.period_s, record.columns)], plot, cycles)
+            console.print(f"picture: {plot}", highlight=False)
+
+
+def _print_walk(console, model, gait, progress) -> None:
+    from rich.table import Table
+
+    table = Table(title=f"{model.name}, period {gait.period_s:g} s", title_justify="left")
+    for heading in ("cycle", "advance [mm]", "slip [mm]", "speed [mm/s]"):
+        table.add_column(heading, justify="right")
+    for k, (advance, slip) in enumerate(zip(progress.advance_m[0], progress.slip_m[0], strict=True)):
+        table.add_row(str(k + 1), f"{1e3 * advance:.2f}", f"{1e3 * slip:.3f}", f"{1e3 * advance / gait.period_s:.2f}")
+    console.print(table)
+    console.print(f"speed of the last cycle: {progress.speed_mm_s[0]:.2f} mm/s", highlight=False)
+    if len(progress.advance_m[0]) >= 3 and progress.unsettled[0] > 0.01:
+        console.print(
+            f"not settled: the last three cycles differ by {progress.unsettled[0]:.0%}; try more --cycles",
+            highlight=False,
+        )
+
+
+def _print_paper(console, model) -> None:
+    from rich.table import Table
+
+    with console.status("simulating every experiment"):
+        from bifa.simulate.paper import compare
+
+        rows = compare(model)
+    table = Table(title=f"The paper and the model {model.name!r}", title_justify="left")
+    for heading in ("", "paper", "model", "fits", "remark"):
+        table.add_column(heading)
+    for row in rows:
+        table.add_row(row.what, row.paper, row.ours, "yes" if row.fits else "[red]no[/red]", row.remark)
+    console.print(table)
+
+
+def _write_csv(path: Path, columns) -> None:
+    import numpy as np
+
+    from bifa.simulate import SimulationError
+
+    try:
+        np.savetxt(
+            path, np.column_stack(list(columns.values())), "%.6g", delimiter=",", header=",".join(columns), comments=""
+        )
+    except OSError as error:
+        raise SimulationError(f"cannot write {path}: {error}") from None

@@ -1,0 +1,120 @@
+"""The paper's figures beside ours: everything that it reports in numbers and the model can say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.robot import BASELINE, Gait, Model
+from bifa.simulate.gaits import speed
+from bifa.simulate.records import anchor_pull, static_loading, step_response, walk
+from bifa.simulate.terrain import passed_at_m, terrain, tunnel
+
+# Near the nominal model's fastest gait (`bifa optimize` finds it), as that of the paper's Fig. 7 (b).
+FAST = Gait(2.515966106, 208.934381, 331.874322, 0.649065611, 0.442500311, 0.442500311)
+SLOW = Gait(6.0, 270.0, 90.0, 0.5, 0.5, 0.5)
+_PULL_S = np.arange(0.0, 2.0, 1e-3)
+_CYCLES = 14
+_FINE_M = 1e-7
+_TUNNEL_S = 120.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table. `fits`: our value is what the paper says, within its own precision."""
+
+    what: str
+    paper: str
+    ours: str
+    fits: bool
+    remark: str = ""
+
+
+def compare(model: Model) -> list[Row]:
+    """Every row for a model; takes about a second."""
+    return [*_speeds(model), *_forces(model), *_steps(model), *_tunnel(model)]
+
+
+def _speeds(model: Model) -> list[Row]:
+    baseline = float(speed(model, BASELINE, _CYCLES, _FINE_M).speed_mm_s)
+    fast = speed(model, FAST, _CYCLES, _FINE_M)
+    best = float(fast.speed_mm_s)
+    gain = best / baseline - 1.0
+    return [
+        _row("baseline gait, mm/s", 10.8, baseline, 0.1, "10.8 ± 0.1"),
+        _row("fastest gait, mm/s", 23.3, best, 0.2, "23.3 ± 0.1"),
+        _row("body duty of the fastest gait", 0.66, FAST.duty_body, 0.02, "0.66"),
+        Row("gain", "120 %", f"{gain:.0%}", abs(gain - 1.157) < 0.03, "23.3 over 10.8 is 116 %"),
+        Row("slip in a cycle, mm", "none", f"{1e3 * fast.slip_m[-1]:.3f}", bool(fast.slip_m[-1] < 1e-5)),
+    ]
+
+
+def _forces(model: Model) -> list[Row]:
+    pressure = model["supply_positive_psi"]
+    anchored = float(anchor_pull(model, _PULL_S, 20.0, pressure)["force_N"].max())
+    vented = float(anchor_pull(model, _PULL_S, 20.0, 0.0)["force_N"].max())
+    weight = 9.80665 * (model["head_mass_kg"] + model["tail_mass_kg"])
+    push = _push(model, pressure)
+    needed = pressure + (150.0 - push) / model["body_area_N_psi"]
+    return [
+        _row(f"anchor of one segment at {pressure:g} psi, N", 33.0, anchored, 1.0, "about 33"),
+        _row("anchor of one segment at 0 psi, N", 5.0, vented, 0.3, "about 5"),
+        _row("both anchors at 0 psi over the weight", 3.0, 2.0 * vented / weight, 0.3, "3"),
+        _row("push of the body at 0 psi, N", 40.0, _push(model, 0.0), 1.0, "about 40"),
+        Row(
+            f"push of the body at {pressure:g} psi, N",
+            "over 150",
+            f"{push:.0f}",
+            push >= 150.0,
+            "" if push >= 150.0 else f"150 N would need {needed:.1f} psi",
+        ),
+    ]
+
+
+def _push(model: Model, pressure_psi: float) -> float:
+    stroke = 1e3 * model.body_stiffness.stroke_m
+    time = np.arange(0.0, 10.0, 0.01)
+    record = static_loading(model, "large", time, np.linspace(0.0, stroke, time.size), pressure_psi)
+    return -float(record["force_N"].min())
+
+
+def _steps(model: Model) -> list[Row]:
+    record = step_response(model, "large")
+    x, time, going = record["displacement_mm"], record["time_s"], record["command"] == 1.0
+    stroke = 1e3 * model.body_stiffness.stroke_m
+    crossing = [time[going][np.argmax(x[going] > share * stroke)] for share in (0.2, 0.8)]
+    snap = float(crossing[1] - crossing[0])
+    with_loop = step_response(model.with_effects({"hysteresis": {}}), "large")["displacement_mm"]
+    offset = float(np.max(np.abs(with_loop - x)[[0, int(np.flatnonzero(going)[-1])]]))
+    return [
+        Row("travel between the stable states, mm", "Fig. 4", f"{stroke:.1f}", True, "the text gives no number"),
+        Row("snap-through, 20 to 80 % of the travel, s", "very fast", f"{snap:.2f}", snap < 0.3),
+        Row(
+            "offset of the model's ends, mm",
+            "about 2",
+            f"{offset:.1f}",
+            abs(offset - 2.0) < 0.5,
+            "with 4 N of hysteresis added: the steep ends of K let it move them no further",
+        ),
+    ]
+
+
+def _tunnel(model: Model) -> list[Row]:
+    obstacles = tunnel()
+    ground, end = terrain(obstacles), 1e3 * passed_at_m(obstacles)
+    rows = []
+    for name, gait, passes in (("fastest", FAST, False), ("6 s", SLOW, True)):
+        tail = walk(model, gait, int(_TUNNEL_S / gait.period_s), terrain=ground)["displacement_tail_mm"][-1]
+        through = bool(tail > end)
+        rows.append(
+            Row(
+                f"{name} gait through the tunnel", *("yes" if t else "no" for t in (passes, through)), through == passes
+            )
+        )
+    return rows
+
+
+def _row(what: str, paper: float, ours: float, precision: float, shown: str) -> Row:
+    digits = 2 if paper < 1.0 else 1
+    return Row(what, shown, f"{ours:.{digits}f}", abs(ours - paper) <= precision)
