@@ -43,13 +43,12 @@ enum class ParameterId : uint8_t {{
 }};
 const uint8_t kParameterCount = {len(table.parameters)};
 
-/// What is known of one parameter; lives in flash, read it with descriptor().
+/// What is known of one parameter; lives in flash, read it with the functions of parameters.h and flash_*().
 struct ParameterDescriptor {{
   char name[{longest}];
   char unit[{unit}];
   uint32_t minimum;
   uint32_t maximum;
-  uint32_t fallback;
   uint8_t decimals;
   uint8_t offset;
   uint8_t width;
@@ -76,7 +75,7 @@ const uint8_t kStorageFormat = {table.storage_format};
 def source(table: ParameterTable) -> str:
     helps = "\n".join(f"const char {constant(p.name)}Help[] BIFA_FLASH = {text(p.help)};" for p in table.parameters)
     rows = "\n".join(
-        f"    {{{text(p.name)}, {text(p.unit)}, {p.minimum}UL, {p.maximum}UL, {p.default}UL, {p.decimals}, "
+        f"    {{{text(p.name)}, {text(p.unit)}, {p.minimum}UL, {p.maximum}UL, {p.decimals}, "
         f"offsetof(ParameterSet, {p.field}), {WIRE_BYTES[p.wire]}, {p.since}, "
         f"reinterpret_cast<FlashText>({constant(p.name)}Help)}},"
         for p in table.parameters

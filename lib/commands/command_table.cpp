@@ -6,11 +6,11 @@ namespace bifa {
 
 namespace {
 const char kHelpUsage[] BIFA_FLASH = "help [NAME]";
-const char kHelpHelp[] BIFA_FLASH = "list the commands and parameters, or explain one";
+const char kHelpHelp[] BIFA_FLASH = "list everything, or explain one";
 const char kVersionUsage[] BIFA_FLASH = "version";
-const char kVersionHelp[] BIFA_FLASH = "firmware, protocol, table, and why the Uno last restarted";
+const char kVersionHelp[] BIFA_FLASH = "versions, and why the Uno last restarted";
 const char kStatusUsage[] BIFA_FLASH = "status";
-const char kStatusHelp[] BIFA_FLASH = "state, fault, pressures, valves and the counters of the link";
+const char kStatusHelp[] BIFA_FLASH = "state, fault, pressures, valves, link";
 const char kShowUsage[] BIFA_FLASH = "show [NAME]";
 const char kShowHelp[] BIFA_FLASH = "print one parameter or all";
 const char kSetUsage[] BIFA_FLASH = "set NAME VALUE";
@@ -26,9 +26,9 @@ const char kClearHelp[] BIFA_FLASH = "release a stop (!) or a fault whose cause 
 const char kStreamUsage[] BIFA_FLASH = "stream on|off";
 const char kStreamHelp[] BIFA_FLASH = "telemetry: one line (>) a sample";
 const char kPlotUsage[] BIFA_FLASH = "plot on|off";
-const char kPlotHelp[] BIFA_FLASH = "telemetry for the Arduino IDE's Serial Plotter";
+const char kPlotHelp[] BIFA_FLASH = "telemetry for the Serial Plotter";
 const char kSaveUsage[] BIFA_FLASH = "save [NAME]";
-const char kSaveHelp[] BIFA_FLASH = "keep the parameters in EEPROM; without a name they load at power-up";
+const char kSaveHelp[] BIFA_FLASH = "keep the parameters; without a name, for power-up";
 const char kLoadUsage[] BIFA_FLASH = "load PRESET";
 const char kLoadHelp[] BIFA_FLASH = "take the parameters of a preset";
 const char kPresetsUsage[] BIFA_FLASH = "presets";
@@ -36,9 +36,9 @@ const char kPresetsHelp[] BIFA_FLASH = "list the presets";
 const char kForgetUsage[] BIFA_FLASH = "forget PRESET";
 const char kForgetHelp[] BIFA_FLASH = "delete a preset from EEPROM";
 const char kDefaultsUsage[] BIFA_FLASH = "defaults confirm";
-const char kDefaultsHelp[] BIFA_FLASH = "erase presets and settings and load the baseline";
+const char kDefaultsHelp[] BIFA_FLASH = "erase all presets and settings";
 const char kZeroUsage[] BIFA_FLASH = "zero confirm|factory";
-const char kZeroHelp[] BIFA_FLASH = "take the present (vented) pressures as zero and keep that; or undo it";
+const char kZeroHelp[] BIFA_FLASH = "take the present pressures as zero; or undo that";
 const char kEchoUsage[] BIFA_FLASH = "echo on|off";
 const char kEchoHelp[] BIFA_FLASH = "repeat what you type (for a bare terminal)";
 }  // namespace
@@ -94,17 +94,17 @@ FlashText result_text(Result result) {
     case Result::kNoPreset:
       return BIFA_TEXT("no such preset; type presets");
     case Result::kName:
-      return BIFA_TEXT("a name is 1 to 12 of a-z 0-9 _ -, and not that of a factory preset");
+      return BIFA_TEXT("a name is 1 to 12 of a-z 0-9 _ -, not a factory preset's");
     case Result::kFull:
       return BIFA_TEXT("no room left; forget a preset first");
     case Result::kEeprom:
-      return BIFA_TEXT("the EEPROM did not keep what was written");
+      return BIFA_TEXT("the EEPROM failed");
     case Result::kBusy:
       return BIFA_TEXT("busy saving; try again");
     case Result::kTransaction:
-      return BIFA_TEXT("no begin, or an earlier field was refused");
+      return BIFA_TEXT("no begin, or a field was refused");
     case Result::kCheck:
-      return BIFA_TEXT("the set arrived differently from what was meant");
+      return BIFA_TEXT("the set arrived damaged");
     case Result::kFault:
       return BIFA_TEXT("its cause is still there; type status");
     case Result::kOrder:

@@ -6,7 +6,7 @@ namespace bifa {
 
 namespace {
 
-Result result_of(Verdict verdict) {
+__attribute__((noinline)) Result result_of(Verdict verdict) {
   switch (verdict) {
     case Verdict::kDone:
       return Result::kOk;

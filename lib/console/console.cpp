@@ -10,6 +10,8 @@ const char kDelete = 0x7F;
 const uint8_t kRoomForSample = 96;
 
 FlashText name_of(const CommandDescriptor& row) { return reinterpret_cast<FlashText>(row.name); }
+FlashText name_of(ParameterId id) { return reinterpret_cast<FlashText>(descriptor(id).name); }
+uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
 
 FlashText text_at(const FlashText& in_flash) {
   FlashText text;
@@ -50,14 +52,14 @@ void Console::feed(uint8_t byte) {
       return;
     }
     line_[length_++] = c;
-    if (echo_) out_.write(byte);
+    if (echo_) print(out_, c);
     return;
   }
   spoilt_ = true;
 }
 
 void Console::end_line() {
-  if (echo_) out_.write('\n');
+  if (echo_) print(out_, '\n');
   line_[length_] = '\0';
   length_ = 0;
   if (spoilt_) {
@@ -90,13 +92,7 @@ void Console::execute() {
 }
 
 bool Console::is(uint8_t word, FlashText text) const {
-  const char* expected = reinterpret_cast<const char*>(text);
-  const char* given = words_[word];
-  for (;; ++expected, ++given) {
-    const char c = static_cast<char>(flash_byte(expected));
-    if (c != *given) return false;
-    if (c == '\0') return true;
-  }
+  return flash_equal(words_[word], reinterpret_cast<const char*>(text));
 }
 
 void Console::dispatch(CommandId id) {
@@ -165,13 +161,13 @@ void Console::dispatch(CommandId id) {
 void Console::answer(Result result) {
   if (result != Result::kOk) print(out_, BIFA_TEXT("error "));
   print(out_, result_text(result));
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::answer_usage(CommandId id) {
   print(out_, BIFA_TEXT("error usage: "));
   print(out_, text_at(kCommandDescriptors[static_cast<uint8_t>(id)].usage));
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::finish_later(Result started) {
@@ -213,7 +209,7 @@ void Console::help() {
   }
   print(out_, BIFA_TEXT("[!  (at any time, no Enter) stop: all chambers vent until clear\n[parameters:"));
   for (const ParameterDescriptor& row : kParameterDescriptors) {
-    out_.write(' ');
+    print(out_, ' ');
     print(out_, reinterpret_cast<FlashText>(row.name));
   }
   print(out_, BIFA_TEXT("\n[try: set period_s 6, run, hold head positive, stop, help period_s\n"));
@@ -221,28 +217,24 @@ void Console::help() {
 }
 
 void Console::print_help(FlashText name, FlashText text) {
-  out_.write('[');
+  print(out_, '[');
   print(out_, name);
   print(out_, BIFA_TEXT("  "));
   print(out_, text);
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::help_on(const char* name) {
   ParameterId id;
   if (find_parameter(name, id)) {
-    const ParameterDescriptor row = descriptor(id);
-    out_.write('[');
-    print(out_, row.name);
-    print(out_, BIFA_TEXT("  "));
-    print(out_, row.help);
-    print(out_, BIFA_TEXT("\n[range "));
+    print_help(name_of(id), text_at(descriptor(id).help));
+    print(out_, BIFA_TEXT("[range "));
     print_range(id);
     print(out_, BIFA_TEXT(", default "));
-    print_decimal(out_, row.fallback, row.decimals);
+    print_decimal(out_, value_of(factory_preset(0), id), decimals_of(id));
     print(out_, BIFA_TEXT(", now "));
-    print_decimal(out_, value_of(commands_.wanted(), id), row.decimals);
-    out_.write('\n');
+    print_decimal(out_, value_of(commands_.wanted(), id), decimals_of(id));
+    print(out_, '\n');
     return answer(Result::kOk);
   }
   for (const CommandDescriptor& row : kCommandDescriptors) {
@@ -254,18 +246,18 @@ void Console::help_on(const char* name) {
 }
 
 void Console::print_range(ParameterId id) {
-  const ParameterDescriptor row = descriptor(id);
-  print_decimal(out_, row.minimum, row.decimals);
+  print_decimal(out_, minimum_of(id), decimals_of(id));
   print(out_, BIFA_TEXT(" to "));
-  print_decimal(out_, row.maximum, row.decimals);
-  if (row.unit[0] != '\0') out_.write(' ');
-  print(out_, row.unit);
+  print_decimal(out_, maximum_of(id), decimals_of(id));
+  const FlashText unit = reinterpret_cast<FlashText>(descriptor(id).unit);
+  if (flash_byte(unit) != 0) print(out_, ' ');
+  print(out_, unit);
 }
 
 void Console::version() {
   print(out_, BIFA_TEXT("[bifa "));
   for (uint8_t i = 0; i < sizeof kFirmwareVersion; ++i) {
-    if (i > 0) out_.write('.');
+    if (i > 0) print(out_, '.');
     print_number(out_, kFirmwareVersion[i]);
   }
   print(out_, BIFA_TEXT(", protocol "));
@@ -274,7 +266,7 @@ void Console::version() {
   print_number(out_, kTableHash);
   print(out_, BIFA_TEXT(", started by "));
   print(out_, word(kStartCauseWords, static_cast<uint8_t>(session_.cause())));
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::status() {
@@ -283,15 +275,15 @@ void Console::status() {
   print(out_, word(kStateWords, static_cast<uint8_t>(status.state)));
   if (status.scheduled) print(out_, BIFA_TEXT(", timed holds"));
   if (status.emergency_stop) print(out_, BIFA_TEXT(", emergency stop pressed"));
-  out_.write('\n');
+  print(out_, '\n');
   if (status.fault.fault != Fault::kNone) print_fault(status.fault);
   print(out_, BIFA_TEXT("[psi "));
   print_triple(status.pressure_mpsi);
   print(out_, BIFA_TEXT("\n[valves"));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    out_.write(' ');
+    print(out_, ' ');
     print(out_, word(kChamberWords, i));
-    out_.write(' ');
+    print(out_, ' ');
     // the two bits of a chamber, positive and vacuum, in the order of ChamberState
     const uint8_t bits = status.valves >> (2 * i) & 3;
     print(out_, word(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0));
@@ -304,14 +296,14 @@ void Console::status() {
   print_number(out_, counters_.bytes_lost);
   print(out_, BIFA_TEXT(", samples lost "));
   print_number(out_, status.samples_lost);
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::print_triple(const int16_t (&pressure_mpsi)[kChamberCount]) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    if (i > 0) out_.write(' ');
+    if (i > 0) print(out_, ' ');
     print(out_, word(kChamberWords, i));
-    out_.write(' ');
+    print(out_, ' ');
     print_signed(out_, pressure_mpsi[i], 3);
   }
 }
@@ -320,7 +312,7 @@ void Console::print_fault(const FaultReport& fault) {
   print(out_, BIFA_TEXT("[fault "));
   print(out_, word(kFaultWords, static_cast<uint8_t>(fault.fault)));
   if (fault.channel < kChamberCount) {
-    out_.write(' ');
+    print(out_, ' ');
     print(out_, word(kChamberWords, fault.channel));
   }
   print(out_, BIFA_TEXT(" value "));
@@ -333,16 +325,15 @@ void Console::print_fault(const FaultReport& fault) {
   print_triple(fault.lowest_mpsi);
   print(out_, BIFA_TEXT(" to "));
   print_triple(fault.highest_mpsi);
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::show_parameter(ParameterId id) {
-  const ParameterDescriptor row = descriptor(id);
-  out_.write('[');
-  print(out_, row.name);
-  out_.write(' ');
-  print_decimal(out_, value_of(commands_.wanted(), id), row.decimals);
-  out_.write('\n');
+  print(out_, '[');
+  print(out_, name_of(id));
+  print(out_, ' ');
+  print_decimal(out_, value_of(commands_.wanted(), id), decimals_of(id));
+  print(out_, '\n');
 }
 
 void Console::show() {
@@ -359,9 +350,8 @@ void Console::show() {
 void Console::set() {
   ParameterId id;
   if (!find_parameter(words_[1], id)) return answer(Result::kNoParameter);
-  const ParameterDescriptor row = descriptor(id);
   uint32_t value;
-  switch (parse_decimal(words_[2], row.decimals, row.minimum, row.maximum, value)) {
+  switch (parse_decimal(words_[2], decimals_of(id), minimum_of(id), maximum_of(id), value)) {
     case DecimalResult::kOk:
       return answer(commands_.set(id, value));
     case DecimalResult::kNotANumber:
@@ -371,10 +361,10 @@ void Console::set() {
       print(out_, BIFA_TEXT("error out of range; "));
       break;
   }
-  print(out_, row.name);
+  print(out_, name_of(id));
   print(out_, BIFA_TEXT(" is "));
   print_range(id);
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::hold() {
@@ -402,7 +392,7 @@ void Console::presets() {
   char name[kNameSize + 1];
   bool stored;
   for (uint8_t i = 0; commands_.preset_at(i, name, stored); ++i) {
-    out_.write('[');
+    print(out_, '[');
     print(out_, name);
     print(out_, stored ? BIFA_TEXT(" saved\n") : BIFA_TEXT(" factory\n"));
   }
@@ -418,35 +408,35 @@ void Console::sample(const Sample& sample) {
 }
 
 void Console::print_stream(const Sample& sample) {
-  out_.write('>');
+  print(out_, '>');
   print_number(out_, sample.sequence);
-  out_.write(',');
+  print(out_, ',');
   print_number(out_, sample.time_us);
-  out_.write(',');
+  print(out_, ',');
   print(out_, word(kStateWords, static_cast<uint8_t>(sample.state)));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    out_.write(',');
+    print(out_, ',');
     print_signed(out_, sample.pressure_mpsi[i], 3);
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    out_.write(',');
+    print(out_, ',');
     print(out_, word(kChamberStateWords, static_cast<uint8_t>(sample.command[i])));
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    out_.write(',');
+    print(out_, ',');
     print_number(out_, static_cast<uint32_t>(sample.phase[i]) * 360 >> 16);
   }
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 void Console::print_plot(const Sample& sample) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    if (i > 0) out_.write('\t');
+    if (i > 0) print(out_, '\t');
     print(out_, word(kChamberWords, i));
     print(out_, BIFA_TEXT("_psi:"));
     print_signed(out_, sample.pressure_mpsi[i], 3);
   }
-  out_.write('\n');
+  print(out_, '\n');
 }
 
 }  // namespace bifa

@@ -77,7 +77,7 @@ struct StreamMessage {
 } __attribute__((packed));
 static_assert(sizeof(StreamMessage) == 1, "no holes");
 
-/// keep the parameters in EEPROM; without a name they load at power-up.
+/// keep the parameters; without a name, for power-up.
 struct SaveMessage {
   char preset[12];
 } __attribute__((packed));
@@ -101,7 +101,7 @@ struct ForgetMessage {
 } __attribute__((packed));
 static_assert(sizeof(ForgetMessage) == 12, "no holes");
 
-/// take the present (vented) pressures as zero and keep that; or undo it.
+/// take the present pressures as zero; or undo that.
 struct ZeroMessage {
   uint8_t factory;
 } __attribute__((packed));

@@ -12,15 +12,15 @@ namespace bifa {
 /// Everything that can be set, as integers in wire units (see docs/protocol.md). Little-endian and without holes, so
 /// that its bytes are its form on the wire and in EEPROM.
 struct ParameterSet {
-  uint32_t period_us;  ///< period_s: time of one cycle of the gait (1/f in the paper)
-  uint32_t psi12_mdeg;  ///< psi12_deg: phase of the head ahead of the body (psi_12); 360 is the same as 0
-  uint32_t psi13_mdeg;  ///< psi13_deg: phase of the tail ahead of the body (psi_13); 360 is the same as 0
-  uint16_t duty_body_e4;  ///< duty_body: part of the cycle that the body spends at vacuum, contracting (d_1)
-  uint16_t duty_head_e4;  ///< duty_head: part of the cycle that the head spends at vacuum, letting go of the wall (d_2)
-  uint16_t duty_tail_e4;  ///< duty_tail: part of the cycle that the tail spends at vacuum, letting go of the wall (d_3)
-  uint16_t coupling_milli_per_s;  ///< coupling_per_s: how fast the three oscillators pull each other into their phases (alpha_phi)
+  uint32_t period_us;  ///< period_s: time of one cycle (1/f)
+  uint32_t psi12_mdeg;  ///< psi12_deg: phase of the head ahead of the body (psi_12)
+  uint32_t psi13_mdeg;  ///< psi13_deg: phase of the tail ahead of the body (psi_13)
+  uint16_t duty_body_e4;  ///< duty_body: part of the cycle at vacuum: contracting (d_1)
+  uint16_t duty_head_e4;  ///< duty_head: part of the cycle at vacuum: not gripping (d_2)
+  uint16_t duty_tail_e4;  ///< duty_tail: part of the cycle at vacuum: not gripping (d_3)
+  uint16_t coupling_milli_per_s;  ///< coupling_per_s: how fast the oscillators pull into their phases (alpha_phi)
   uint16_t pressure_mpsi;  ///< pressure_psi: set-point of the positive supply
-  uint16_t host_timeout_ms;  ///< host_timeout_s: vent when the computer has been silent for so long; 0 = never
+  uint16_t host_timeout_ms;  ///< host_timeout_s: vent after such a silence of the computer; 0 = never
 };
 static_assert(sizeof(ParameterSet) == 24, "a set has no holes");
 
@@ -37,13 +37,12 @@ enum class ParameterId : uint8_t {
 };
 const uint8_t kParameterCount = 9;
 
-/// What is known of one parameter; lives in flash, read it with descriptor().
+/// What is known of one parameter; lives in flash, read it with the functions of parameters.h and flash_*().
 struct ParameterDescriptor {
   char name[15];
   char unit[4];
   uint32_t minimum;
   uint32_t maximum;
-  uint32_t fallback;
   uint8_t decimals;
   uint8_t offset;
   uint8_t width;

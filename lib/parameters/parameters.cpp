@@ -2,33 +2,37 @@
 
 namespace bifa {
 
-ParameterDescriptor descriptor(ParameterId id) {
-  ParameterDescriptor row;
-  flash_copy(&row, &kParameterDescriptors[static_cast<uint8_t>(id)], sizeof row);
-  return row;
+namespace {
+
+uint32_t flash_long(const uint32_t& in_flash) {
+  uint32_t value;
+  flash_copy(&value, &in_flash, sizeof value);
+  return value;
 }
 
+}  // namespace
+
+uint32_t minimum_of(ParameterId id) { return flash_long(descriptor(id).minimum); }
+uint32_t maximum_of(ParameterId id) { return flash_long(descriptor(id).maximum); }
+
 uint32_t value_of(const ParameterSet& set, ParameterId id) {
-  const ParameterDescriptor row = descriptor(id);
   uint32_t value = 0;
-  memcpy(&value, reinterpret_cast<const uint8_t*>(&set) + row.offset, row.width);
+  memcpy(&value, reinterpret_cast<const uint8_t*>(&set) + flash_byte(&descriptor(id).offset),
+         flash_byte(&descriptor(id).width));
   return value;
 }
 
 void put_value(ParameterSet& set, ParameterId id, uint32_t value) {
-  const ParameterDescriptor row = descriptor(id);
-  memcpy(reinterpret_cast<uint8_t*>(&set) + row.offset, &value, row.width);
+  memcpy(reinterpret_cast<uint8_t*>(&set) + flash_byte(&descriptor(id).offset), &value,
+         flash_byte(&descriptor(id).width));
 }
 
-bool in_range(ParameterId id, uint32_t value) {
-  const ParameterDescriptor row = descriptor(id);
-  return value >= row.minimum && value <= row.maximum;
-}
+bool in_range(ParameterId id, uint32_t value) { return value >= minimum_of(id) && value <= maximum_of(id); }
 
 bool find_parameter(const char* name, ParameterId& id) {
   for (uint8_t i = 0; i < kParameterCount; ++i) {
     id = static_cast<ParameterId>(i);
-    if (strcmp(name, descriptor(id).name) == 0) return true;
+    if (flash_equal(name, descriptor(id).name)) return true;
   }
   return false;
 }
@@ -49,10 +53,8 @@ ParameterSet factory_preset(uint8_t index) {
 
 bool find_factory_preset(const char* name, ParameterSet& set) {
   for (uint8_t i = 0; i < kFactoryPresetCount; ++i) {
-    FactoryPreset preset;
-    flash_copy(&preset, &kFactoryPresets[i], sizeof preset);
-    if (strcmp(name, preset.name) != 0) continue;
-    set = preset.set;
+    if (!flash_equal(name, kFactoryPresets[i].name)) continue;
+    set = factory_preset(i);
     return true;
   }
   return false;

@@ -1,12 +1,16 @@
-// Parameters by name or number: read, write, check, format.
+// Parameters by name or number: read, write, check.
 #pragma once
 
 #include "parameter_table.h"
 
 namespace bifa {
 
-/// Copies the descriptor of one parameter out of flash.
-ParameterDescriptor descriptor(ParameterId id);
+/// What is known of a parameter, in flash.
+inline const ParameterDescriptor& descriptor(ParameterId id) { return kParameterDescriptors[static_cast<uint8_t>(id)]; }
+
+/// Bounds of its value in wire units.
+uint32_t minimum_of(ParameterId id);
+uint32_t maximum_of(ParameterId id);
 
 /// Value of one parameter in wire units.
 uint32_t value_of(const ParameterSet& set, ParameterId id);

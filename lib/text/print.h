@@ -6,6 +6,7 @@
 
 namespace bifa {
 
+void print(Sink& sink, char character);
 void print(Sink& sink, FlashText text);
 void print(Sink& sink, const char* text);
 
