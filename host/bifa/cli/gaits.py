@@ -1,0 +1,71 @@
+"""`bifa gaits`: the library of gaits, and the command that makes it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = """Examples:  bifa gaits   |   bifa gaits --make   |   bifa gaits --make --model mine.toml --folder my-gaits"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EPILOG)(gaits)
+
+
+def gaits(
+    make: Annotated[bool, typer.Option("--make", help="Search them anew (minutes) and write them.")] = False,
+    model: Annotated[Path | None, typer.Option(help="Model to search on; the nominal one if left out.")] = None,
+    folder: Annotated[Path | None, typer.Option(help="Where --make writes; the package itself if left out.")] = None,
+    only: Annotated[list[str], typer.Option(help="Make only this one; may be repeated.")] = [],  # noqa: B006
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the searches.")] = 0,
+) -> None:
+    """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or make them anew."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from bifa.gait import library
+
+    console = Console()
+    if make:
+        _make(console, model, folder or library.FOLDER, only or list(library.SCENARIOS), seed)
+        return
+    table = Table(title="Gaits of the nominal robot", title_justify="left")
+    for heading in ("gait", "for", "speed [mm/s]", "10th percentile", "period [s]", "psi12, psi13", "duties"):
+        table.add_column(heading)
+    for name, scenario in library.SCENARIOS.items():
+        entry = library.load(name)
+        gait, notes = entry.gait, entry.provenance
+        table.add_row(
+            name,
+            scenario.purpose,
+            f"{notes['predicted_speed_mm_s']:.1f}",
+            f"{notes['predicted_10th_percentile_mm_s']:.1f}",
+            f"{gait.period_s:.2f}",
+            f"{gait.psi12_deg:.0f}, {gait.psi13_deg:.0f}",
+            f"{gait.duty_body:.2f}, {gait.duty_head:.2f}, {gait.duty_tail:.2f}",
+        )
+    console.print(table)
+    console.print(f"files: {library.FOLDER / 'NAME.toml'}", highlight=False)
+
+
+def _make(console, model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:
+    from dataclasses import replace
+
+    from bifa.cli.optimize import search_progress
+    from bifa.gait import library, optimise, simulations
+    from bifa.robot import load_model, nominal
+
+    model = load_model(model_path) if model_path else nominal()
+    scenarios = [library.load_scenario(name) for name in names]
+    folder.mkdir(parents=True, exist_ok=True)
+    with simulations() as runs, search_progress(console) as progress:
+        for scenario in scenarios:
+            settings = replace(scenario.settings, seed=seed)
+            optimum = optimise(model, runs, settings, progress(scenario.name))
+            path = library.save(folder, scenario, optimum, model.name)
+            console.print(
+                f"{scenario.name}: {optimum.nominal_mm_s:.2f} mm/s, 10th percentile {optimum.quantile_mm_s:.2f} "
+                f"({optimum.simulations} simulations): {path.name}",
+                highlight=False,
+            )

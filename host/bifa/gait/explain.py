@@ -1,0 +1,109 @@
+"""What sets a gait apart from another, and why it is faster: the paper's three reasons (section VI.A) as numbers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.robot.gait import Gait
+from bifa.robot.model import Model
+from bifa.simulate import Record, walk
+
+CYCLES = 8
+_RATE_HZ = 1000.0
+
+
+@dataclass(frozen=True)
+class Anatomy:
+    """One settled cycle of a gait on a model. Times in s, pressures in psi.
+
+    extension_s, contraction_s: from the body's command to the passing of its unstable point; NaN if it never passes.
+    tail_lead_s: how long before the body extends the tail is told to anchor; head_lead_s: the head, before the body
+    contracts (negative: after). extended_psi, contracted_psi: body pressure when the next command comes.
+    """
+
+    gait: Gait
+    record: Record
+    advance_mm: float
+    speed_mm_s: float
+    extension_s: float
+    contraction_s: float
+    contraction_share: float
+    tail_lead_s: float
+    head_lead_s: float
+    extended_psi: float
+    contracted_psi: float
+
+
+def anatomy(model: Model, gait: Gait) -> Anatomy:
+    """Walk the gait and take its last cycle apart."""
+    samples = round(CYCLES * gait.period_s * _RATE_HZ) + 1
+    record = walk(model, gait, time_s=np.arange(samples) / _RATE_HZ)
+    time, head = record["time_s"], record["displacement_head_mm"]
+    start = (CYCLES - 1) * gait.period_s
+    advance = float(np.interp(CYCLES * gait.period_s, time, head) - np.interp(start, time, head))
+    unstable = model.body_stiffness.unstable_m
+    on = _switch(gait, "body", to_positive=True)
+    off = _switch(gait, "body", to_positive=False)
+    body_psi = record["pressure_body_psi"]
+    return Anatomy(
+        gait=gait,
+        record=record,
+        advance_mm=advance,
+        speed_mm_s=advance / gait.period_s,
+        extension_s=_first_after(time, record["body_m"] - unstable, _late(on, gait)),
+        contraction_s=_first_after(time, unstable - record["body_m"], _late(off, gait)),
+        contraction_share=gait.duty_body,
+        tail_lead_s=_wrapped(on - _switch(gait, "tail", to_positive=True), gait.period_s),
+        head_lead_s=_wrapped(off - _switch(gait, "head", to_positive=True), gait.period_s),
+        extended_psi=float(np.interp(_late(off, gait) - 1e-3, time, body_psi)),
+        contracted_psi=float(np.interp(_late(on, gait) - 1e-3, time, body_psi)),
+    )
+
+
+def reasons(before: Anatomy, after: Anatomy) -> list[str]:
+    """Sentences on what changed from `before` to `after`, each with its figures."""
+    model_supply = max(abs(before.extended_psi), abs(after.extended_psi))
+    return [
+        f"Speed {before.speed_mm_s:.1f} to {after.speed_mm_s:.1f} mm/s: the cycle takes {after.gait.period_s:.2f} s "
+        f"in place of {before.gait.period_s:.2f} s and advances {after.advance_mm:.1f} mm "
+        f"in place of {before.advance_mm:.1f} mm.",
+        f"The body has {100 * after.contraction_share:.0f} % of the cycle to contract, was "
+        f"{100 * before.contraction_share:.0f} %: it snaps {_seconds(after.contraction_s)} after the command when "
+        f"contracting, {_seconds(after.extension_s)} when extending, since the bulging fabric empties slowly.",
+        f"The tail is told to anchor {_lead(after.tail_lead_s)} the body's extension, was "
+        f"{_lead(before.tail_lead_s)}; the head {_lead(after.head_lead_s)} its contraction, was "
+        f"{_lead(before.head_lead_s)}: the body answers later than the ends, so the waiting can be cut.",
+        f"The body's pressure is reversed at {after.extended_psi:.1f} and {after.contracted_psi:.1f} psi, was "
+        f"{before.extended_psi:.1f} and {before.contracted_psi:.1f} psi: passing the spring's peak is enough, "
+        f"the supplies' full pressure ({model_supply:.1f} psi was reached) is not needed.",
+    ]
+
+
+def _switch(gait: Gait, chamber: str, to_positive: bool) -> float:
+    """Time of a chamber's switch within the cycle: phase 2 pi d to positive, phase 0 to vacuum."""
+    values = gait.as_dict()
+    ahead = {"body": 0.0, "head": gait.psi12_deg, "tail": gait.psi13_deg}[chamber] / 360.0
+    return ((values[f"duty_{chamber}"] if to_positive else 0.0) - ahead) % 1.0 * gait.period_s
+
+
+def _late(within_cycle: float, gait: Gait) -> float:
+    """That moment in the last cycle but one, so that what follows is on record."""
+    return (CYCLES - 2) * gait.period_s + within_cycle
+
+
+def _first_after(time: np.ndarray, signal: np.ndarray, start: float) -> float:
+    """Seconds from `start` until `signal` turns positive from below; NaN if it does not."""
+    later = np.flatnonzero((time[1:] > start) & (signal[:-1] <= 0.0) & (signal[1:] > 0.0))
+    return float(time[later[0] + 1] - start) if later.size else float("nan")
+
+
+def _wrapped(seconds: float, period_s: float) -> float:
+    return (seconds + 0.5 * period_s) % period_s - 0.5 * period_s
+
+
+def _seconds(value: float) -> str:
+    return "never" if np.isnan(value) else f"{value:.2f} s"
+
+
+def _lead(seconds: float) -> str:
+    return f"{abs(seconds):.2f} s {'before' if seconds >= 0 else 'after'}"

@@ -1,0 +1,10 @@
+"""Optimisers from well-kept libraries behind one call: maximise a batched objective over the unit cube."""
+
+from .bayesian import bayesian_optimisation
+from .cma_es import cma_es
+from .common import Found, Objective, Report
+from .evolution import differential_evolution
+
+METHODS = {"de": differential_evolution, "cma": cma_es, "bo": bayesian_optimisation}
+
+__all__ = ["METHODS", "Found", "Objective", "Report", "bayesian_optimisation", "cma_es", "differential_evolution"]

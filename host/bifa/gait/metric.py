@@ -1,0 +1,102 @@
+"""What counts as the speed of a gait (paper, section V.B, with the loopholes closed).
+
+The paper takes the last of four cycles. Some gaits are still accelerating then and collapse later, so a gait has to
+be periodic here; and a gait that slips counts nothing, as in the paper: it is hard to reproduce on a real robot.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifa.simulate import Progress
+from bifa.simulate.rigs import CLEAR
+from bifa.simulate.terrain import passed_at_m, terrain, tunnel
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Of n walks: `speed_mm_s`; `refused`: the metric's rules are broken; both of shape (n,)."""
+
+    speed_mm_s: np.ndarray
+    refused: np.ndarray
+
+    @property
+    def counted_mm_s(self) -> np.ndarray:
+        """(n,) what the optimiser sees: 0 where the rules are broken or the robot goes the wrong way."""
+        return np.where(self.refused, 0.0, np.maximum(self.speed_mm_s, 0.0))
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Settled speed in a clear pipe.
+
+    cycles: simulated, from rest. judged: the last so many must agree within `periodic` (of the advance, which counts
+    as at least 1 mm) and slip less than `slip_m` each. Slip is travel while both ends slide. tolerance_m: of the
+    integrator, a step. direction: -1 to count backward walking. inclination_deg: of the pipe, uphill positive.
+    """
+
+    cycles: int = 10
+    judged: int = 3
+    periodic: float = 1e-3
+    slip_m: float = 10e-6
+    tolerance_m: float = 1e-5
+    direction: int = 1
+    inclination_deg: float = 0.0
+
+    @property
+    def terrain(self) -> np.ndarray:
+        """No obstacles."""
+        return CLEAR
+
+    def finer(self) -> "Metric":
+        """For finalists: twenty cycles, the last ten of them judged, and a far smaller step."""
+        return replace(self, cycles=20, judged=10, tolerance_m=1e-7)
+
+    def quicker(self) -> "Metric":
+        """For searches over many draws: six cycles. What it lets through is judged again."""
+        return replace(self, cycles=6, judged=2, periodic=5e-3)
+
+    def judge(self, progress: Progress) -> Judged:
+        """Apply the rules to simulated cycles of shape (n, cycles)."""
+        last = progress.advance_m[:, -self.judged :]
+        slips = progress.slip_m[:, -self.judged :].max(axis=1) > self.slip_m
+        spread = np.ptp(last, axis=1) / np.maximum(np.abs(last[:, -1]), 1e-3)
+        return Judged(self.direction * progress.speed_mm_s, slips | (spread > self.periodic))
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Mean speed through the paper's 97 mm tunnel (section VI.B), 0 for a robot that is not through in `cycles`.
+
+    Slip is not counted against a gait here: to bend the supports both ends may give way.
+    """
+
+    cycles: int = 16
+    tolerance_m: float = 1e-5
+    inclination_deg: float = 0.0
+
+    @property
+    def terrain(self) -> np.ndarray:
+        """The tunnel, 10 cm ahead of the head."""
+        return terrain(tunnel())
+
+    def finer(self) -> "Passage":
+        """For finalists: a smaller step."""
+        return replace(self, tolerance_m=1e-6)
+
+    def quicker(self) -> "Passage":
+        """Itself: the tunnel has to be passed."""
+        return self
+
+    def judge(self, progress: Progress) -> Judged:
+        """Time until the whole robot is behind the tunnel, from simulated cycles of shape (n, cycles)."""
+        way = passed_at_m(tunnel())
+        reached = np.cumsum(progress.advance_m, axis=1)
+        passed = reached >= way
+        cycle = np.argmax(passed, axis=1)
+        row = np.arange(len(cycle))
+        left = way - (reached - progress.advance_m)[row, cycle]
+        part = left / np.maximum(progress.advance_m[row, cycle], 1e-9)
+        seconds = (cycle + np.clip(part, 0.0, 1.0)) * progress.period_s
+        refused = ~passed.any(axis=1)
+        return Judged(np.where(refused, 0.0, 1e3 * way / np.maximum(seconds, 1e-9)), refused)

@@ -1,0 +1,78 @@
+"""What is maximised: the nominal model's speed, or the speed that nine robots in ten reach."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bifa.gait.metric import Metric, Passage
+from bifa.gait.simulations import Simulations
+from bifa.gait.space import SearchSpace
+from bifa.simulate import Plant, gait_rows
+
+QUANTILE = 0.10
+_ABANDON = 0.9  # a gait that cannot reach this share of the best one's value is not simulated further
+_FIRST_DRAWS = 3
+
+
+class NominalSpeed:
+    """Speed of gaits on one model, in mm/s, 0 where the metric's rules are broken."""
+
+    def __init__(self, runs: Simulations, plant: Plant, space: SearchSpace, metric: Metric | Passage):
+        self._runs, self._plants, self._space, self._metric = runs, [plant], space, metric
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """(n,) of points (n, dimensions) of the unit cube."""
+        rows = gait_rows(self._space.gaits(points))
+        which = np.zeros(len(rows), dtype=np.int64)
+        return self._runs.judged(self._plants, which, rows, self._metric).counted_mm_s
+
+
+class RobustSpeed:
+    """The `QUANTILE` of the speed over draws of the model, every gait meeting the same draws.
+
+    Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(QUANTILE n), so
+    the r-th smallest met so far bounds it from above: a gait whose bound is below `_ABANDON` of the best value
+    is given up, and the bound is its value. Draws that gave up most gaits come first.
+    """
+
+    def __init__(
+        self, runs: Simulations, nominal: Plant, draws: Sequence[Plant], space: SearchSpace, metric: Metric | Passage
+    ):
+        self._runs, self._space, self._metric = runs, space, metric
+        self._plants = [nominal, *draws]
+        self._rank = max(1, math.ceil(QUANTILE * len(draws)))
+        self._failures = np.zeros(len(draws))
+        self._best = 0.0
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """(n,) of points (n, dimensions) of the unit cube, in mm/s."""
+        rows = gait_rows(self._space.gaits(points))
+        draws = len(self._plants) - 1
+        order = np.argsort(-self._failures, kind="stable")
+        met = np.full((len(rows), draws), np.inf)
+        bound = self._speeds(rows, np.zeros(len(rows), dtype=np.int64))
+        alive = np.flatnonzero(bound >= max(_ABANDON * self._best, 1e-9))
+        done, size = 0, _FIRST_DRAWS + self._rank
+        while alive.size and done < draws:
+            batch = order[done : done + size]
+            gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
+            met[gaits, which] = self._speeds(rows[gaits], which + 1)
+            done, size = done + len(batch), 2 * size
+            bound[alive] = np.minimum(bound[alive], np.partition(met[alive], self._rank - 1)[:, self._rank - 1])
+            low = met[np.ix_(alive, batch)] < _ABANDON * np.maximum(bound[alive], self._best)[:, None]
+            self._failures[batch] += low.mean(axis=0)
+            if done >= draws:
+                self._best = max(self._best, float(bound[alive].max()))
+            alive = alive[bound[alive] >= max(_ABANDON * self._best, 1e-9)]
+        return bound
+
+    def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:
+        return self._runs.judged(self._plants, which, rows, self._metric).counted_mm_s
+
+
+def distribution(runs: Simulations, draws: Sequence[Plant], gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:
+    """(n, draws) speeds of gaits (n, 6) on every draw, by the metric's rules, in mm/s."""
+    n, m = len(gaits), len(draws)
+    judged = runs.judged(draws, np.tile(np.arange(m), n), np.repeat(gaits, m, axis=0), metric)
+    return judged.counted_mm_s.reshape(n, m)

@@ -1,0 +1,110 @@
+"""How the speed answers to each gait parameter, and what robustness costs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.gait.metric import Metric, Passage
+from bifa.gait.objectives import QUANTILE, distribution
+from bifa.gait.simulations import Simulations
+from bifa.robot.gait import GAIT_RANGES, Gait
+from bifa.simulate import Plant, gait_rows
+
+# Half the width of the scan of each parameter: a relative change of the period, degrees, parts of the cycle.
+_REACH = {"period_s": 0.15, "psi12_deg": 40.0, "psi13_deg": 40.0, "duty_body": 0.06, "duty_head": 0.1, "duty_tail": 0.1}
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Speed along one gait parameter, the others held: `values` (n,), `nominal_mm_s` and `quantile_mm_s` (n,).
+
+    `room`: (lower, upper) neighbourhood of the gait's value within which the quantile stays above 90 % of its own.
+    """
+
+    name: str
+    unit: str
+    at: float
+    values: np.ndarray
+    nominal_mm_s: np.ndarray
+    quantile_mm_s: np.ndarray
+    room: tuple[float, float]
+
+
+def sensitivity(
+    runs: Simulations,
+    nominal: Plant,
+    draws: Sequence[Plant],
+    gait: Gait,
+    metric: Metric | Passage,
+    points: int = 17,
+) -> list[Scan]:
+    """One scan for each of the six parameters, `points` (odd) values each."""
+    base = gait.as_dict()
+    scans, rows = {}, []
+    for name, reach in _REACH.items():
+        lower, upper, _ = GAIT_RANGES[name]
+        width = reach * base[name] if name == "period_s" else reach
+        values = base[name] + width * np.linspace(-1.0, 1.0, points)
+        values = np.mod(values, 360.0) if name.startswith("psi") else np.clip(values, lower, upper)
+        scans[name] = base[name] + width * np.linspace(-1.0, 1.0, points)
+        rows += [Gait(**{**base, name: float(value)}) for value in values]
+    speeds = distribution(runs, [nominal, *draws], gait_rows(rows), metric)
+    result = []
+    for number, (name, values) in enumerate(scans.items()):
+        part = speeds[number * points : (number + 1) * points]
+        quantile = np.quantile(part[:, 1:], QUANTILE, axis=1)
+        unit = GAIT_RANGES[name][2]
+        result.append(Scan(name, unit, base[name], values, part[:, 0], quantile, _room(values, quantile)))
+    return result
+
+
+def _room(values: np.ndarray, quantile: np.ndarray) -> tuple[float, float]:
+    middle = len(values) // 2
+    good = quantile >= 0.9 * quantile[middle]
+    low = high = middle
+    while low > 0 and good[low - 1]:
+        low -= 1
+    while high < len(values) - 1 and good[high + 1]:
+        high += 1
+    return float(values[low]), float(values[high])
+
+
+@dataclass(frozen=True)
+class Front:
+    """Gaits (n, 6) with nominal speed and 10th percentile (n,) each; `efficient` (n,): no other is better in both."""
+
+    gaits: np.ndarray
+    nominal_mm_s: np.ndarray
+    quantile_mm_s: np.ndarray
+
+    @property
+    def efficient(self) -> np.ndarray:
+        """(n,) true on the front."""
+        better = (self.nominal_mm_s[None] > self.nominal_mm_s[:, None]) & (
+            self.quantile_mm_s[None] > self.quantile_mm_s[:, None]
+        )
+        return ~better.any(axis=1)
+
+
+def front(
+    runs: Simulations,
+    nominal: Plant,
+    draws: Sequence[Plant],
+    robust: Gait,
+    fast: Gait,
+    metric: Metric | Passage,
+    points: int = 25,
+) -> Front:
+    """Speed against robustness, from the robust gait to the fastest one, along and around the line between them."""
+    ends = gait_rows([robust, fast])
+    shift = ends[1] - ends[0]
+    shift[1:3] = (shift[1:3] + 180.0) % 360.0 - 180.0  # the shorter way round
+    rows = ends[0] + np.linspace(0.0, 1.0, points)[:, None] * shift
+    # The period alone is the cheapest way to trade: the same gaits, faster or slower.
+    periods = np.linspace(0.97, 1.03, 7)[:, None]
+    around = np.repeat(rows[:: max(1, points // 6)], 7, axis=0)
+    around[:, 0] = (rows[:: max(1, points // 6), 0][:, None] * periods.T).ravel()
+    rows = np.concatenate([rows, around])
+    speeds = distribution(runs, [nominal, *draws], rows, metric)
+    return Front(rows, speeds[:, 0], np.quantile(speeds[:, 1:], QUANTILE, axis=1))

@@ -1,0 +1,69 @@
+"""Many walks at once, through any `concurrent.futures.Executor`: this machine's cores, or a cluster's."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+
+import numpy as np
+
+from bifa.errors import BifaError
+from bifa.gait.metric import Judged, Metric, Passage
+from bifa.simulate import Plant, Progress, cores, speeds
+
+_PIECES_PER_WORKER = 4  # gaits differ in cost
+
+
+class ClusterError(BifaError):
+    """The cluster cannot be used; the text says what to do."""
+
+
+class Simulations:
+    """Runs walks in pieces on `executor`. The simulator releases the GIL, so threads do on one machine."""
+
+    def __init__(self, executor: Executor, workers: int):
+        self._executor, self._pieces = executor, workers * _PIECES_PER_WORKER
+        self.count = 0
+
+    def judged(self, plants: Sequence[Plant], which: np.ndarray, gaits: np.ndarray, metric: Metric | Passage) -> Judged:
+        """Judge walks of `gaits` (n, 6), row k with the model `plants[which[k]]`."""
+        self.count += len(gaits)
+        rows = [piece for piece in np.array_split(np.arange(len(gaits)), min(self._pieces, len(gaits))) if piece.size]
+        futures = [
+            self._executor.submit(_walks, [plants[i] for i in which[piece]], gaits[piece], metric) for piece in rows
+        ]
+        parts = [future.result() for future in futures]
+        progress = Progress(
+            np.concatenate([part.advance_m for part in parts]),
+            np.concatenate([part.slip_m for part in parts]),
+            np.concatenate([part.period_s for part in parts]),
+        )
+        return metric.judge(progress)
+
+
+def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Progress:
+    return speeds(plants, gaits, metric.cycles, metric.tolerance_m, inclination_deg=metric.inclination_deg, workers=1)
+
+
+@contextmanager
+def simulations(dask: str | None = None, workers: int | None = None) -> Iterator[Simulations]:
+    """On this machine's cores, or on the dask cluster whose scheduler is at the address `dask`."""
+    if dask is None:
+        count = workers or cores()
+        with ThreadPoolExecutor(count, thread_name_prefix="bifa-gait") as executor:
+            yield Simulations(executor, count)
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ClusterError("--dask needs the package distributed: pip install 'bifa[dask]'") from None
+    try:
+        client = Client(dask, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"no dask scheduler answers at {dask}: {error}; start one with `dask scheduler`") from None
+    with client:
+        count = sum(client.nthreads().values())
+        if not count:
+            raise ClusterError(f"the dask scheduler at {dask} has no workers; start some with `dask worker {dask}`")
+        # The simulator is compiled once a process; its calls with equal arguments are equal, but not worth keeping.
+        with client.get_executor(pure=False) as executor:
+            yield Simulations(executor, count)

@@ -1,0 +1,94 @@
+"""Where gaits are looked for: the paper's box (section V.B), and the map between it and the unit cube."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.errors import BifaError
+from bifa.robot.gait import GAIT_RANGES, Gait
+
+
+class SpaceError(BifaError):
+    """A search space is empty, or leaves what a gait may be; the text names the axis and the range."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One coordinate: the gait parameters that it sets together, its range, whether its ends meet."""
+
+    name: str
+    sets: tuple[str, ...]
+    lower: float
+    upper: float
+    unit: str
+    wraps: bool = False
+
+    def __post_init__(self):
+        for name in self.sets:
+            low, high, unit = GAIT_RANGES[name]
+            if not low <= self.lower < self.upper <= high:
+                raise SpaceError(
+                    f"{self.name}: {self.lower:g} to {self.upper:g} must be a range within {low:g} to {high:g} {unit}"
+                )
+
+
+@dataclass(frozen=True)
+class SearchSpace:
+    """Axes of the search. Points are rows of the unit cube, shape (n, dimensions)."""
+
+    axes: tuple[Axis, ...]
+
+    @property
+    def dimensions(self) -> int:
+        """Number of axes."""
+        return len(self.axes)
+
+    @property
+    def wraps(self) -> np.ndarray:
+        """(dimensions,) true where an axis is a full turn."""
+        return np.array([axis.wraps for axis in self.axes])
+
+    def fold(self, points: np.ndarray) -> np.ndarray:
+        """Points brought back into the unit cube: full turns wrap, the other axes are cut at their ends."""
+        return np.where(self.wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
+
+    def gaits(self, points: np.ndarray) -> list[Gait]:
+        """The gaits of points of shape (n, dimensions)."""
+        lower = np.array([axis.lower for axis in self.axes])
+        upper = np.array([axis.upper for axis in self.axes])
+        values = lower + self.fold(np.atleast_2d(points)) * (upper - lower)
+        return [
+            Gait(**{name: value for axis, value in zip(self.axes, row, strict=True) for name in axis.sets})
+            for row in values.tolist()
+        ]
+
+    def point(self, gait: Gait) -> np.ndarray:
+        """(dimensions,) of a gait; SpaceError where the gait lies outside or breaks an axis's equality."""
+        values = gait.as_dict()
+        point = []
+        for axis in self.axes:
+            first, *others = (values[name] for name in axis.sets)
+            if any(abs(other - first) > 1e-9 for other in others):
+                raise SpaceError(f"{axis.name}: {' and '.join(axis.sets)} are searched as equal, and differ")
+            if not axis.lower <= first <= axis.upper:
+                raise SpaceError(f"{axis.name} = {first:g} is outside {axis.lower:g} to {axis.upper:g} {axis.unit}")
+            point.append((first - axis.lower) / (axis.upper - axis.lower))
+        return np.array(point)
+
+
+def paper_space(
+    period_s: Sequence[float] = (2.0, 4.0),
+    duty_body: Sequence[float] = (0.2, 0.8),
+    duty_ends: Sequence[float] = (0.2, 0.8),
+) -> SearchSpace:
+    """The box of section V.B; d_2 = d_3 there, as the duty of both ends."""
+    return SearchSpace(
+        (
+            Axis("period_s", ("period_s",), *period_s, "s"),
+            Axis("psi12_deg", ("psi12_deg",), 0.0, 360.0, "degrees", wraps=True),
+            Axis("psi13_deg", ("psi13_deg",), 0.0, 360.0, "degrees", wraps=True),
+            Axis("duty_body", ("duty_body",), *duty_body, ""),
+            Axis("duty_ends", ("duty_head", "duty_tail"), *duty_ends, ""),
+        )
+    )

@@ -1,0 +1,55 @@
+"""The optimisers on a function whose optimum is known: across a wrap, beside a cliff, on a plain of zeros."""
+
+import numpy as np
+import pytest
+
+from bifa.gait.methods import METHODS
+from bifa.gait.methods.common import Found
+
+WRAPS = np.array([False, True, True, False, False])
+TOP = np.array([0.31, 0.98, 0.07, 0.5, 0.6])
+WIDTH = np.array([0.35, 0.25, 0.25, 0.35, 0.35])
+
+
+def hill(points):
+    """1 at TOP, 0 far from it, and 0 where the first coordinate is below 0.3: a cliff just beside the top."""
+    away = np.abs(points - TOP)
+    away = np.where(WRAPS, np.minimum(away, 1 - away), away)
+    value = np.maximum(1 - ((away / WIDTH) ** 2).sum(axis=1), 0)
+    return np.where(points[:, 0] < 0.3, 0.0, value)
+
+
+@pytest.mark.parametrize("method", ["de", "cma"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_finds_the_top_beside_the_cliff(method, seed):
+    found = METHODS[method](hill, WRAPS, 3000, seed)
+    assert found.best_value > 0.995
+    assert len(found.values) <= 3100
+
+
+def test_the_papers_method_learns_from_few_evaluations():
+    found = METHODS["bo"](lambda p: -((p - 0.4) ** 2).sum(axis=1), np.zeros(2, bool), 16, 0)
+    assert found.best_value > -0.01
+    assert len(found.values) == 16
+
+
+@pytest.mark.parametrize("method", ["de", "cma", "bo"])
+def test_a_seed_gives_the_same_search_again_and_progress_is_told(method):
+    told = []
+    count = 13 if method == "bo" else 300
+    first = METHODS[method](hill, WRAPS, count, 7, lambda n, best: told.append((n, best)))
+    again = METHODS[method](hill, WRAPS, count, 7)
+    np.testing.assert_array_equal(first.points, again.points)
+    assert told[-1] == (len(first.values), first.best_value)
+    assert all(0 <= value <= 1 for value in first.points.ravel())
+
+
+def test_a_plain_of_zeros_does_not_end_the_search_early():
+    found = METHODS["de"](lambda p: np.zeros(len(p)), WRAPS, 500, 0)
+    assert len(found.values) == 500
+
+
+def test_finalists_are_the_best_and_apart():
+    points = np.array([[0.1, 0.1], [0.1, 0.1001], [0.5, 0.5], [0.9, 0.9]])
+    found = Found(points, np.array([3.0, 4.0, 2.0, 1.0]))
+    np.testing.assert_array_equal(found.finalists(2), [[0.1, 0.1001], [0.5, 0.5]])

@@ -1,0 +1,73 @@
+"""The rules of the speed: settled, periodic, no slip; and the passage of the tunnel."""
+
+import numpy as np
+import pytest
+
+from bifa.gait.metric import Metric, Passage
+from bifa.simulate import Progress, speeds
+from bifa.simulate.terrain import passed_at_m, tunnel
+
+
+def progress(advance_mm, slip_um=0.0, period_s=2.0):
+    advance = 1e-3 * np.atleast_2d(np.asarray(advance_mm, dtype=float))
+    slip = np.broadcast_to(1e-6 * np.asarray(slip_um, dtype=float), advance.shape)
+    return Progress(advance, slip, np.full(len(advance), period_s))
+
+
+def test_the_speed_is_that_of_the_settled_cycles():
+    judged = Metric().judge(progress([10, 90, 60, 50, 50, 50, 50, 50, 50, 50]))
+    assert judged.counted_mm_s == pytest.approx([25.0])
+    assert not judged.refused
+
+
+@pytest.mark.parametrize(
+    ("advance", "slip"),
+    [
+        ([50] * 9 + [50.2], 0),  # still accelerating
+        ([30, 70] * 5, 0),  # every second cycle
+        ([50] * 10, [0] * 9 + [11]),  # slips in the last cycle
+        ([-50] * 10, 0),  # backward
+    ],
+)
+def test_what_breaks_the_rules_counts_nothing(advance, slip):
+    assert Metric().judge(progress(advance, slip)).counted_mm_s == [0.0]
+
+
+def test_slip_below_the_tolerance_and_before_the_judged_cycles_is_forgiven():
+    slip = [1500, 0, 0, 0, 0, 0, 0, 9, 9, 9]
+    assert Metric().judge(progress([50] * 10, slip)).counted_mm_s == pytest.approx([25.0])
+
+
+def test_the_finer_metric_wants_ten_equal_cycles():
+    late = [50] * 11 + [50.2] + [50] * 8
+    assert Metric().finer().cycles == 20
+    assert Metric().finer().judge(progress(late)).refused
+    assert not Metric().finer().judge(progress([20, 80] + [50] * 18)).refused
+
+
+def test_a_gait_that_the_four_cycle_metric_overrates_is_refused():
+    """The nominal optimum's neighbour: fast in early cycles, then not periodic or slow."""
+    early_then_collapse = [19, 3, 91, 63, 59, 30, 2, 2, 2, 2]
+    assert Metric(cycles=4, judged=1).judge(progress(early_then_collapse[:4])).counted_mm_s == pytest.approx([31.5])
+    assert Metric().judge(progress(early_then_collapse)).counted_mm_s == pytest.approx([1.0])
+
+
+def test_backward_walking_counts_when_asked_for():
+    assert Metric(direction=-1).judge(progress([-50] * 10)).counted_mm_s == pytest.approx([25.0])
+
+
+def test_passage_is_way_over_time_with_the_last_cycle_in_part():
+    way_mm = 1e3 * passed_at_m(tunnel())
+    step = way_mm / 3.5
+    judged = Passage(cycles=5).judge(progress([step] * 5))
+    assert judged.counted_mm_s == pytest.approx([way_mm / (3.5 * 2.0)])
+    assert Passage(cycles=3).judge(progress([step] * 3)).counted_mm_s == [0.0]
+
+
+def test_the_papers_observation_the_slow_gait_passes_the_tunnel_and_the_fast_one_does_not(nominal_plant):
+    """Section VI.B: 6 s gaits get through, the optimised one does not bend the supports."""
+    passage = Passage()
+    rows = np.array([[6.0, 270, 90, 0.5, 0.5, 0.5], [2.516, 208.94, 331.87, 0.6491, 0.4425, 0.4425]])
+    slow, fast = passage.judge(speeds(nominal_plant, rows, passage.cycles, terrain=passage.terrain)).counted_mm_s
+    assert slow > 5.0
+    assert fast == 0.0

@@ -1,0 +1,36 @@
+"""The box that is searched, and the map to the unit cube."""
+
+import numpy as np
+import pytest
+
+from bifa.gait.space import Axis, SpaceError, paper_space
+from bifa.robot.gait import Gait
+
+
+def test_the_paper_box_at_its_corners():
+    low, high = paper_space().gaits(np.array([[0, 0, 0, 0, 0], [1, 0.5, 0.75, 1, 1]]))
+    assert low == Gait(2.0, 0.0, 0.0, 0.2, 0.2, 0.2)
+    assert high == Gait(4.0, 180.0, 270.0, 0.8, 0.8, 0.8)
+
+
+def test_phases_wrap_and_the_rest_is_cut():
+    gait, other = paper_space().gaits(np.array([[1.3, 1.25, -0.25, -2.0, 0.5], [-1, 0.25, 0.75, 0, 0.5]]))
+    assert gait == Gait(4.0, 90.0, 270.0, 0.2, 0.5, 0.5)
+    assert other.psi12_deg == gait.psi12_deg
+
+
+def test_point_is_the_inverse_of_gaits():
+    points = np.random.default_rng(0).random((20, 5))
+    for point, gait in zip(points, paper_space().gaits(points), strict=True):
+        np.testing.assert_allclose(paper_space().point(gait), point, atol=1e-12)
+
+
+def test_errors_name_the_axis_and_the_range():
+    with pytest.raises(SpaceError, match=r"period_s = 5.7 is outside 2 to 4 s"):
+        paper_space().point(Gait(5.7, 0, 0, 0.5, 0.5, 0.5))
+    with pytest.raises(SpaceError, match="duty_head and duty_tail are searched as equal, and differ"):
+        paper_space().point(Gait(3.0, 0, 0, 0.5, 0.5, 0.6))
+    with pytest.raises(SpaceError, match=r"period_s: 0.1 to 4 must be a range within 0.5 to 60 s"):
+        paper_space(period_s=(0.1, 4.0))
+    with pytest.raises(SpaceError, match="must be a range"):
+        Axis("duty", ("duty_body",), 0.6, 0.4, "")
