@@ -6,7 +6,7 @@ import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.compiled import kernel
-from bifa.simulate.march import march, new_run, shown, start_effects, switched
+from bifa.simulate.march import march, new_run, shown, start_effects
 from bifa.simulate.stepper import (
     STATES,
     X_HEAD,
@@ -38,9 +38,7 @@ def _through(plant, rig, run, until, tolerance, late, order, chamber, command, i
     while i < order.size and late[order[i]] <= until:
         k = order[i]
         march(plant, rig, run, late[k], tolerance)
-        if run.command[chamber[k]] != command[k]:
-            run.command[chamber[k]] = command[k]
-            switched(run)
+        run.command[chamber[k]] = command[k]
         i += 1
     march(plant, rig, run, until, tolerance)
     return i

@@ -30,7 +30,7 @@ from bifa.simulate.stepper import (
     step,
 )
 
-LONGEST_S = 0.05
+LONGEST_S = 0.1
 SHORTEST_S = 1e-5
 _FIRST_S = 1e-3
 _ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
@@ -114,12 +114,6 @@ def shown(plant, run, actuator):
     if plant.active & chains.SENSOR:
         value = chains.sensor(plant.active, plant.q, run.z, actuator, value, value, 1e-9)
     return chains.reading(plant.active, plant.q, value)
-
-
-@merged
-def switched(run):
-    """A valve switched: begin with a short step."""
-    run.clock[1] = _FIRST_S
 
 
 @inner

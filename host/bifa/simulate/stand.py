@@ -8,7 +8,7 @@ from bifa.simulate import layout
 from bifa.simulate.actuator import area_at, pressure_after, remember, resistance
 from bifa.simulate.compiled import kernel
 from bifa.simulate.hooks import chains
-from bifa.simulate.march import march, new_run, pressures, shown, start_effects, switched
+from bifa.simulate.march import march, new_run, pressures, shown, start_effects
 from bifa.simulate.stepper import (
     HAS_BODY,
     P_BODY,
@@ -60,9 +60,7 @@ def step_record(plant, rig, states_of_effects, times, command, sample_times, tol
     for k in range(sample_times.size):
         while i < order.size and late[order[i]] <= sample_times[k]:
             march(plant, rig, run, late[order[i]], tolerance)
-            if run.command[actuator] != command[order[i]]:
-                run.command[actuator] = command[order[i]]
-                switched(run)
+            run.command[actuator] = command[order[i]]
             i += 1
         march(plant, rig, run, sample_times[k], tolerance)
         out[k, 0] = run.y[x] - contracted

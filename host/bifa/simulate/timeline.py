@@ -59,8 +59,10 @@ def timeline(switches) -> Timeline:
 
 def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Timeline:
     """Settled switching: phases a constant psi apart from time 0 on, the body at `first_phase_rad`."""
+    from bifa.simulate.entries import entries  # compiled from this file, too
+
     row = np.array([*gait.as_dict().values()])
-    return Timeline(*gait_switches(row, duration_s, first_phase_rad))
+    return Timeline(*entries.gait_switches(row, float(duration_s), float(first_phase_rad)))
 
 
 def of_phases(gait: Gait, duration_s: float, initial_rad, coupling_per_s: float = cpg.COUPLING_PER_S) -> Timeline:
