@@ -1,4 +1,5 @@
-"""Uploads over a line that damages bytes, with restarts of the Uno in the middle: the old set or the new one, never another.
+"""Uploads over a line that damages bytes, with restarts of the Uno in the middle: the old set or the new one,
+never another.
 
 `make soak` prints the table of docs/protocol.md (test_a_thousand_uploads).
 """

@@ -16,7 +16,8 @@ from bifa.link.table import COMMANDS, REPORTS
 ffi, lib = load(
     "frame_harness.cpp",
     """
-    uint16_t harness_crc(const uint8_t*, size_t, uint16_t); uint16_t harness_reflected(const uint8_t*, size_t, uint16_t);
+    uint16_t harness_crc(const uint8_t*, size_t, uint16_t);
+    uint16_t harness_reflected(const uint8_t*, size_t, uint16_t);
     int harness_decode(const uint8_t*, size_t, uint32_t session, uint8_t* frame);
     size_t harness_encode(uint8_t, uint8_t, const uint8_t*, uint8_t, uint32_t, uint8_t*);
     void harness_damage(const uint8_t* pool, size_t frames, size_t stride, uint32_t session, uint64_t seed,

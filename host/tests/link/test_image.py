@@ -1,5 +1,6 @@
 """The link of the real image, in the simulated chip."""
 
+import itertools
 import random
 
 import pytest
@@ -87,7 +88,7 @@ def test_timed_holds_happen_on_their_ticks():
             last = chip.valves()
             seen.append((chip.now(), last))
     assert [valves for _, valves in seen] == [0b0001, 0b1001, 0b1000, 0]
-    gaps = [round((b - a) * 1000) for (a, _), (b, _) in zip(seen, seen[1:], strict=False)]
+    gaps = [round((b - a) * 1000) for (a, _), (b, _) in itertools.pairwise(seen)]
     assert gaps == [100, 150, 1]
     with pytest.raises(RefusedError):
         uno.schedule([(2.0, "body", "positive"), (1.0, "body", "off")])

@@ -154,7 +154,7 @@ OPERATIONS = {
 
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_power_cut_at_every_write(operation):
-    """After a cut at any write, whatever it leaves in the cell, the old or the new set is there, and nothing else changed."""
+    """After a cut at any write, whatever is left in the cell, the old or the new set is there; nothing else changed."""
     act, name, new = OPERATIONS[operation]
     image = furnished()
 
