@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bifa.identify.system import Channels, Trial
-from bifa.report.style import MEASURED, PREDICTED, figure_style
+from bifa.report.style import Palette, figure_style
 
 from .identification import Identification
 from .inputs import ANCHOR, STATIC, STEP, WALK
@@ -19,7 +19,7 @@ def draw(found: Identification, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     pairs = list(zip(found.fit.problem.trials, found.fit.predictions(), strict=True))
     written = []
-    with figure_style():
+    with figure_style() as palette:
         for name, draw_one, experiment in (
             ("fig4_stiffness", _stiffness, STATIC),
             ("fig5_steps", _steps, STEP),
@@ -29,7 +29,7 @@ def draw(found: Identification, folder: Path) -> list[Path]:
             mine = [(trial, prediction) for trial, prediction in pairs if trial.experiment == experiment]
             if mine:
                 written.append(folder / f"{name}.png")
-                draw_one(mine, written[-1])
+                draw_one(mine, palette, written[-1])
     return written
 
 
@@ -68,7 +68,7 @@ def _colours(values: Sequence[float]) -> dict[float, tuple]:
     return dict(zip(places, map(tuple, colours), strict=True))
 
 
-def _stiffness(pairs, path: Path) -> None:
+def _stiffness(pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes(1, len(groups))
     for axis, (actuator, mine) in zip(axes[0], groups.items(), strict=True):
@@ -78,13 +78,13 @@ def _stiffness(pairs, path: Path) -> None:
             pressure = trial.payload.pressure_psi
             axis.plot(x, trial.channels["force_N"], color=colours[pressure], alpha=0.35, lw=0.7)
             axis.plot(x, prediction["force_N"], color=colours[pressure], lw=1.2, ls="--", label=f"{pressure:g} psi")
-        axis.axhline(0.0, color=MEASURED, lw=0.6)
+        axis.axhline(0.0, color=palette.quiet, lw=0.6)
         axis.set(title=f"{actuator} actuator", xlabel="displacement [mm]", ylabel="force [N]")
         _legend(axis)
     _save(figure, path)
 
 
-def _steps(pairs, path: Path) -> None:
+def _steps(pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes(2, len(groups))
     for column, (actuator, mine) in zip(axes.T, groups.items(), strict=True):
@@ -107,7 +107,7 @@ def _steps(pairs, path: Path) -> None:
     _save(figure, path)
 
 
-def _anchor(pairs, path: Path) -> None:
+def _anchor(pairs, palette: Palette, path: Path) -> None:
     figure, axes = _axes(1, 1, 6.4, 4.0)
     axis = axes[0, 0]
     colours = _colours([trial.payload.pressure_psi for trial, _ in pairs])
@@ -120,7 +120,7 @@ def _anchor(pairs, path: Path) -> None:
     _save(figure, path)
 
 
-def _walks(pairs, path: Path) -> None:
+def _walks(pairs, palette: Palette, path: Path) -> None:
     first: dict[object, tuple[Trial, Channels]] = {}
     for trial, prediction in pairs:
         first.setdefault(trial.condition, (trial, prediction))
@@ -128,8 +128,8 @@ def _walks(pairs, path: Path) -> None:
     for axis, (trial, prediction) in zip(axes[0], first.values(), strict=True):
         for channel in ("displacement_head_mm", "displacement_tail_mm"):
             if channel in trial.channels:
-                axis.plot(trial.time_s, trial.channels[channel], color=MEASURED, alpha=0.6, label="measured")
-                axis.plot(trial.time_s, prediction[channel], color=PREDICTED, ls="--", label="model")
+                axis.plot(trial.time_s, trial.channels[channel], color=palette.measured, alpha=0.6, label="measured")
+                axis.plot(trial.time_s, prediction[channel], color=palette.predicted, ls="--", label="model")
         axis.set(title=trial.name, xlabel="time [s]", ylabel="head and tail [mm]")
         _legend(axis)
     _save(figure, path)

@@ -18,6 +18,7 @@ from bifa.robot.model import Covariance
 
 from .estimate import Estimate
 from .inputs import ANCHOR
+from .robust import clustered_covariance
 from .start import fit_statics, start
 from .static import StaticFit
 from .system import RobotSystem
@@ -96,11 +97,7 @@ def identify(
     fit = fit_base(system, system.trials)
     progress("what is known now")
     known = uncertainty(fit, confidence=CONFIDENCE)
-    intervals = {
-        e.name: Estimate(e.value, e.sd, e.lower, e.upper, CONFIDENCE)
-        for e in known.estimates
-        if e.name in system.fitted and e.determined
-    }
+    intervals = _intervals(system, fit, known)
     intervals |= _profiles(fit, intervals)
     return Identification(
         system=system,
@@ -112,6 +109,20 @@ def identify(
         open=_open(system, dataset, known),
         error=_errors(fit),
     )
+
+
+def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, Estimate]:
+    """Quadratic intervals, wider where the experiments contradict one another by more than their noise."""
+    spread = np.sqrt(np.diag(clustered_covariance(fit)))
+    found = {}
+    for estimate, between in zip(known.estimates, spread, strict=True):
+        if estimate.name in system.fitted and estimate.determined:
+            sd = max(estimate.sd, float(between))
+            low, high = estimate.value - _NORMAL_HALF * sd, estimate.value + _NORMAL_HALF * sd
+            parameter = system.model.parameters[estimate.name]
+            low, high = max(low, parameter.lower), min(high, parameter.upper)
+            found[estimate.name] = Estimate(estimate.value, sd, low, high, CONFIDENCE)
+    return found
 
 
 def _profiles(fit: Fit, intervals: Mapping[str, Estimate]) -> dict[str, Estimate]:

@@ -21,14 +21,15 @@ def print_report(console: Console, found: Identification) -> None:
 
 
 def _parameters(found: Identification) -> Table:
-    table = Table(title="Parameters (90 % intervals)")
+    table = Table(title="Parameters (90 % intervals)", box=None, title_justify="left")
     for column in ("parameter", "value", "interval", "unit", "remark"):
-        table.add_column(column, justify="right" if column in ("value", "interval") else "left")
+        right = column in ("value", "interval")
+        table.add_column(column, justify="right" if right else "left", no_wrap=column != "remark")
     estimates = {e.name: e for e in found.uncertainty.estimates}
     for name, parameter in found.model.parameters.items():
         interval = found.intervals.get(name)
         if interval is None:
-            remark = "known" if name in found.system.dataset.known else "not determined: see below"
+            remark = "known" if name in found.system.dataset.known else "open"
             table.add_row(name, f"{parameter.value:.5g}", "", parameter.unit, remark)
             continue
         estimate = estimates[name]
@@ -63,11 +64,13 @@ def remarks(found: Identification) -> list[str]:
 
 
 def _errors(found: Identification) -> Table:
-    table = Table(title=f"Error (RMS; {effective_samples(found.fit):.0f} independent samples)")
-    for column in ("experiment", "channel", "in units of the noise", "noise floor", "floor from"):
-        table.add_column(column, justify="left" if column in ("experiment", "channel", "floor from") else "right")
+    title = f"RMS error in units of the noise floor ({effective_samples(found.fit):.0f} independent samples)"
+    table = Table(title=title, box=None, title_justify="left")
+    for column in ("experiment", "channel", "error", "noise", "repeats"):
+        left = column in ("experiment", "channel")
+        table.add_column(column, justify="left" if left else "right", no_wrap=True)
     for (experiment, channel), error in found.error.items():
         noise = found.fit.problem.floor.channels[experiment, channel]
-        origin = f"{noise.repeats} pairs of repeats" if noise.repeats else "the record's own fast noise"
-        table.add_row(experiment, channel, f"{error:.2f}", f"{noise.sd:.3g}", origin)
+        pairs = f"{noise.repeats} pairs" if noise.repeats else "none"
+        table.add_row(experiment, channel, f"{error:.2f}", f"{noise.sd:.3g}", pairs)
     return table

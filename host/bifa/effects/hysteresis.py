@@ -10,7 +10,7 @@ EFFECT = Effect(
     equation="K(x) + force_N z,  dz/dx = (1 - z sign(dx)) / displacement_m,  |z| <= 1",
     source="P. R. Dahl, A Solid Friction Model (1968); the 2 mm offset of the paper's Fig. 5",
     enters="eq. (1), beside K(x), in every actuator",
-    experiments=("static_loading", "step_response", "locomotion"),
+    experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
     confusable_with=("viscoelasticity", "backlash"),
     parameters=(
         EffectParameter("force_N", "N", 0.0, 20.0, 4.0, "half width of the loop, body", size=True),

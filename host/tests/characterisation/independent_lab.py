@@ -55,6 +55,7 @@ class Lab:
     small: Actuator = Actuator((1800.0, 0.0290, 0.0110, 0.08, 3.5), 0.015, 13.0, 3.05, 2.6, 0.9)
     head_mass: float = 0.180
     tail_mass: float = 0.170
+    segment_mass: float = 0.100
     wall_offset: float = 0.0268
     wall_stiffness: float = 8000.0
     wall_damping: float = 20.0
@@ -122,7 +123,7 @@ class Lab:
             return actuator.spring(x) + wall - actuator.area * pressure
 
         x = brentq(balance, 0.8 * actuator.curve[1], 1.6 * actuator.curve[1])
-        normal = 3 * max(0.0, self.wall_stiffness * (x - self.wall_offset)) + self.head_mass * G
+        normal = 3 * max(0.0, self.wall_stiffness * (x - self.wall_offset)) + self.segment_mass * G
         normal *= 1 + self.friction_wobble * self.rng.standard_normal()
         time = np.arange(0.0, 2.0, 0.02)
         pulled = rate_mm_s * 1e-3 * time
