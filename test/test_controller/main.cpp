@@ -1,0 +1,407 @@
+// The facade, tick by tick: what may be asked for when, sampling, faults and how they are released.
+#include <unity.h>
+
+#include "../suite.h"
+#include "controller.h"
+#include "parameters.h"
+
+using bifa::Calibration;
+using bifa::Chamber;
+using bifa::ChamberState;
+using bifa::Controller;
+using bifa::Fault;
+using bifa::ParameterSet;
+using bifa::RawRound;
+using bifa::Sample;
+using bifa::StartCause;
+using bifa::State;
+using bifa::Verdict;
+
+namespace {
+
+const uint16_t kZero = 512 * bifa::kOversampling;
+const uint16_t kMonitorZero = 0;
+const uint8_t kBodyPositive = 0x01;
+const uint8_t kBodyVacuum = 0x02;
+
+class Pins : public bifa::ValvePins {
+ public:
+  void write(bifa::ValvePattern pattern) override { bits = pattern.bits(); }
+  uint8_t bits = 0;
+};
+
+/// A controller, and a board around it whose converter answers at once.
+struct Bench {
+  Pins pins;
+  Controller controller;
+  RawRound round = {{kZero, kZero, kZero}, kMonitorZero};
+  bool pressed = false;
+  uint16_t rounds = 0;
+  bool noisy = true;  ///< the last bit of the readings moves, as that of a sensor that lives
+
+  explicit Bench(StartCause cause = StartCause::kPower, ParameterSet set = bifa::factory_preset(0)) : controller(pins) {
+    controller.begin(cause, set, Calibration());
+  }
+
+  void tick(uint32_t times = 1) {
+    for (; times > 0; --times) {
+      const bool begins = controller.tick(pressed);
+      if (!begins) continue;
+      ++rounds;
+      RawRound seen = round;
+      if (noisy && rounds % 2) ++seen.sum[0], ++seen.sum[1], ++seen.sum[2];
+      controller.converted_in_interrupt(seen);
+    }
+  }
+
+  State state() const { return controller.state(); }
+  Fault fault() const { return controller.status().fault.fault; }
+  void pressure(uint8_t chamber, uint16_t conversion) { round.sum[chamber] = conversion * bifa::kOversampling; }
+};
+
+void equal(Verdict expected, Verdict actual) {
+  TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(actual));
+}
+void equal(State expected, State actual) {
+  TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(actual));
+}
+void equal(Fault expected, Fault actual) {
+  TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(actual));
+}
+
+// ---- what may be asked for when ----
+
+void test_it_starts_idle_and_vented() {
+  Bench bench;
+  bench.tick(100);
+  equal(State::kIdle, bench.state());
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+}
+
+void test_run_walks_with_the_body_at_vacuum_first() {
+  Bench bench;
+  equal(Verdict::kDone, bench.controller.run());
+  bench.tick(10);
+  equal(State::kRunning, bench.state());
+  TEST_ASSERT_EQUAL_HEX8(0x02 | 0x04 | 0x20, bench.pins.bits);  // baseline: head 270, tail 90 degrees ahead
+  equal(Verdict::kRefused, bench.controller.run());
+}
+
+void test_stop_vents_and_returns_to_idle() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(10);
+  equal(Verdict::kDone, bench.controller.stop());
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+  equal(State::kIdle, bench.state());
+}
+
+void test_hold_is_for_idle_and_holding_only() {
+  Bench bench;
+  equal(Verdict::kDone, bench.controller.hold(Chamber::kBody, ChamberState::kPositive));
+  bench.tick(5);
+  TEST_ASSERT_EQUAL_HEX8(kBodyPositive, bench.pins.bits);
+  equal(Verdict::kRefused, bench.controller.run());
+  bench.controller.stop();
+  bench.controller.run();
+  equal(Verdict::kRefused, bench.controller.hold(Chamber::kBody, ChamberState::kPositive));
+}
+
+void test_a_stop_byte_latches_until_clear() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(10);
+  bench.controller.stop_in_interrupt();
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+  equal(Verdict::kLatched, bench.controller.run());
+  equal(Verdict::kLatched, bench.controller.hold(Chamber::kBody, ChamberState::kVacuum));
+  equal(Verdict::kLatched, bench.controller.schedule_start());
+  equal(Verdict::kDone, bench.controller.stop());
+  equal(State::kStopped, bench.state());
+  equal(Verdict::kDone, bench.controller.clear());
+  equal(State::kIdle, bench.state());
+}
+
+void test_emergency_stop_holds_as_long_as_it_is_pressed() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(10);
+  bench.pressed = true;
+  bench.tick();
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+  equal(State::kStopped, bench.state());
+  equal(Verdict::kCauseStands, bench.controller.clear());
+  bench.pressed = false;
+  bench.tick();
+  equal(State::kStopped, bench.state());
+  equal(Verdict::kDone, bench.controller.clear());
+}
+
+void test_emergency_stop_that_is_pressed_at_power_up_counts() {
+  Bench bench;
+  bench.pressed = true;
+  bench.tick();
+  equal(State::kStopped, bench.state());
+}
+
+void test_a_set_that_comes_while_running_does_not_make_the_phases_jump() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(1000);
+  Sample before, after;
+  bench.controller.take_sample(before);
+  ParameterSet set = bifa::factory_preset(0);
+  set.period_us = 60000000;
+  set.duty_body_e4 = 9000;
+  bench.controller.apply(set);
+  bench.tick(11);
+  bench.controller.take_sample(after);
+  for (uint8_t i = 0; i < 3; ++i) {
+    TEST_ASSERT_UINT16_WITHIN(230, 0, static_cast<uint16_t>(after.phase[i] - before.phase[i]));  // 20 ms of 5.7 s
+  }
+}
+
+// ---- timed holds ----
+
+void test_timed_holds_come_on_their_tick() {
+  Bench bench;
+  Controller& controller = bench.controller;
+  equal(Verdict::kDone, controller.schedule_add(0, Chamber::kBody, ChamberState::kVacuum));
+  equal(Verdict::kDone, controller.schedule_add(100, Chamber::kBody, ChamberState::kOff));
+  equal(Verdict::kOrder, controller.schedule_add(99, Chamber::kBody, ChamberState::kOff));
+  equal(Verdict::kDone, controller.schedule_start());
+  TEST_ASSERT_TRUE(controller.status().scheduled);
+  equal(Verdict::kRefused, controller.schedule_add(200, Chamber::kBody, ChamberState::kOff));
+  bench.tick();
+  TEST_ASSERT_EQUAL_HEX8(kBodyVacuum, bench.pins.bits);
+  bench.tick(99);
+  TEST_ASSERT_EQUAL_HEX8(kBodyVacuum, bench.pins.bits);
+  bench.tick();
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+  TEST_ASSERT_FALSE(controller.status().scheduled);
+  equal(State::kIdle, bench.state());
+}
+
+void test_a_stop_ends_timed_holds() {
+  Bench bench;
+  bench.controller.schedule_add(50, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_start();
+  bench.controller.stop_in_interrupt();
+  bench.tick(2);
+  bench.controller.clear();
+  bench.tick(200);
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+}
+
+void test_a_schedule_has_room_for_sixteen() {
+  Bench bench;
+  for (uint8_t i = 0; i < 16; ++i) {
+    equal(Verdict::kDone, bench.controller.schedule_add(i, Chamber::kTail, ChamberState::kVacuum));
+  }
+  equal(Verdict::kFull, bench.controller.schedule_add(99, Chamber::kTail, ChamberState::kVacuum));
+  equal(Verdict::kDone, bench.controller.schedule_clear());
+  equal(Verdict::kDone, bench.controller.schedule_add(0, Chamber::kTail, ChamberState::kVacuum));
+}
+
+// ---- sampling ----
+
+void test_a_sample_every_ten_milliseconds_stamped_with_the_strobe() {
+  Bench bench;
+  uint32_t last_us = 0;
+  uint16_t last_sequence = 0;
+  uint8_t samples = 0;
+  for (uint16_t ms = 0; ms < 1000; ++ms) {
+    bench.tick();
+    Sample sample;
+    if (!bench.controller.take_sample(sample)) continue;
+    if (samples > 0) {
+      TEST_ASSERT_EQUAL_UINT32(10000, sample.time_us - last_us);
+      TEST_ASSERT_EQUAL_UINT16(1, static_cast<uint16_t>(sample.sequence - last_sequence));
+    }
+    last_us = sample.time_us;
+    last_sequence = sample.sequence;
+    ++samples;
+  }
+  TEST_ASSERT_UINT16_WITHIN(1, 100, samples);
+  TEST_ASSERT_UINT16_WITHIN(1, 100, bench.rounds);
+  TEST_ASSERT_EQUAL_UINT16(0, bench.controller.status().samples_lost);
+}
+
+void test_samples_that_nobody_takes_are_counted() {
+  Bench bench;
+  bench.tick(1005);
+  TEST_ASSERT_UINT16_WITHIN(2, 99, bench.controller.status().samples_lost);
+}
+
+void test_zero_is_measured_while_idle_and_taken_off_every_sample() {
+  Bench bench;
+  bench.noisy = false;
+  bench.pressure(0, 518);
+  bench.tick(5000);
+  Calibration zero;
+  equal(Verdict::kDone, bench.controller.measure_zero(zero));
+  TEST_ASSERT_INT16_WITHIN(5, 238, zero.offset_mpsi[0]);  // 6.5 steps of 36.6
+  bench.controller.calibrate(zero);
+  bench.tick(20);
+  TEST_ASSERT_INT16_WITHIN(5, 0, bench.controller.status().pressure_mpsi[0]);
+  bench.controller.run();
+  equal(Verdict::kRefused, bench.controller.measure_zero(zero));
+}
+
+void test_a_chamber_under_pressure_is_not_taken_for_zero() {
+  Bench bench;
+  bench.pressure(1, 512 + 40);  // 1.5 psi
+  bench.tick(5000);
+  Calibration zero;
+  equal(Verdict::kRefused, bench.controller.measure_zero(zero));
+}
+
+// ---- faults ----
+
+void test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(100);
+  bench.pressure(2, 512 + 330);  // 12.1 psi; the trip is at 10.5
+  bench.tick(250);
+  equal(Fault::kOverPressure, bench.fault());
+  TEST_ASSERT_EQUAL_HEX8(0, bench.pins.bits);
+  TEST_ASSERT_EQUAL_UINT16(0, bench.controller.supply().counts());
+  const bifa::FaultReport report = bench.controller.status().fault;
+  TEST_ASSERT_EQUAL_UINT8(2, report.channel);
+  TEST_ASSERT_EQUAL_INT16(10500, report.limit);
+  TEST_ASSERT_INT16_WITHIN(40, 12100, report.value);
+  TEST_ASSERT_INT16_WITHIN(40, 12100, report.highest_mpsi[2]);
+  equal(Verdict::kCauseStands, bench.controller.clear());
+  bench.pressure(2, 512);
+  bench.tick(20);
+  equal(Verdict::kDone, bench.controller.clear());
+  equal(State::kIdle, bench.state());
+  TEST_ASSERT_TRUE(bench.controller.supply().counts() > 0);
+}
+
+void test_a_spike_of_a_hundred_milliseconds_is_borne() {
+  Bench bench;
+  bench.controller.run();
+  bench.pressure(2, 512 + 330);
+  bench.tick(100);
+  bench.pressure(2, 512);
+  bench.tick(500);
+  equal(State::kRunning, bench.state());
+}
+
+void test_a_broken_sensor_is_a_fault_in_any_state_even_idle() {
+  Bench bench;
+  bench.pressure(0, 0);
+  bench.tick(100);
+  equal(Fault::kSensorRange, bench.fault());
+  equal(Verdict::kCauseStands, bench.controller.clear());
+}
+
+void test_a_stuck_sensor_is_a_fault_while_walking() {
+  Bench bench;
+  bench.noisy = false;
+  bench.controller.run();
+  bench.tick(5700);
+  equal(Fault::kSensorStuck, bench.fault());
+}
+
+void test_a_silent_host_vents_when_it_was_asked_to() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.host_timeout_ms = 500;
+  Bench bench(StartCause::kPower, set);
+  bench.tick(5000);
+  equal(State::kIdle, bench.state());  // nothing to vent
+  bench.controller.run();
+  for (uint8_t i = 0; i < 10; ++i) {
+    bench.tick(400);
+    bench.controller.host_heard();
+  }
+  equal(State::kRunning, bench.state());
+  bench.tick(499);
+  equal(State::kRunning, bench.state());
+  bench.tick(1);
+  equal(Fault::kHostSilent, bench.fault());
+  equal(Verdict::kDone, bench.controller.clear());
+}
+
+void test_without_a_time_out_the_host_may_be_silent_forever() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(70000);
+  equal(State::kRunning, bench.state());
+}
+
+void test_a_dac_that_does_not_answer_is_a_fault_until_it_does() {
+  Bench bench;
+  bench.controller.supply_told(false);
+  bench.controller.supply_told(false);
+  equal(State::kIdle, bench.state());
+  bench.controller.supply_told(false);
+  equal(Fault::kSupplyControl, bench.fault());
+  equal(Verdict::kCauseStands, bench.controller.clear());
+  bench.controller.supply_told(true);
+  equal(Verdict::kDone, bench.controller.clear());
+}
+
+void test_after_the_watchdog_or_a_brown_out_it_starts_in_a_fault() {
+  Bench hung(StartCause::kWatchdog);
+  equal(Fault::kWatchdog, hung.fault());
+  equal(Verdict::kLatched, hung.controller.run());
+  equal(Verdict::kDone, hung.controller.clear());
+  Bench sagged(StartCause::kBrownOut);
+  equal(Fault::kBrownOut, sagged.fault());
+  Bench reset(StartCause::kExternal);
+  equal(State::kIdle, reset.state());
+}
+
+void test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read() {
+  Bench bench(StartCause::kWatchdog);
+  bench.controller.stop_in_interrupt();
+  equal(State::kFault, bench.state());
+  equal(Fault::kWatchdog, bench.fault());
+}
+
+// ---- the set-point ----
+
+void test_pressures_beyond_14_psi_end_at_14_psi_even_from_a_set_that_nobody_checked() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.pressure_mpsi = 65535;
+  Bench bench(StartCause::kPower, set);
+  TEST_ASSERT_EQUAL_UINT16(441, bench.controller.supply().counts());
+}
+
+void run() {
+  RUN_TEST(test_it_starts_idle_and_vented);
+  RUN_TEST(test_run_walks_with_the_body_at_vacuum_first);
+  RUN_TEST(test_stop_vents_and_returns_to_idle);
+  RUN_TEST(test_hold_is_for_idle_and_holding_only);
+  RUN_TEST(test_a_stop_byte_latches_until_clear);
+  RUN_TEST(test_emergency_stop_holds_as_long_as_it_is_pressed);
+  RUN_TEST(test_emergency_stop_that_is_pressed_at_power_up_counts);
+  RUN_TEST(test_a_set_that_comes_while_running_does_not_make_the_phases_jump);
+  RUN_TEST(test_timed_holds_come_on_their_tick);
+  RUN_TEST(test_a_stop_ends_timed_holds);
+  RUN_TEST(test_a_schedule_has_room_for_sixteen);
+  RUN_TEST(test_a_sample_every_ten_milliseconds_stamped_with_the_strobe);
+  RUN_TEST(test_samples_that_nobody_takes_are_counted);
+  RUN_TEST(test_zero_is_measured_while_idle_and_taken_off_every_sample);
+  RUN_TEST(test_a_chamber_under_pressure_is_not_taken_for_zero);
+  RUN_TEST(test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands);
+  RUN_TEST(test_a_spike_of_a_hundred_milliseconds_is_borne);
+  RUN_TEST(test_a_broken_sensor_is_a_fault_in_any_state_even_idle);
+  RUN_TEST(test_a_stuck_sensor_is_a_fault_while_walking);
+  RUN_TEST(test_a_silent_host_vents_when_it_was_asked_to);
+  RUN_TEST(test_without_a_time_out_the_host_may_be_silent_forever);
+  RUN_TEST(test_a_dac_that_does_not_answer_is_a_fault_until_it_does);
+  RUN_TEST(test_after_the_watchdog_or_a_brown_out_it_starts_in_a_fault);
+  RUN_TEST(test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read);
+  RUN_TEST(test_pressures_beyond_14_psi_end_at_14_psi_even_from_a_set_that_nobody_checked);
+}
+
+}  // namespace
+
+void setUp() {}
+void tearDown() {}
+
+RUN_SUITE(run)

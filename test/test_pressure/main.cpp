@@ -1,0 +1,97 @@
+// Conversions to pressures, and the extremes of the last second.
+#include <unity.h>
+
+#include "../suite.h"
+#include "calibration.h"
+#include "extremes.h"
+#include "sensor.h"
+
+using bifa::kOversampling;
+using bifa::LastSecond;
+using bifa::sensor_mpsi;
+
+namespace {
+
+void test_sensor_spans_15_psi_either_way_from_10_to_90_percent_of_the_supply() {
+  // Half a step is added to every conversion: a converter rounds down.
+  TEST_ASSERT_INT16_WITHIN(20, 0, sensor_mpsi(512 * kOversampling));
+  TEST_ASSERT_INT16_WITHIN(20, -15000, sensor_mpsi(static_cast<uint16_t>(102.4 * kOversampling)));
+  TEST_ASSERT_INT16_WITHIN(20, 15000, sensor_mpsi(static_cast<uint16_t>(921.6 * kOversampling)));
+}
+
+void test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it() {
+  int16_t last = sensor_mpsi(0);
+  TEST_ASSERT_INT16_WITHIN(1, -18732, last);
+  for (uint16_t sum = 1; sum <= 1023 * kOversampling; ++sum) {
+    const int16_t pressure = sensor_mpsi(sum);
+    TEST_ASSERT_INT16_WITHIN(3, last + 4, pressure);  // 4.58 mpsi a step
+    last = pressure;
+  }
+  TEST_ASSERT_INT16_WITHIN(1, 18731, last);
+}
+
+void test_range_of_a_sensor_that_works_is_its_diagnostic_band() {
+  TEST_ASSERT_FALSE(bifa::is_in_range(0));
+  TEST_ASSERT_FALSE(bifa::is_in_range(25 * kOversampling));
+  TEST_ASSERT_TRUE(bifa::is_in_range(26 * kOversampling));
+  TEST_ASSERT_TRUE(bifa::is_in_range(997 * kOversampling));
+  TEST_ASSERT_FALSE(bifa::is_in_range(998 * kOversampling));
+  TEST_ASSERT_FALSE(bifa::is_in_range(1023 * kOversampling));
+}
+
+void test_monitor_of_the_regulator_is_0_to_130_psi_at_1_to_5_volts() {
+  TEST_ASSERT_INT16_WITHIN(160, 0, bifa::monitor_mpsi(205));
+  TEST_ASSERT_INT16_WITHIN(160, 8500, bifa::monitor_mpsi(258));
+  TEST_ASSERT_EQUAL_INT16(INT16_MAX, bifa::monitor_mpsi(1023));
+  TEST_ASSERT_INT16_WITHIN(160, -32420, bifa::monitor_mpsi(0));
+}
+
+void test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets() {
+  const bifa::Calibration good = {{900, -900, 0}};
+  const bifa::Calibration high = {{0, 901, 0}};
+  const bifa::Calibration low = {{0, 0, -901}};
+  TEST_ASSERT_TRUE(bifa::is_valid(good));
+  TEST_ASSERT_FALSE(bifa::is_valid(high));
+  TEST_ASSERT_FALSE(bifa::is_valid(low));
+}
+
+void add(LastSecond& last, int16_t pressure, uint16_t samples) {
+  const int16_t pressures[] = {pressure, static_cast<int16_t>(-pressure), 0};
+  for (; samples > 0; --samples) last.add(pressures);
+}
+
+void test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon_after() {
+  LastSecond last;
+  add(last, 100, 200);
+  add(last, 5000, 1);
+  add(last, 100, 99);
+  TEST_ASSERT_EQUAL_INT16(5000, last.highest_mpsi(0));
+  TEST_ASSERT_EQUAL_INT16(-5000, last.lowest_mpsi(1));
+  TEST_ASSERT_EQUAL_INT16(0, last.highest_mpsi(2));
+  add(last, 100, 40);
+  TEST_ASSERT_EQUAL_INT16(100, last.highest_mpsi(0));
+  TEST_ASSERT_EQUAL_INT16(-100, last.lowest_mpsi(1));
+}
+
+void test_last_second_knows_nothing_before_the_first_sample() {
+  LastSecond last;
+  TEST_ASSERT_EQUAL_INT16(0, last.lowest_mpsi(0));
+  TEST_ASSERT_EQUAL_INT16(0, last.highest_mpsi(0));
+}
+
+void run() {
+  RUN_TEST(test_sensor_spans_15_psi_either_way_from_10_to_90_percent_of_the_supply);
+  RUN_TEST(test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it);
+  RUN_TEST(test_range_of_a_sensor_that_works_is_its_diagnostic_band);
+  RUN_TEST(test_monitor_of_the_regulator_is_0_to_130_psi_at_1_to_5_volts);
+  RUN_TEST(test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets);
+  RUN_TEST(test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon_after);
+  RUN_TEST(test_last_second_knows_nothing_before_the_first_sample);
+}
+
+}  // namespace
+
+void setUp() {}
+void tearDown() {}
+
+RUN_SUITE(run)
