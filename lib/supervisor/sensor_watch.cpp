@@ -5,8 +5,8 @@
 namespace bifa {
 
 void TripLimit::follow(uint16_t set_point_mpsi) {
-  int16_t target = static_cast<int16_t>(set_point_mpsi) + kTripMargin_mpsi;
-  if (target > kGreatestTrip_mpsi) target = kGreatestTrip_mpsi;
+  const uint16_t highest = kGreatestTrip_mpsi - kTripMargin_mpsi;
+  const int16_t target = static_cast<int16_t>(set_point_mpsi < highest ? set_point_mpsi : highest) + kTripMargin_mpsi;
   if (limit_mpsi_ - target > kTripFall_mpsi_per_sample) {
     limit_mpsi_ -= kTripFall_mpsi_per_sample;
   } else {

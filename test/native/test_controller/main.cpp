@@ -1,7 +1,7 @@
 // The facade, tick by tick: what may be asked for when, sampling, faults and how they are released.
 #include <unity.h>
 
-#include "../suite.h"
+#include "../../suite.h"
 #include "controller.h"
 #include "parameters.h"
 
@@ -344,15 +344,21 @@ void test_a_dac_that_does_not_answer_is_a_fault_until_it_does() {
   equal(Verdict::kDone, bench.controller.clear());
 }
 
-void test_after_the_watchdog_or_a_brown_out_it_starts_in_a_fault() {
-  Bench hung(StartCause::kWatchdog);
-  equal(Fault::kWatchdog, hung.fault());
-  equal(Verdict::kLatched, hung.controller.run());
-  equal(Verdict::kDone, hung.controller.clear());
-  Bench sagged(StartCause::kBrownOut);
-  equal(Fault::kBrownOut, sagged.fault());
-  Bench reset(StartCause::kExternal);
-  equal(State::kIdle, reset.state());
+void test_after_the_watchdog_it_starts_in_a_fault() {
+  Bench bench(StartCause::kWatchdog);
+  equal(Fault::kWatchdog, bench.fault());
+  equal(Verdict::kLatched, bench.controller.run());
+  equal(Verdict::kDone, bench.controller.clear());
+}
+
+void test_after_a_brown_out_it_starts_in_a_fault() {
+  Bench bench(StartCause::kBrownOut);
+  equal(Fault::kBrownOut, bench.fault());
+}
+
+void test_after_a_reset_from_outside_it_starts_idle() {
+  Bench bench(StartCause::kExternal);
+  equal(State::kIdle, bench.state());
 }
 
 void test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read() {
@@ -394,7 +400,9 @@ void run() {
   RUN_TEST(test_a_silent_host_vents_when_it_was_asked_to);
   RUN_TEST(test_without_a_time_out_the_host_may_be_silent_forever);
   RUN_TEST(test_a_dac_that_does_not_answer_is_a_fault_until_it_does);
-  RUN_TEST(test_after_the_watchdog_or_a_brown_out_it_starts_in_a_fault);
+  RUN_TEST(test_after_the_watchdog_it_starts_in_a_fault);
+  RUN_TEST(test_after_a_brown_out_it_starts_in_a_fault);
+  RUN_TEST(test_after_a_reset_from_outside_it_starts_idle);
   RUN_TEST(test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read);
   RUN_TEST(test_pressures_beyond_14_psi_end_at_14_psi_even_from_a_set_that_nobody_checked);
 }
