@@ -24,6 +24,7 @@ def bayesian_optimisation(
     """
     from bayes_opt import BayesianOptimization
     from bayes_opt.acquisition import UpperConfidenceBound
+    from threadpoolctl import threadpool_limits
 
     recorder = Recorder(objective, wraps, report)
     names = [f"x{axis}" for axis in range(len(wraps))]
@@ -36,7 +37,8 @@ def bayesian_optimisation(
         allow_duplicate_points=True,
     )
     initial = np.random.default_rng([seed, 3]).random((min(_INITIAL, evaluations), len(wraps)))
-    with warnings.catch_warnings():
+    # The matrices are small: threads of the linear algebra library only get into each other's way.
+    with warnings.catch_warnings(), threadpool_limits(1):
         # Hyperparameters at their bounds and repeated points are usual where most of the cube has speed 0.
         warnings.simplefilter("ignore")
         for point in initial:

@@ -1,0 +1,63 @@
+"""`bifa optimize` and `bifa gaits` from the outside."""
+
+import tomllib
+
+import pytest
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.errors import BifaError
+from bifa.robot import load_gait, nominal, save_model
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
+    model, out = tmp_path / "model.toml", tmp_path / "gait.toml"
+    save_model(model, nominal())
+    result = invoke("optimize", "--model", model, "--out", out, "--nominal", "--method", "cma", "--evaluations", 400)
+    assert result.exit_code == 0, result.output
+    assert load_gait(out).period_s <= 4.0
+    notes = tomllib.loads(out.read_text())["provenance"]
+    assert notes["method"] == "cma"
+    assert notes["predicted_speed_mm_s"] > 10
+    pictures = {path.name for path in (tmp_path / "gait").iterdir()}
+    assert pictures == {"changes.png", "sensitivity.png", "front.png", "distribution.png"}
+    assert "The body has" in result.output
+    assert "10th percentile of 512 robots" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--method", "sgd"], "'sgd' is not one of de, cma, bo"),
+        (["--spread", "0.9"], "spread = 0.9 is outside its range"),
+        (["--period", "0.1", "4"], "period_s: 0.1 to 4 must be a range within 0.5 to 60 s"),
+        (["--period", "4", "2"], "must be a range"),
+        (["--model", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_bad_input_names_the_range(tmp_path, arguments, words):
+    result = invoke("optimize", "--out", tmp_path / "gait.toml", *arguments)
+    assert isinstance(result.exception, BifaError), result.output
+    assert words in str(result.exception)
+    assert not (tmp_path / "gait.toml").exists()
+
+
+def test_a_folder_that_is_not_there_is_noticed_before_the_search(tmp_path):
+    result = invoke("optimize", "--out", tmp_path / "no" / "gait.toml")
+    assert "does not exist" in str(result.exception)
+
+
+def test_gaits_lists_the_library():
+    result = invoke("gaits")
+    assert result.exit_code == 0, result.output
+    for name in ("fast", "robust", "obstacle", "vertical", "backward", "quiet"):
+        assert name in result.output
+
+
+def test_gaits_refuses_an_unknown_scenario(tmp_path):
+    result = invoke("gaits", "--make", "--only", "moon", "--folder", tmp_path)
+    assert "the library has fast" in str(result.exception)
