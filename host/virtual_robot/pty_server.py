@@ -16,6 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from virtual_robot.errors import VirtualRobotError
+
 _SLICE_S = 0.005
 _STATUS_S = 0.25
 _BOOTLOADER_S = 0.5
@@ -48,6 +50,8 @@ def serve(
 
 
 def _point(link: Path, path: str) -> None:
+    if link.exists() and not link.is_symlink():
+        raise VirtualRobotError(f"{link} exists and is no symbolic link; choose another name for the link")
     temporary = link.with_name(f".{link.name}.{os.getpid()}")
     temporary.symlink_to(path)
     os.replace(temporary, link)

@@ -33,6 +33,9 @@ def main() -> None:
     """Run the command; an expected error ends in one clear sentence and exit status 2."""
     try:
         app()
-    except BifaError as error:
+    except Exception as error:
+        # A rig that another package offers cannot know BifaError; it marks its errors.
+        if not isinstance(error, BifaError) and not getattr(error, "for_the_user", False):
+            raise
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)

@@ -42,10 +42,14 @@ def register(app: typer.Typer) -> None:
 
         Opening the port resets the board, as with a real Uno. 250000 baud; any serial program will do.
         """
+        import signal
+
         from rich.console import Console
 
         from bifa.rig import open_rig
 
+        for ending in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C
         console = Console()
         effects = dict(_effect(text) for text in effect or [])
         options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}

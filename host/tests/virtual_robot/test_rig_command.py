@@ -1,5 +1,6 @@
 """`bifa rig` as a person uses it: it says where the port is, serves it, and Ctrl-C leaves nothing behind."""
 
+import signal
 import sys
 from pathlib import Path
 
@@ -13,7 +14,8 @@ GREET = "int main(void) { serial(); for (;;) { put('H'); put('i'); put('\\n'); _
 BIFA = str(Path(sys.executable).with_name("bifa"))
 
 
-def test_serve_and_stop(image, tmp_path):
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_serve_and_stop(image, tmp_path, ending):
     link = tmp_path / "uno"
     arguments = ["rig", "--firmware", str(image(GREET)), "--link", str(link), "--eeprom", str(tmp_path / "eeprom")]
     child = pexpect.spawn(BIFA, arguments, timeout=60, encoding="utf-8", dimensions=(24, 300))
@@ -21,7 +23,7 @@ def test_serve_and_stop(image, tmp_path):
     with serial.Serial(str(link), 250000, timeout=10) as port:
         assert port.readline() == b"Hi\n"
     child.expect("port open")
-    child.sendintr()
+    child.kill(ending)
     child.expect("stopped")
     child.expect(pexpect.EOF)
     child.close()
@@ -36,6 +38,7 @@ def test_serve_and_stop(image, tmp_path):
         (["--firmware", "missing.elf"], "pio run -e uno"),
         (["--effect", "leak:much"], "NAME:PARAMETER=VALUE"),
         (["--profile", "perfect"], "ideal, realistic"),
+        (["--link", __file__], "no symbolic link"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_line(arguments, message, image):
