@@ -23,9 +23,11 @@ bifa::HostPort port(controller, cells, uart);
 
 const uint16_t kSupplyEvery_ms = 100;
 
-/// Something has happened that the main loop may have to attend to. Conversions and sent bytes are not: they would wake
-/// it some thousand times a second for nothing.
+/// Something has happened that the main loop may have to attend to: a byte arrived, or time passed. It would wake for
+/// every tick, conversion and sent byte otherwise, some thousand times a second for nothing.
 volatile bool attend = true;
+/// How often it looks without a byte: about as often as the EEPROM can take one.
+const uint8_t kAttendEvery_ms = 4;
 
 /// Tells the regulator its set-point when that has changed, and again from time to time.
 void tell_supply() {
@@ -42,7 +44,11 @@ void tell_supply() {
 }  // namespace
 
 bool board::on_tick(bool emergency_stop_pressed) {
-  attend = true;
+  static uint8_t until_attend = kAttendEvery_ms;
+  if (--until_attend == 0) {
+    until_attend = kAttendEvery_ms;
+    attend = true;
+  }
   port.tick_in_interrupt();
   return controller.tick(emergency_stop_pressed);
 }
@@ -67,7 +73,7 @@ void setup() {
 }
 
 void loop() {
-  while (!attend) sleep_mode();  // an interrupt between the two costs a millisecond at most
+  while (!attend) sleep_mode();  // an interrupt between the two costs a tick at most
   attend = false;
   board::watchdog_feed();
   port.poll();

@@ -55,8 +55,9 @@ ISR(ADC_vect) {
   }
   const uint8_t converted = channel;
   ++conversion;
-  if (conversion % bifa::kChamberCount != 0) {
-    channel += direction;
+  const uint8_t next = channel + direction;
+  if (next < bifa::kChamberCount) {  // also false for "-1"
+    channel = next;
   } else {
     direction = -direction;  // the same channel once more, on the way back
   }

@@ -11,13 +11,13 @@ namespace board {
 namespace {
 
 const uint32_t kBaud = 250000;
-const uint8_t kRingBytes = 128;
+const uint8_t kRingBytes = 96;
 
 uint8_t ring[kRingBytes];
 volatile uint8_t head;  // where the next byte goes in
 volatile uint8_t tail;  // where the next byte comes out
 
-uint8_t after(uint8_t place) { return (place + 1) % kRingBytes; }
+uint8_t after(uint8_t place) { return place + 1 == kRingBytes ? 0 : place + 1; }
 
 }  // namespace
 
@@ -35,7 +35,10 @@ void Uart::write(uint8_t byte) {
   UCSR0B |= 1 << UDRIE0;
 }
 
-uint8_t Uart::room() const { return static_cast<uint8_t>(tail - head - 1) % kRingBytes; }
+uint8_t Uart::room() const {
+  const uint8_t out = tail;
+  return out > head ? out - head - 1 : kRingBytes + out - head - 1;
+}
 
 }  // namespace board
 

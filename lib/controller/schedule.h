@@ -26,8 +26,7 @@ class Schedule {
 
   struct Entry {
     uint32_t time_ms;
-    Chamber chamber;
-    ChamberState state;
+    uint8_t what;  ///< chamber in the upper half, state in the lower: memory is short
   };
 
   Entry entries_[kCapacity];
