@@ -11,15 +11,17 @@ from bifa.discrepancy.candidate import Candidate, judge, profile, refit
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit
 from bifa.identify.noise import NoiseFloor, estimate_noise
-from bifa.identify.problem import Problem
+from bifa.identify.problem import Point, Problem
 from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
-_BEAM = 3
-_REFITTED = {1: 8, 2: 5, 3: 3}  # effects fully refitted for each parent, by the size of the set
+_BEAM = 2
+_REFITTED = {1: 5, 2: 3, 3: 2}  # effects fully refitted for each parent, by the size of the set
+_PROFILED = 6  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
+_SEEN = 3.0  # log-likelihood of a linear regression, below which a small effect is not worth a fit
 _ABSORBED = 0.02  # a change in the residual of which less than this share is left after the base's is absorbed
 
 Progress = Callable[[str], None]
@@ -27,13 +29,17 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Screened:
-    """What the data could tell of an effect of typical size: `visible` standard deviations that its typical
-    size stands out by after everything that the base can imitate is taken off; `absorbed` if hardly
-    anything is left."""
+    """What the data could tell of an effect of typical size.
+
+    `visible`: standard deviations that its typical size stands out by after everything that the base can
+    imitate is taken off; `absorbed` if hardly anything is left. `gain`: log-likelihood that a linear
+    regression of the residual on that direction would bring.
+    """
 
     effect: str
     visible: float
     absorbed: bool
+    gain: float
 
     @property
     def detectable(self) -> bool:
@@ -61,6 +67,8 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
     reference = parent.problem.residuals(parent.solution.point)
     flat = _stack(jacobians)
     basis = _orthonormal(flat)
+    residual = np.concatenate(reference)
+    remaining = residual - basis @ (basis.T @ residual)
     for name, effect in parent.structure.system.effects.items():
         if name in parent.structure.effects:
             continue
@@ -71,11 +79,12 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
             | parent.theta
             | {effect.full_name(p): p.value for p in effect.parameters}
         )
-        moved = problem.residuals(type(parent.solution.point)(values, parent.solution.point.nuisances))
+        moved = problem.residuals(Point(values, parent.solution.point.nuisances))
         change = np.concatenate([m - r for m, r in zip(moved, reference, strict=True)])
         left = change - basis @ (basis.T @ change)
         size, visible = float(np.linalg.norm(change)), float(np.linalg.norm(left))
-        found.append(Screened(name, visible, size == 0 or visible < _ABSORBED * size))
+        gain = 0.5 * float(left @ remaining) ** 2 / max(visible**2, 1e-300)
+        found.append(Screened(name, visible, size == 0 or visible < _ABSORBED * size, gain))
     return found
 
 
@@ -114,10 +123,14 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, progress: Prog
     first = judge(base, split)
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     beam = [first]
+    everything = list(base.structure.system.effects)
+    # small effects only, if any, where the base passes: those that a regression on their direction sees at
+    # all
+    library = [s.effect for s in screened if s.gain > _SEEN] if enough(first) else everything
     for size in range(1, LARGEST_SET + 1):
         grown: list[Candidate] = []
         for parent in beam:
-            grown += _grow(parent, size, split, floor, tried, progress)
+            grown += _grow(parent, library, split, floor, tried, progress)
         if not grown:
             break
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
@@ -150,9 +163,12 @@ def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor) -> Candidat
     return judge(replace(candidate.fitted, problem=problem, solution=solution), split)
 
 
-def _grow(parent: Candidate, size, split, floor, tried, progress) -> list[Candidate]:
-    library = parent.fitted.structure.system.effects
+def _grow(parent: Candidate, library, split, floor, tried, progress) -> list[Candidate]:
+    size = len(parent.effects) + 1
     fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
+    if parent.effects:
+        gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
+        fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
     profiles = []
     for effect in fresh:
         progress(f"trying {' + '.join((*parent.effects, effect))}")

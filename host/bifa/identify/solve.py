@@ -11,8 +11,9 @@ from bifa.identify.problem import Point, Problem
 
 Jacobians = list[tuple[np.ndarray, np.ndarray]]  # of each trial: by the free parameters, by its nuisances
 _ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
-_RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
+_RELATIVE = 1e-4  # of the cost: far from the floor no more is needed
 _NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
+_REACH = 10.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 
 
@@ -72,7 +73,8 @@ def solve(
         system = _linearise(problem, point, free, residuals, jacobians)
         accepted = False
         while damping < _LAMBDA_MOST:
-            step, promise = _step(system, x, lower, upper, scale, damping)
+            reach = _REACH * scale
+            step, promise = _step(system, x, np.maximum(lower, x - reach), np.minimum(upper, x + reach), scale, damping)
             if promise < max(_ENOUGH, _RELATIVE * cost):
                 break
             trial_point = _unpack(point, free, x + step)
@@ -89,7 +91,7 @@ def solve(
         if accepted:
             gain = cost - trial_cost
             x, point, residuals, cost = x + step, trial_point, trial_residuals, trial_cost
-            if keep or (fresh and 0.9 < ratio < 1.1):
+            if keep or (fresh and 0.8 < ratio < 1.25):
                 fresh = False
                 continue
             if gain < max(_ENOUGH, _RELATIVE * cost) and fresh:

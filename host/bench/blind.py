@@ -1,0 +1,181 @@
+"""Blind trial of the diagnosis: sealed data sets, verdicts first, labels opened afterwards.
+
+    python -m bench.blind --singles 60 --none 20 --outside 20 --pairs 20 [--jobs 2] [--out FOLDER]
+
+Each data set is drawn by `python -m virtual_robot.sealed` from its seed; verdicts are kept in FOLDER, so
+that an interrupted trial continues. Prints the figures with 95 % Wilson intervals beside four baselines
+that see the same fits: the best single refit by error, BIC, greedy forward selection, and sparse regression
+on the base model's residual.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+BASELINES = ("best single", "BIC", "greedy", "sparse regression")
+
+
+def diagnose_sealed(seed: int, kind: str, out: Path) -> dict:
+    """Draw, diagnose, and only then open the label. Returns the record kept for one data set."""
+    kept = out / f"{kind}-{seed}.json"
+    if kept.exists():
+        return json.loads(kept.read_text())
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, verdict = Path(scratch) / "sealed", Path(scratch) / "verdict.json"
+        options = [] if kind == "single" else [f"--{kind}"]
+        label = Path(scratch) / "label" / "sealed.toml"
+        label.parent.mkdir()
+        sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(seed), "--out", str(folder), *options]
+        subprocess.run([*sealed, "--label", str(label)], check=True)
+        subprocess.run([sys.executable, "-m", "bench.blind", "--one", str(folder), "--json", str(verdict)], check=True)
+        record = json.loads(verdict.read_text())
+        truth = tomllib.loads(label.read_text())
+    record |= {"seed": seed, "kind": kind, "truth": sorted(truth["effects"]), "sizes": truth["sizes"]}
+    out.mkdir(parents=True, exist_ok=True)
+    kept.write_text(json.dumps(record, indent=1))
+    return record
+
+
+def diagnose_one(folder: Path, verdict: Path) -> None:
+    """The diagnosis of one folder, with what the baselines would have said of the same fits."""
+    from bifa.characterisation.system import prepare
+    from bifa.data import read_dataset
+    from bifa.discrepancy.diagnosis import diagnose
+    from bifa.discrepancy.record import as_record
+
+    found = diagnose(prepare(read_dataset(folder)))
+    verdict.write_text(json.dumps(as_record(found) | {"baselines": baselines(found.search)}))
+
+
+def baselines(search) -> dict[str, list[str]]:
+    """What simpler rules name: always something, for those that know no "none"."""
+    singles = [c for c in search.tried if len(c.effects) == 1]
+    by_error = min(singles or [search.base], key=lambda c: c.fitted.cost + c.checked.cost)
+    by_bic = min(search.tried, key=_bic)
+    greedy = search.base
+    while True:
+        larger = [c for c in search.tried if set(greedy.effects) < set(c.effects)]
+        larger = [c for c in larger if len(c.effects) == len(greedy.effects) + 1]
+        best = min(larger, key=_bic, default=None)
+        if best is None or _bic(best) >= _bic(greedy):
+            break
+        greedy = best
+    sparse = max(search.screened, key=lambda s: s.gain)
+    named = (by_error.effects, by_bic.effects, greedy.effects, (sparse.effect,))
+    return {name: list(effects) for name, effects in zip(BASELINES, named, strict=True)}
+
+
+def _bic(candidate) -> float:
+    library = candidate.fitted.structure.system.effects
+    extra = sum(len(library[name].parameters) for name in candidate.effects)
+    return 2 * (candidate.fitted.cost + candidate.checked.cost) + extra * math.log(candidate.pieces)
+
+
+def wilson(hits: int, of: int) -> tuple[float, float]:
+    """95 % interval of a share."""
+    if of == 0:
+        return 0.0, 1.0
+    z, share = 1.96, hits / of
+    centre = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return centre - half, centre + half
+
+
+def report(records: list[dict]) -> None:
+    """Print the figures of all data sets diagnosed."""
+    by_kind = {kind: [r for r in records if r["kind"] == kind] for kind in ("single", "none", "outside", "pair")}
+    single, none, outside, pair = by_kind.values()
+    _share("one effect: named first", [_first(r) in r["truth"] for r in single])
+    _share("one effect: in the reported set", [bool(set(r["truth"]) & _reported(r)) for r in single])
+    sizes = [len(_reported(r)) for r in single if r["effects"]]
+    print(f"  mean size of the reported set {sum(sizes) / max(len(sizes), 1):.2f}")
+    _share("no effect: verdict none", [r["verdict"] == "none" for r in none])
+    _share("outside the library: unexplained", [r["verdict"] == "unexplained" for r in outside])
+    _share("outside: at least half the gap closed", [_closed(r) >= 0.5 for r in outside])
+    _share("two effects: both named", [set(r["truth"]) <= {e["name"] for e in r["effects"]} for r in pair])
+    named = [r for r in single + pair if r["verdict"] == "identified"]
+    _share("identified: held-out error within 1.2 floors", [_ratio(r) <= 1.2 for r in named])
+    closed = sorted(_closed(r) for r in named)
+    if closed:
+        print(f"  median share of the gap closed {closed[len(closed) // 2]:.2f}")
+    for name in BASELINES:
+        _share(f"baseline {name}: one effect, named alone", [r["baselines"][name] == r["truth"] for r in single])
+        _share(f"baseline {name}: no effect, says none", [not r["baselines"][name] for r in none])
+    seconds = sorted(r["seconds"] for r in records)
+    print(f"seconds a diagnosis: median {seconds[len(seconds) // 2]:.0f}, longest {seconds[-1]:.0f}")
+    print("\ntruth -> named")
+    for (truth, said), count in sorted(Counter((_name(r["truth"]), _said(r)) for r in records).items()):
+        print(f"  {count:3d}  {truth:40} {said}")
+
+
+def _share(what: str, hits: list[bool]) -> None:
+    if hits:
+        low, high = wilson(sum(hits), len(hits))
+        print(f"{what:55} {sum(hits):3d}/{len(hits):<3d} = {sum(hits) / len(hits):.2f}  [{low:.2f}, {high:.2f}]")
+
+
+def _first(record: dict) -> str | None:
+    return record["effects"][0]["name"] if record["effects"] else None
+
+
+def _reported(record: dict) -> set[str]:
+    return {name for e in record["effects"] for name in (e["name"], *e["confusable_with"])}
+
+
+def _name(effects: list[str]) -> str:
+    return " + ".join(sorted(effects)) or "nothing"
+
+
+def _said(record: dict) -> str:
+    return _name([e["name"] for e in record["effects"]]) if record["effects"] else record["verdict"]
+
+
+def _ratio(record: dict) -> float:
+    return record["error"]["after"]["held_out"] / record["error"]["noise_floor"]["held_out"]
+
+
+def _closed(record: dict) -> float:
+    error = record["error"]
+    floor, before = error["noise_floor"]["held_out"], error["before"]["held_out"]
+    return (before - error["after"]["held_out"]) / max(before - floor, 1e-9)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    counts = {"singles": ("single", 60), "none": ("none", 20), "outside": ("outside", 20), "pairs": ("pair", 20)}
+    for name, (_, count) in counts.items():
+        parser.add_argument(f"--{name}", type=int, default=count)
+    parser.add_argument("--first-seed", type=int, default=1000)
+    parser.add_argument("--jobs", type=int, default=max(1, len(os.sched_getaffinity(0)) // 2))
+    parser.add_argument("--out", type=Path, default=Path("../out/blind"))
+    parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--json", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        diagnose_one(options.one, options.json)
+        return
+    jobs = [
+        (options.first_seed + 1000 * place + k, kind)
+        for place, (name, (kind, _)) in enumerate(counts.items())
+        for k in range(getattr(options, name))
+    ]
+    records = []
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for record in pool.map(lambda job: diagnose_sealed(*job, options.out), jobs):
+            records.append(record)
+            print(f"{record['kind']:8} {record['seed']}  {_name(record['truth'])} -> {_said(record)}", flush=True)
+    report(records)
+
+
+if __name__ == "__main__":
+    main()
