@@ -1,0 +1,224 @@
+"""The host's own part: units, gait files, versions, ports, the commands."""
+
+import contextlib
+import os
+import pty
+import random
+import threading
+import time
+from decimal import Decimal
+
+import pytest
+from board import Board
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.link import MismatchError, NoAnswerError, ParameterError, PortGoneError, Uno
+from bifa.link.clock_relation import ClockRelation
+from bifa.link.frames import Report
+from bifa.link.gait_file import read_gait_file
+from bifa.link.table import PARAMETERS, TABLE_HASH
+from bifa.link.units import from_wire, to_wire
+from bifa.live.interactive import words_after
+from bifa.rig import RigError, SerialRig, open_rig
+
+GAIT = (
+    "period_s = 2.72\npsi12_deg = 204.5\npsi13_deg = 331.7\nduty_body = 0.6535\nduty_head = 0.439\nduty_tail = 0.439\n"
+)
+
+
+@given(st.sampled_from(PARAMETERS), st.data())
+def test_units_go_there_and_back(parameter, data):
+    wire = data.draw(st.integers(parameter.minimum, parameter.maximum))
+    assert to_wire(parameter.name, from_wire(parameter.name, wire)) == wire
+
+
+@given(st.sampled_from(PARAMETERS), st.floats(allow_nan=True, allow_infinity=True))
+def test_values_out_of_range_are_refused(parameter, value):
+    low, high = (Decimal(bound).scaleb(-parameter.decimals) for bound in (parameter.minimum, parameter.maximum))
+    inside = value == value and abs(value) != float("inf") and low <= Decimal(str(value)) <= high
+    if inside:
+        assert abs(from_wire(parameter.name, to_wire(parameter.name, value)) - value) <= 0.5 * 10**-parameter.decimals
+    else:
+        with pytest.raises(ParameterError, match=parameter.name):
+            to_wire(parameter.name, value)
+
+
+def test_a_gait_file_may_hold_other_parameters_too(tmp_path):
+    path = tmp_path / "gait.toml"
+    path.write_text("format = 1\n" + GAIT + "pressure_psi = 7\n[provenance]\nby = 'me'\n")
+    assert read_gait_file(path)["pressure_psi"] == 7
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("period_s = 1", "psi12_deg"),
+        (GAIT + "speed = 1", "speed"),
+        (GAIT.replace("0.6535", "1.5"), "duty_body"),
+        (GAIT.replace("0.6535", "nan"), "duty_body"),
+        (GAIT.replace("0.6535", "'half'"), "duty_body"),
+        ("=", "gait.toml"),
+    ],
+)
+def test_a_bad_gait_file_is_refused_by_name(tmp_path, text, named):
+    path = tmp_path / "gait.toml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=named):
+        read_gait_file(path)
+
+
+def test_a_mismatch_names_both_versions_and_the_command(monkeypatch):
+    board = Board()
+    monkeypatch.setattr("bifa.link.session.TABLE_HASH", TABLE_HASH ^ 1)
+    with pytest.raises(MismatchError, match=f"{TABLE_HASH:08x}.*{TABLE_HASH ^ 1:08x}.*bifa flash"):
+        Uno(board, board).connect()
+
+
+def test_silence_is_told():
+    class Silent(Board):
+        def read(self, timeout_s: float) -> bytes:
+            super().read(timeout_s)
+            return b""
+
+    silent = Silent()
+    with pytest.raises(NoAnswerError, match="bifa flash"):
+        Uno(silent, silent).connect(1.0)
+
+
+def test_leaving_turns_the_valves_off():
+    board = Board()
+
+    def interrupted() -> None:
+        with Uno(board, board) as uno:
+            uno.connect()
+            uno.run()
+            board.sleep(0.1)
+            assert board.valves != 0
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    board.sleep(0.002)
+    assert (board.valves, board.state) == (0, "stopped")
+
+
+def test_lost_samples_are_counted():
+    board = Board()
+    uno = Uno(board, board)
+    fields = {"state": 0, "pressure_mpsi": (0, 0, 0), "phase": (0, 0, 0), "command": 0b100100, "valves": 0}
+    for sequence in (65533, 65534, 65535, 2, 3, 3, 7):
+        uno._take_sample(Report("sample", sequence % 256, {**fields, "sequence": sequence, "time_us": sequence * 10}))
+    assert (uno.counters.samples, uno.counters.lost) == (7, 5)
+    samples = uno.samples(0)
+    assert [s.sequence for s in samples] == [65533, 65534, 65535, 65538, 65539, 65543]
+    assert samples[0].command[1:] == (0.0, 1.0)
+
+
+@given(st.floats(-5e-3, 5e-3), st.floats(0, 1000), st.integers(0, 2**32))
+@settings(max_examples=40, deadline=None)
+def test_the_clock_relation_keeps_its_bound(drift, offset_s, seed):
+    rng, relation = random.Random(seed), ClockRelation()
+    for i in range(12):
+        uno_s = i * 0.7
+        true_s = offset_s + (1 + drift) * uno_s
+        relation.add(true_s - rng.uniform(0, 0.01), uno_s, true_s + rng.uniform(0, 0.01))
+    for uno_s in (0.0, 4.0, 9.0):
+        host = relation.to_host(uno_s)
+        assert abs(host.time_s - offset_s - (1 + drift) * uno_s) <= host.bound_s + 1e-7
+        assert abs(relation.estimate(uno_s) - host.time_s) <= host.bound_s + 0.01
+
+
+def test_completion_knows_the_grammar():
+    assert "hold" in words_after([], [])
+    assert words_after(["hold"], []) == ["body", "head", "tail"]
+    assert words_after(["hold", "body"], []) == ["off", "vacuum", "positive"]
+    assert words_after(["load"], ["baseline", "fast"]) == ["baseline", "fast"]
+    assert words_after(["set", "period_s"], []) == []
+
+
+def test_wrong_ports_are_named():
+    with pytest.raises(RigError, match="virtuall"):
+        open_rig("virtuall")
+    with pytest.raises(PortGoneError, match="/dev/does-not-exist"):
+        open_rig("/dev/does-not-exist")
+
+
+class PtyUno:
+    """The Uno's code behind a pty, in real time as far as it matters."""
+
+    def __init__(self) -> None:
+        self.master, slave = pty.openpty()
+        self.device = os.ttyname(slave)
+        self._slave = slave
+        self.board = Board()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        os.set_blocking(self.master, False)
+        while not self._ended.is_set():
+            with contextlib.suppress(OSError):
+                self.board.write(os.read(self.master, 4096))
+            self.board.sleep(0.002)
+            data = self.board.receive()
+            if data:
+                os.write(self.master, data)
+            self._ended.wait(0.002)
+
+    def wait(self, duration_s: float) -> None:
+        """Until so much of the board's own time has passed."""
+        end_s = self.board.now() + duration_s
+        while self.board.now() < end_s:
+            time.sleep(0.01)
+
+    def unplug(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        os.close(self._slave)
+        os.close(self.master)
+
+
+def test_a_serial_port_exclusive_and_unplugged():
+    plugged = PtyUno()
+    with SerialRig(plugged.device) as rig:
+        uno = Uno(rig.transport, rig.clock)
+        uno.connect()
+        uno.set("period_s", 3.0)
+        assert uno.get("period_s") == 3.0
+        with pytest.raises(PortGoneError, match="another program"):
+            SerialRig(plugged.device)
+        uno.stream(True)
+        assert uno.samples(2.0)
+        plugged.unplug()
+        with pytest.raises(PortGoneError, match="gone"):
+            uno.set("period_s", 4.0)
+        uno.make_safe()  # nothing to say any more, but no error either
+
+
+@pytest.mark.uno
+def test_upload_and_console_on_the_virtual_robot(tmp_path):
+    path = tmp_path / "gait.toml"
+    path.write_text(GAIT)
+    runner = CliRunner()
+    done = runner.invoke(app, ["upload", str(path), "--port", "virtual", "--save", "fast", "--run"])
+    assert done.exit_code == 0, done.output
+    assert "read back equal, saved as fast, walking" in " ".join(done.output.split())
+    done = runner.invoke(app, ["console", "--port", "virtual"], input="show period_s\nset period_s 4\nshow period_s\n")
+    assert done.output.splitlines() == ["[period_s 5.7", "ok", "ok", "[period_s 4", "ok"]
+    assert runner.invoke(app, ["console", "--port", "virtual"], input="fly\n").exit_code == 1
+
+
+@pytest.mark.uno
+def test_a_recording_is_a_data_set(tmp_path):
+    from bifa.data import read_dataset
+
+    command = ["record", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "lost 0" in done.output
+    (trial,) = read_dataset(tmp_path / "walks").trials
+    assert trial.experiment == "locomotion"
