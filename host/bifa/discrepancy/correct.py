@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from bifa.discrepancy.candidate import Candidate
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit, evaluate_on, fit, refit_on, starting_point
@@ -14,13 +12,11 @@ from bifa.identify.structure import Structure
 from bifa.identify.system import Correction
 
 _ITERATIONS = 15
-_TRIED_WITH_EFFECTS = 1
 
 
 @dataclass(frozen=True)
 class Corrected:
-    """The explanation with a learnt curve, fitted to all known trials. `share`: of the gap to the floor on
-    trials that chose nothing, it closes so much."""
+    """An explanation with a learnt curve at `site`, which stands for `term`, fitted to all known trials."""
 
     site: str
     term: str
@@ -55,8 +51,4 @@ def holds(corrected: Corrected, before: Fit, split: Split) -> bool:
     """Whether the curve also helps on the trials that informed nothing."""
     if not split.final:
         return False
-    return bool(evaluate_on(corrected.fitted, split.final).cost < np.float64(before_cost(before, split)))
-
-
-def before_cost(before: Fit, split: Split) -> float:
-    return evaluate_on(before, split.final).cost
+    return evaluate_on(corrected.fitted, split.final).cost < evaluate_on(before, split.final).cost

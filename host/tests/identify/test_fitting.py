@@ -1,0 +1,104 @@
+"""Fitting on a system whose truth is known: values, intervals, bounds, floors."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bifa.discrepancy.toy import SENSOR_SD_MM, hide
+from bifa.identify.fit import fit_base
+from bifa.identify.noise import correlation_samples, estimate_noise
+from bifa.identify.problem import Problem
+from bifa.identify.solve import solve
+from bifa.identify.structure import Structure
+from bifa.identify.system import Parameter
+from bifa.identify.uncertainty import profile_interval, uncertainty
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    system = hide({"sensor_gain.gain": 0.0}, seed=1)
+    return fit_base(system, system.trials)
+
+
+def test_residual_of_the_right_model_is_the_floor(fitted):
+    squares = [np.mean(c["position_mm"] ** 2) for c in fitted.scaled_residuals()]
+    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_floor_is_the_sensors_noise(fitted):
+    for noise in fitted.problem.floor.channels.values():
+        assert noise.sd == pytest.approx(SENSOR_SD_MM, rel=0.1)
+
+
+def test_intervals_contain_the_truth_and_agree_with_the_profile(fitted):
+    estimates = {e.name: e for e in uncertainty(fitted).estimates}
+    draw = np.random.default_rng(1)  # as `hide` draws its specimen
+    mass = np.exp(0.05 * draw.standard_normal())
+    stiffness = 40 * np.exp(0.05 * draw.standard_normal())
+    for name, truth in (("mass_kg", mass), ("stiffness_N_m", stiffness)):
+        assert abs(estimates[name].value - truth) < 4 * estimates[name].sd
+        assert estimates[name].determined
+    low, high = profile_interval(fitted, "stiffness_N_m")
+    assert high - low == pytest.approx(estimates["stiffness_N_m"].upper - estimates["stiffness_N_m"].lower, rel=0.5)
+
+
+def test_a_parameter_that_the_data_cannot_see_is_said_to_be_undetermined():
+    system = hide({}, seed=2)
+    blind = Structure(system, ("sensor_gain",))
+    floor = estimate_noise(system, system.trials)
+    from bifa.identify.fit import fit
+
+    found = uncertainty(fit(blind, system.trials, floor))
+    assert found.undetermined or found.correlations(above=0.99)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3))
+def test_a_fit_never_leaves_its_bounds_nor_gets_worse(shift):
+    system = hide({"coulomb.force_N": 0.1}, seed=3, repeats=1)
+    structure = Structure(system)
+    problem = Problem(structure, system.trials[:2], estimate_noise(system, system.trials))
+    lower, upper = structure.bounds()
+    start = np.clip(structure.start() + np.array(shift) * structure.scales(), lower, upper)
+    begun = solve(problem, problem.start(start), max_iterations=0)
+    ended = solve(problem, problem.start(start), max_iterations=3)
+    assert ended.cost <= begun.cost
+    assert np.all(ended.point.values >= lower)
+    assert np.all(ended.point.values <= upper)
+
+
+def test_correlated_noise_counts_for_less():
+    draw = np.random.default_rng(0)
+    white = [draw.standard_normal(2000) for _ in range(4)]
+    coloured = []
+    for trace in white:
+        slow = np.zeros_like(trace)
+        for i in range(1, len(trace)):
+            slow[i] = 0.9 * slow[i - 1] + trace[i]
+        coloured.append(slow)
+    assert correlation_samples(white) == pytest.approx(1.0, abs=0.3)
+    assert correlation_samples(coloured) == pytest.approx(19.0, rel=0.3)  # (1 + 0.9) / (1 - 0.9)
+
+
+def test_a_trace_that_is_offset_as_a_whole_is_one_piece():
+    traces = [np.full(400, sign) for sign in (1.0, -1.0, 1.0)]
+    assert correlation_samples(traces) > 100
+
+
+def test_jumps_at_slightly_different_times_are_not_noise_of_the_whole_record():
+    system = hide({}, seed=4, repeats=2, sizes=(1.0,))
+    draw = np.random.default_rng(4)
+    for trial in system.trials:
+        late = 3.0 + 0.02 * draw.standard_normal()
+        trial.channels["position_mm"][:] = 50.0 * (trial.time_s > late) + 0.1 * draw.standard_normal(len(trial.time_s))
+    for noise in estimate_noise(system, system.trials).channels.values():
+        assert noise.sd < 1.0
+        assert noise.jitter_s > 0
+
+
+def test_parameters_are_checked():
+    with pytest.raises(ValueError, match="not below"):
+        Parameter("k", "N/m", 1.0, 2.0, 1.0)
+    with pytest.raises(ValueError, match="outside"):
+        Parameter("k", "N/m", 3.0, 0.0, 1.0)
