@@ -19,10 +19,17 @@ from bifa.errors import BifaError
 from .alignment import ClockLine, align
 from .plan import PlannedTrial
 
-_PAUSE_PERIODS = 2.5  # a longer gap between two edges is the Uno's restart
+FIRST_SAMPLE = 1  # the Uno's first sample is taken one period after its start, and bears this number
+_PAUSE_PERIODS = 1.5  # a longer gap between two edges is the Uno's restart
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
 _CHAMBERS = ("body", "head", "tail")
+_MEASURES = {
+    "static_loading": ("displacement_mm", "force_N"),
+    "anchor_pull": ("displacement_mm", "force_N"),
+    "step_response": ("displacement_mm",),
+    "locomotion": ("displacement_head_mm",),
+}
 
 
 class InstrumentFileError(BifaError):
@@ -35,13 +42,13 @@ def import_trial(instrument: Path, telemetry: Path, planned: PlannedTrial, folde
     Raises InstrumentFileError where a column is missing or the two do not overlap, AlignmentError where their clocks do
     not line up, DatasetError where `folder` exists.
     """
-    measured = _columns(instrument, ("time_s",))
+    measured = _columns(instrument, ("time_s", *_MEASURES[planned.experiment]))
     edges = _columns(instrument.with_suffix(".sync.csv"), ("sync_time_s",))["sync_time_s"]
     uno = _columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
     since_restart = _after_restart(edges, instrument)
-    # The Uno's time 0 is its first sample: edge n after the restart is sample n.
-    strobe_s = np.arange(len(since_restart)) * float(np.median(np.diff(uno["time_s"]) / np.diff(uno["sequence"])))
-    clock = align(since_restart, strobe_s, 0.0)
+    period_s = float(np.median(np.diff(uno["time_s"]) / np.diff(uno["sequence"])))
+    strobe_s = np.arange(FIRST_SAMPLE, FIRST_SAMPLE + len(since_restart)) * period_s
+    clock = align(since_restart, strobe_s, strobe_s[0])
     columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
     writer = DatasetWriter(folder, f"{planned.experiment} from {instrument.name}")
     writer.add(planned.as_trial(columns, extra={"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate}))
@@ -111,7 +118,6 @@ def _assemble(measured, instrument_s, uno, planned: PlannedTrial, instrument: Pa
 
 
 def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
-    _require(measured, ("displacement_mm", "force_N"), instrument)
     moved = overlap & (np.abs(measured["displacement_mm"] - measured["displacement_mm"][overlap][0]) > _MOVED_MM)
     if not moved.any():
         raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
@@ -129,7 +135,6 @@ def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instru
 
 def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
     step = planned.experiment == "step_response"
-    _require(measured, ("displacement_mm",) if step else ("displacement_head_mm",), instrument)
     chambers = (("body" if planned.actuator == "large" else "head"),) if step else _CHAMBERS
     commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])
     keep = np.isfinite(commands).all(axis=0)
@@ -146,9 +151,3 @@ def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path
         if name in measured:
             columns[name] = np.interp(time_s, instrument_s, measured[name])
     return columns
-
-
-def _require(measured, names: tuple[str, ...], instrument: Path) -> None:
-    missing = [name for name in names if name not in measured]
-    if missing:
-        raise InstrumentFileError(f"{instrument} lacks the column {', '.join(missing)}")
