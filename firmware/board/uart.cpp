@@ -11,7 +11,7 @@ namespace board {
 namespace {
 
 const uint32_t kBaud = 250000;
-const uint8_t kRingBytes = 96;
+const uint8_t kRingBytes = 100;
 
 uint8_t ring[kRingBytes];
 volatile uint8_t head;  // where the next byte goes in
