@@ -1,0 +1,107 @@
+"""Sessions on the virtual bench: the real firmware, instruments with clocks of their own, interruptions."""
+
+import numpy as np
+import pytest
+
+from bifa.characterisation.experiments import STEP_DOWN_S, STEP_UP_S
+from bifa.characterisation.plan import BRISK, EXPERIMENTS, PlannedTrial, session
+from bifa.characterisation.session import run_session
+from bifa.data import DatasetError, read_dataset
+from bifa.errors import BifaError
+from bifa.rig import open_rig
+
+PLAN = (
+    PlannedTrial("step_response", "small", 8.5),
+    PlannedTrial("static_loading", "small", 4.0, 20.0),
+    PlannedTrial("anchor_pull", None, 8.5, 40.0),
+    PlannedTrial("locomotion", gait=BRISK, cycles=1),
+)
+
+
+def run(rig, folder, trials=PLAN, **more):
+    return run_session(rig, folder, trials, name="a day", known={}, provenance={"by": "a test"}, **more)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench") / "day"
+    with open_rig("virtual", profile="ideal", seed=3) as rig:
+        run(rig, folder)
+        return read_dataset(folder), dict(rig.truth)
+
+
+@pytest.mark.uno
+def test_every_experiment_is_recorded_as_the_format_wants_it(recorded):
+    dataset, _ = recorded
+    assert [trial.experiment for trial in dataset.trials] == [planned.experiment for planned in PLAN]
+    assert [trial.session_order for trial in dataset.trials] == [1, 2, 3, 4]
+    for trial in dataset.trials:
+        assert trial.rate_hz == pytest.approx(trial.nominal_rate_hz, rel=0.01)
+        assert trial.extra["clock_error_s"] < 1e-4
+
+
+@pytest.mark.uno
+def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(recorded):
+    """The actuator snaps when its pressure does: an instrument that was off by a sample would show it."""
+    dataset, _ = recorded
+    step = dataset.of("step_response")[0]
+    switches = step.extra["switch_time_s"]
+    assert switches[1] - switches[0] == pytest.approx(STEP_DOWN_S - STEP_UP_S)
+    changes = step.time_s[np.flatnonzero(np.diff(step.columns["command"])) + 1]
+    assert ((changes - switches >= 0.0) & (changes - switches <= 0.0101)).all()
+    rising = (step.time_s > switches[0]) & (step.time_s < switches[1])
+    speed = np.gradient(step.columns["displacement_mm"], step.time_s)
+    snap = step.time_s[rising][np.argmax(speed[rising])]
+    dip = step.time_s[rising][np.argmin(np.gradient(np.gradient(step.columns["pressure_psi"]))[rising])]
+    assert abs(snap - dip) < 0.05
+
+
+@pytest.mark.uno
+def test_a_static_loading_is_the_spring_less_the_pressure_force(recorded):
+    dataset, truth = recorded
+    static = dataset.of("static_loading")[0]
+    mean_force = static.columns["force_N"].mean()
+    assert mean_force == pytest.approx(-truth["small_area_N_psi"] * 4.0, abs=1.5)
+    assert static.columns["displacement_mm"].max() > 29.0
+    assert static.columns["pressure_psi"].mean() == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.uno
+def test_an_interrupted_session_goes_on_and_is_never_written_over(tmp_path):
+    plan = PLAN[1:3]
+    with open_rig("virtual", profile="ideal", seed=4) as rig:
+
+        def interrupt(event):
+            if event.number == 2 and event.share > 0.3:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run(rig, tmp_path / "day", plan, on_event=interrupt)
+        rig.clock.sleep(0.01)
+        assert not any(rig.uno.pin(pin) for pin in range(4, 10))  # all six valves
+        assert len(read_dataset(tmp_path / "day.partial").trials) == 1
+        seen = []
+        dataset = run(rig, tmp_path / "day", plan, on_event=seen.append)
+        assert seen[0].skipped
+        assert len(dataset.trials) == 2
+        with pytest.raises(DatasetError, match="never overwritten"):
+            run(rig, tmp_path / "day", plan)
+
+
+def test_a_rig_without_instruments_says_what_to_do():
+    class Bare:
+        instruments = None
+
+    from bifa.characterisation.recording import Recording
+
+    with pytest.raises(BifaError, match="--instrument"):
+        Recording(Bare(), None)
+
+
+def test_a_session_holds_45_trials_and_spreads_the_repeats():
+    trials = session()
+    assert len(trials) == 45
+    assert len({trial.file for trial in trials}) == 45
+    assert {trial.experiment for trial in trials} == set(EXPERIMENTS)
+    assert [trial.repeat for trial in trials] == sorted(trial.repeat for trial in trials)
+    assert len(session(quick=True)) < 20
