@@ -1,0 +1,124 @@
+"""Faults as the image meets them: DAC, bus, watchdog, brown-out, host, and what no path may command."""
+
+import itertools
+import struct
+
+import pytest
+
+from bifa.link.table import PARAMETERS
+from virtual_robot.uno import CLOCK_HZ
+
+pytestmark = pytest.mark.uno
+
+COUNT_OF_14_PSI = 441
+
+
+def test_dac_follows_the_set_point_and_ends_at_14_psi(bench):
+    for value, code in (("8.5", 267), ("0", 0), ("14", COUNT_OF_14_PSI)):
+        assert bench.say(f"set pressure_psi {value}", 0.2).endswith("ok\n")
+        assert bench.board.dac_code == code
+    for value in ("14.001", "15", "65535", "-1", "1e9", "nan", "inf", "0x20"):
+        assert "error" in bench.say(f"set pressure_psi {value}", 0.1)
+        assert bench.board.dac_code == COUNT_OF_14_PSI
+    assert bench.board.dac_eeprom_writes == 0
+
+
+def test_no_eeprom_commands_more_than_14_psi(new_bench, bench):
+    bench.say("set pressure_psi 14")
+    bench.say("save", 2.0)
+    good = bench.board.eeprom
+    at = [i for i in range(len(good) - 1) if good[i : i + 2] == struct.pack("<H", 14000)]
+    assert at, "the set is in EEPROM"
+    for address, value in itertools.product(at, (14001, 20000, 65535)):
+        bad = bytearray(good)
+        bad[address : address + 2] = struct.pack("<H", value)
+        board = new_bench(bytes(bad)).board
+        board.run_for(0.2)
+        assert max((e.value for e in board.events if e.kind == "dac"), default=0) <= COUNT_OF_14_PSI
+    for fill in (0x00, 0x55, 0xAA, 0xFF):
+        board = new_bench(bytes([fill]) * len(good)).board
+        board.run_for(0.2)
+        assert board.dac_code <= COUNT_OF_14_PSI
+
+
+@pytest.mark.parametrize("mode", ["absent", "stuck"])
+def test_dac_that_does_not_answer_vents_and_names_itself(bench, mode):
+    bench.say("run")
+    assert bench.valves_on
+    bench.board.set_bus(mode)
+    bench.wait(0.6)
+    assert not bench.valves_on
+    assert "supply_control" in bench.say("status", 0.5)
+    assert bench.board.resets == 1, "a stuck bus must not hang the main loop"
+    assert "error" in bench.say("clear", 0.3)
+    bench.board.set_bus("dac")
+    bench.wait(0.5)
+    assert bench.say("clear").endswith("ok\n")
+
+
+def test_main_loop_that_hangs_vents_and_is_restarted_into_a_fault(bench):
+    """Without its tick the main loop waits forever, and does not feed the watchdog."""
+    bench.say("run")
+    first = len(bench.board.events)
+    timer_interrupts_off = b"\x00"
+    bench.board.poke(0x6F, timer_interrupts_off)  # TIMSK1: no more ticks, so the main loop has nothing to attend to
+    bench.wait(1.5)
+    resets = [e for e in bench.events_since(first) if e.kind == "reset"]
+    falls = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in range(4, 10) and e.value == 0]
+    assert bench.board.last_reset_cause == "watchdog"
+    assert len(resets) == 1
+    assert falls[0].cycle < resets[0].cycle, "the watchdog's interrupt vents before it resets"
+    assert not bench.valves_on
+    assert "watchdog" in bench.say("status", 0.5)
+    assert "error" in bench.say("run")
+    assert bench.say("clear").endswith("ok\n")
+
+
+def test_brown_out_is_a_fault(bench):
+    bench.board.reset("brown-out")
+    bench.wait(0.3)
+    assert "brown_out" in bench.say("status", 0.5)
+
+
+def test_sensor_without_its_wire_vents(bench):
+    bench.say("run")
+    bench.volts[1] = 0.02
+    bench.wait(0.2)
+    assert not bench.valves_on
+    status = bench.say("status", 0.5)
+    assert "sensor_range" in status
+    assert "head" in status
+    assert "error" in bench.say("clear")
+    bench.volts[1] = 2.5
+    bench.wait(0.1)
+    assert bench.say("clear").endswith("ok\n")
+
+
+def test_silent_host_vents(bench):
+    bench.say("set host_timeout_s 0.5")
+    bench.say("run", 0.05)
+    bench.wait(0.35)
+    assert bench.valves_on
+    bench.wait(0.3)
+    assert not bench.valves_on
+    assert "host_silent" in bench.say("status", 0.5)
+
+
+def test_samples_are_exactly_10_ms_apart_and_their_stamps_are_the_strobe_s(bench):
+    first = len(bench.board.events)
+    bench.say("stream on", 1.0)
+    text = bench.wait(1.0)
+    rises = [e.cycle for e in bench.events_since(first) if e.kind == "pin" and e.index == 10 and e.value == 1]
+    gaps = [b - a for a, b in itertools.pairwise(rises)]
+    assert max(gaps) - min(gaps) <= 16
+    assert sum(gaps) / len(gaps) == pytest.approx(CLOCK_HZ / 100, abs=0.1)
+    lines = [line for line in text.splitlines() if line.startswith(">")]
+    stamps = [int(line.split(",")[1]) for line in lines[1:-1]]
+    assert {b - a for a, b in itertools.pairwise(stamps)} == {10_000}
+
+
+def test_every_parameter_has_a_range_that_the_firmware_keeps(bench):
+    for parameter in PARAMETERS:
+        before = bench.say(f"show {parameter.name}")
+        assert "error" in bench.say(f"set {parameter.name} {parameter.maximum * 2 + 1}")
+        assert bench.say(f"show {parameter.name}") == before

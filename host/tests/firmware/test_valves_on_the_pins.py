@@ -1,0 +1,110 @@
+"""Whatever comes in, the pins never show both valves of a chamber, nor less than the dead time between them."""
+
+import random
+import string
+
+import pytest
+
+from bifa.link import frames
+from bifa.link.table import COMMANDS
+from virtual_robot.uno import CLOCK_HZ
+
+pytestmark = pytest.mark.uno
+
+DEAD_CYCLES = 3 * CLOCK_HZ // 1000
+CHAMBERS = ((4, 5), (6, 7), (8, 9))
+WORDS = ("body", "head", "tail", "positive", "vacuum", "off", "on", "confirm", "baseline", "obstacle")
+
+
+def breaks(events, state=None):
+    """Violations in a list of events; `state` carries over from an earlier list."""
+    state = state if state is not None else {"on": set(), "off_since": {}}
+    found = []
+    partner = {a: b for pair in CHAMBERS for a, b in (pair, pair[::-1])}
+    for event in events:
+        if event.kind != "pin" or event.index not in partner:
+            continue
+        if event.value == 0:
+            state["on"].discard(event.index)
+            state["off_since"][event.index] = event.cycle
+            continue
+        state["on"].add(event.index)
+        other = partner[event.index]
+        if other in state["on"]:
+            found.append(("both on", event))
+        elif event.cycle - state["off_since"].get(other, -CLOCK_HZ) < DEAD_CYCLES:
+            found.append(("too soon", event))
+    return found
+
+
+def random_input(chance: random.Random) -> bytes:
+    """A line that makes sense, half sense or none, or a frame, whole or damaged."""
+    kind = chance.random()
+    if kind < 0.35:
+        return f"hold {chance.choice(WORDS[:3])} {chance.choice(WORDS[3:6])}\n".encode()
+    if kind < 0.5:
+        return chance.choice((b"run\n", b"run\n", b"stop\n", b"clear\n", b"!", b"load obstacle\n", b"stream on\n"))
+    if kind < 0.7:
+        name, value = chance.choice(
+            (
+                ("period_s", chance.uniform(0.3, 3)),
+                ("psi12_deg", chance.uniform(-10, 400)),
+                ("psi13_deg", chance.uniform(0, 360)),
+                ("duty_body", chance.uniform(0, 1)),
+                ("duty_head", chance.choice((0, 1, 0.001))),
+                ("coupling_per_s", chance.uniform(0, 20)),
+            )
+        )
+        return f"set {name} {value:.4f}\n".encode()
+    if kind < 0.8:
+        return "".join(chance.choices(string.printable, k=chance.randrange(80))).encode()
+    if kind < 0.9:
+        return bytes(chance.randrange(256) for _ in range(chance.randrange(40)))
+    frame = bytearray(
+        frames.encode(COMMANDS["hold"], chance.randrange(256), (chance.randrange(4), 1), frames.OPEN_SEED)
+    )
+    if chance.random() < 0.5:
+        frame[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
+    return b"\x00" + bytes(frame) + b"\x00"
+
+
+def exercise(bench, seconds: float, seed: int) -> None:
+    chance = random.Random(seed)
+    state = {"on": set(), "off_since": {}}
+    first = len(bench.board.events)
+    found, edges = [], 0
+    end_s = bench.board.time_s + seconds
+    while bench.board.time_s < end_s:
+        bench.board.send(b"clear\n" + random_input(chance))
+        bench.wait(chance.choice((0.0005, 0.002, 0.01, 0.05, 0.3)))
+        if chance.random() < 0.01:
+            bench.board.press_emergency_stop()
+            bench.wait(0.01)
+            bench.board.press_emergency_stop(False)
+        new = bench.events_since(first)
+        first += len(new)
+        found += breaks(new, state)
+        edges += sum(event.kind == "pin" and event.index in range(4, 10) for event in new)
+    assert found == []
+    assert edges > 5 * seconds, "the valves did move"
+    assert bench.board.resets == 1
+    assert not bench.board.crashed
+
+
+def test_a_minute_of_random_input(bench):
+    exercise(bench, 60, seed=1)
+
+
+@pytest.mark.soak
+def test_an_hour_of_random_input(bench):
+    exercise(bench, 3600, seed=2)
+
+
+def test_the_check_itself_finds_both_faults():
+    class Edge:
+        def __init__(self, cycle, index, value):
+            self.kind, self.cycle, self.index, self.value = "pin", cycle, index, value
+
+    assert breaks([Edge(0, 4, 1), Edge(9, 5, 1)])[0][0] == "both on"
+    assert breaks([Edge(0, 4, 1), Edge(9, 4, 0), Edge(9 + DEAD_CYCLES - 1, 5, 1)])[0][0] == "too soon"
+    assert not breaks([Edge(0, 4, 1), Edge(9, 4, 0), Edge(9 + DEAD_CYCLES, 5, 1)])
