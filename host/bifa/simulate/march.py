@@ -1,8 +1,9 @@
 """Marching in time: steps as long as the error allows, ending exactly at switches and samples.
 
-A step of h is taken once whole and once as two halves. Their difference is the error's estimate, and 2 (halves) -
-(whole) is of second order. Where the three are not of one kind (something started to slide, touched the wall or
-passed x_th in between) the halves stand as they are, and the tolerance makes the step short.
+A step of h is taken once whole and once as two halves. Their difference is the error's estimate, and 2
+(halves) - (whole) is of second order. Where the three are not of one kind (something started to slide,
+touched the wall or passed x_th in between) the halves stand as they are, and the tolerance makes the step
+short.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from bifa.simulate.stepper import (
 LONGEST_S = 0.1
 SHORTEST_S = 1e-5
 _FIRST_S = 1e-3
+_HOPELESS_S = 1e-12  # where even shorter steps are asked for there is no solution: the run goes on as NaN
 _ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
 # Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
@@ -42,8 +44,8 @@ _WEIGHTS = np.array(
 
 
 class Run(NamedTuple):
-    """What a march works on. `y`, `z`: the state now; `clock`: time, proposed step; `slip`: both ends' travel while
-    both slide, the lesser one summed; `command`: (3,) of the chambers; the rest is scratch."""
+    """What a march works on. `y`, `z`: the state now; `clock`: time, proposed step; `slip`: both ends'
+    travel while both slide, the lesser one summed; `command`: (3,) of the chambers; the rest is scratch."""
 
     y: np.ndarray
     z: np.ndarray
@@ -122,6 +124,9 @@ def march(plant, rig, run, until, tolerance):
     clock = run.clock
     y, z = run.y, run.z
     whole, first, halves = run.whole, run.first, run.halves
+    if not math.isfinite(y[0]):
+        clock[0] = until
+        return
     while until - clock[0] > 1e-12:
         left = until - clock[0]
         h = min(clock[1], LONGEST_S)
@@ -131,6 +136,9 @@ def march(plant, rig, run, until, tolerance):
         kind = step(plant, rig, run.gravity, run.source, y, z, h, whole, run.z_whole)
         if kind == TOO_LONG:
             clock[1] = 0.3 * h
+            if h < _HOPELESS_S:
+                y[:] = np.nan
+                break
             continue
         sources(plant, rig, run.command, y, clock[0] + 0.5 * h, run.source)
         kind_first = step(plant, rig, run.gravity, run.source, y, z, 0.5 * h, first, run.z_first)
@@ -138,6 +146,9 @@ def march(plant, rig, run, until, tolerance):
         kind_second = step(plant, rig, run.gravity, run.source, first, run.z_first, 0.5 * h, halves, run.z_halves)
         if kind_first == TOO_LONG or kind_second == TOO_LONG:
             clock[1] = 0.3 * h
+            if h < _HOPELESS_S:
+                y[:] = np.nan
+                break
             continue
         error = 0.0
         for i in range(STATES):
@@ -155,7 +166,7 @@ def march(plant, rig, run, until, tolerance):
         grown = min(3.0, 0.9 / math.sqrt(max(error, 1e-6)))
         clock[1] = max(clock[1], h * grown) if h < 0.5 * clock[1] else h * grown
     clock[0] = until
-    if not plant.active & chains.SENSOR:
+    if not plant.active & chains.SENSOR and math.isfinite(y[0]):
         pressures(plant, run)
 
 
