@@ -1,0 +1,164 @@
+"""The library: every effect declares what it does, does it only there, and vanishes with its size."""
+
+import inspect
+import types
+
+import numpy as np
+import pytest
+
+from bifa import effects, robot, simulate
+from bifa.effects import Effect, EffectError, EffectParameter
+from bifa.simulate import hooks, layout
+from bifa.simulate.paper import FAST
+
+NAMED = {
+    "hysteresis", "viscoelasticity", "backlash", "area_variation", "valve_latency", "valve_asymmetry", "line_lag",
+    "choked_flow", "leak", "supply_sag", "regulator_ripple", "sensor_lag", "sensor_position", "sensor_calibration",
+    "stribeck", "friction_direction", "inclination", "tether_drag",
+}  # fmt: skip
+EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
+LEAST_VISIBLE = {"force_N": 0.02, "displacement_mm": 0.02, "displacement_head_mm": 0.02}  # pressures: 0.005 psi
+# Friction at the one speed of a pull tells little of how it falls with speed; everything else is plain.
+FAINT = {("stribeck", "anchor_pull")}
+
+
+def _channels(model):
+    time = np.arange(0.0, 12.0, 0.02)
+    path = np.interp(time, [0.0, 6.0, 12.0], [0.0, 50.0, 0.0])
+    records = {
+        "static_loading": [
+            simulate.static_loading(model, "large", time, path, 4.0),
+            simulate.static_loading(model, "small", time, 0.5 * path, 4.0),
+        ],
+        "step_response": [simulate.step_response(model, a) for a in ("large", "small")],
+        "anchor_pull": [simulate.anchor_pull(model, np.arange(0.0, 2.0, 0.02), 20.0, 8.5)],
+        "locomotion": [simulate.walk(model, robot.BASELINE, 2), simulate.walk(model, FAST, 3)],
+    }  # fmt: skip
+    return {
+        experiment: {
+            f"{k}:{name}": values
+            for k, record in enumerate(found)
+            for name, values in record.columns.items()
+            if name.startswith(("displacement", "force", "pressure"))
+        }
+        for experiment, found in records.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def base():
+    return _channels(robot.nominal())
+
+
+@pytest.mark.parametrize("name", sorted(effects.library()))
+def test_an_effect_shows_where_it_says_and_only_there(name, base):
+    changed = _channels(robot.nominal().with_effects({name: {}}))
+    for experiment in EXPERIMENTS:
+        visible = any(
+            np.abs(changed[experiment][key] - base[experiment][key]).max()
+            > LEAST_VISIBLE.get(key.partition(":")[2], 0.005)
+            for key in base[experiment]
+        )
+        if (name, experiment) not in FAINT:
+            assert visible == (experiment in effects.library()[name].experiments), experiment
+        if experiment not in effects.library()[name].experiments:
+            for key in base[experiment]:
+                np.testing.assert_allclose(changed[experiment][key], base[experiment][key], atol=5e-3, err_msg=key)
+
+
+@pytest.mark.parametrize("name", sorted(effects.library()))
+def test_size_zero_is_exactly_the_base_model(name, base):
+    sizes = {parameter.name: 0.0 for parameter in effects.library()[name].sizes}
+    changed = _channels(robot.nominal().with_effects({name: sizes}))
+    for experiment, channels in base.items():
+        for key, values in channels.items():
+            np.testing.assert_array_equal(changed[experiment][key], values, err_msg=f"{experiment} {key}")
+
+
+@pytest.mark.parametrize("name", sorted(effects.library()))
+def test_a_small_effect_is_a_small_change(name, base):
+    """No jump where an effect sets in, so that a fit can start from nothing."""
+    effect = effects.library()[name]
+    tiny = {size.name: 1e-4 * size.typical for size in effect.sizes}
+    model = robot.nominal().with_effects({name: tiny})
+    changed = simulate.step_response(model, "large")
+    for channel, allowed in (("displacement_mm", 0.1), ("pressure_psi", 0.1)):
+        difference = np.abs(changed[channel] - base["step_response"][f"0:{channel}"]).max()
+        assert difference < allowed, channel
+
+
+def test_every_effect_of_the_contract_is_there_and_declared():
+    assert set(effects.library()) >= NAMED
+    for name, effect in effects.library().items():
+        assert effect.name == name
+        assert effect.equation
+        assert effect.source
+        assert effect.sizes
+        assert set(effect.experiments) <= set(EXPERIMENTS)
+        assert set(effect.confusable_with) <= set(effects.library())
+        for parameter in effect.parameters:
+            assert parameter.lower <= parameter.typical <= parameter.upper
+            assert not parameter.size or parameter.lower <= 0.0 <= parameter.upper
+
+
+def test_effects_add_up_in_one_compilation():
+    every = {name: {} for name in effects.library()}
+    record = simulate.walk(robot.nominal().with_effects(every), robot.BASELINE, 3)
+    assert all(np.all(np.isfinite(values)) for values in record.columns.values())
+    assert record["displacement_head_mm"][-1] > 20.0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "told"),
+    [
+        ({"magic": {}}, "no effect"),
+        ({"hysteresis": {"force": 1.0}}, "no parameter force"),
+        ({"hysteresis": {"force_N": -1.0}}, r"force_N = -1.0 is outside its range 0 to 20 N"),
+        ({"leak": {"rate_per_s": float("nan")}}, "rate_per_s"),
+    ],
+)
+def test_a_wrong_effect_is_refused_by_name_and_range(chosen, told):
+    with pytest.raises(EffectError, match=told):
+        robot.nominal().with_effects(chosen)
+
+
+def _new_effect(**functions):
+    module = types.ModuleType("bifa.effects.swelling")
+    parameter = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
+    module.EFFECT = Effect("swelling", "", "F (1 + share)", "a test", "eq. (2)", (), (), (parameter,))
+    module.__dict__.update(functions)
+    return module
+
+
+@pytest.fixture
+def with_new_effect(monkeypatch):
+    """The library as it is with one more file in it; the flat layout follows."""
+
+    def add(**functions):
+        found = dict(effects.modules()) | {"swelling": _new_effect(**functions)}
+        monkeypatch.setattr(effects, "modules", lambda: found)
+        monkeypatch.setattr(effects, "library", lambda: {name: module.EFFECT for name, module in found.items()})
+        for cached in (layout._indices, layout._slots, layout.effect_bit):
+            monkeypatch.setattr(layout, cached.__name__, inspect.unwrap(cached))
+        return hooks.chain_source()
+
+    return add
+
+
+def test_adding_an_effect_is_adding_a_file(with_new_effect):
+    def area(share, stroke_share):
+        return 1.0 + share * stroke_share
+
+    source = with_new_effect(area=area)
+    assert f"area_of_swelling(q[{layout.index('swelling.share')}], stroke_share)" in source
+    assert source != hooks.chains.__loader__.get_source(hooks.chains.__name__)  # so the compiled code is another, too
+
+
+def test_an_effect_that_asks_for_what_there_is_not_is_refused(with_new_effect):
+    with pytest.raises(EffectError, match=r"swelling\.area asks for 'moon_phase'"):
+        with_new_effect(area=lambda share, moon_phase: share)
+
+
+def test_an_effect_without_a_hook_is_refused(with_new_effect):
+    with pytest.raises(EffectError, match="swelling acts nowhere"):
+        with_new_effect()

@@ -1,0 +1,100 @@
+"""Against an independent, event-driven solution of eq. (1)-(8)."""
+
+import numpy as np
+import pytest
+
+from bifa import robot, simulate
+from bifa.robot import Gait
+from bifa.simulate.paper import FAST
+
+from . import reference
+
+CYCLES = 10
+FINE_M = 1e-7
+WALKS_MM_S = 2.0
+# A gait of which a change of 1e-6 in any number of the reference's own model moves the result more than this is a
+# cliff: its advance is no number to compare with.
+CLIFF = 1e-3
+
+
+def _errors(gaits, tolerance_m):
+    """Relative errors of the last cycle's advance; NaN on a cliff."""
+    model = robot.nominal()
+    ours = simulate.speeds(model, simulate.gait_rows(gaits), CYCLES, tolerance_m).advance_m[:, -1]
+    errors = []
+    for gait, advance in zip(gaits, ours, strict=True):
+        theirs = _reference_advance(model, gait)
+        nearby = _reference_advance(model.with_values({"mu_s": model["mu_s"] * (1.0 + 1e-6)}), gait)
+        cliff = abs(nearby / theirs - 1.0) > CLIFF
+        errors.append(np.nan if cliff else abs(advance / theirs - 1.0))
+    return np.array(errors)
+
+
+def _reference_advance(model, gait):
+    head = reference.walk(model, gait, gait.period_s * np.arange(1, CYCLES + 1), 1e-11)[:, 0]
+    return head[-1] - head[-2]
+
+
+def _walking_gaits(count, seed):
+    rng, gaits = np.random.default_rng(seed), []
+    while len(gaits) < count:
+        angles, duty = rng.uniform(0.0, 360.0, 2), rng.uniform(0.2, 0.8, 2)
+        gait = Gait(rng.uniform(2.0, 6.0), *angles, duty[0], duty[1], duty[1])
+        if abs(simulate.speed(robot.nominal(), gait, CYCLES).speed_mm_s) > WALKS_MM_S:
+            gaits.append(gait)
+    return gaits
+
+
+def test_baseline_and_fastest_gait():
+    assert np.all(_errors([robot.BASELINE, FAST], FINE_M) < 1e-4)
+
+
+def test_random_walking_gaits():
+    errors = _errors(_walking_gaits(8, seed=1), FINE_M)
+    assert np.count_nonzero(np.isnan(errors)) <= 1
+    assert np.nanmax(errors) < 1e-3
+
+
+@pytest.mark.soak
+def test_two_hundred_walking_gaits(capsys):
+    errors = _errors(_walking_gaits(210, seed=2), FINE_M)
+    cliffs = np.count_nonzero(np.isnan(errors))
+    with capsys.disabled():
+        kept = errors[~np.isnan(errors)]
+        print(f"\n{kept.size} gaits: median {np.median(kept):.2e}, worst {kept.max():.2e}; {cliffs} cliffs")
+    assert np.count_nonzero(~np.isnan(errors)) >= 200
+    assert np.nanmax(errors) < 1e-3
+
+
+@pytest.mark.parametrize("gait", [robot.BASELINE, FAST], ids=["baseline", "fastest"])
+def test_every_channel_of_a_record(gait):
+    model = robot.nominal()
+    record = simulate.walk(model, gait, 3, tolerance_m=1e-8)
+    states = reference.walk(model, gait, record["time_s"])
+    v = model.values
+    head = 1e3 * (states[:, 0] - states[0, 0])
+    body = (states[:, 4] - v["body_damping_Ns_m"] * (states[:, 1] - states[:, 3])) / v["body_area_N_psi"]
+    small = (states[:, [7, 10]] - v["small_damping_Ns_m"] * states[:, [6, 9]]) / v["small_area_N_psi"]
+    np.testing.assert_allclose(record["displacement_head_mm"], head, atol=0.01)
+    np.testing.assert_allclose(record["displacement_tail_mm"], 1e3 * states[:, 2], atol=0.01)
+    np.testing.assert_allclose(record["pressure_body_psi"], body, atol=0.02)
+    np.testing.assert_allclose(record["pressure_head_psi"], small[:, 0], atol=0.02)
+    np.testing.assert_allclose(record["pressure_tail_psi"], small[:, 1], atol=0.02)
+    np.testing.assert_allclose(record["small_head_m"], states[:, 5], atol=1e-5)
+
+
+def test_friction_work_is_never_given_back():
+    """Work of the pressure, less what is stored and damped, is what friction took: it only grows."""
+    model, gait = robot.nominal(), FAST
+    time = np.arange(0.0, 2.0 * gait.period_s, 2e-5)
+    s = simulate.walk(model, gait, time_s=time, tolerance_m=1e-8)
+    area, damping = model["body_area_N_psi"], model["body_damping_Ns_m"]
+    opening = s["velocity_head_m_s"] - s["velocity_tail_m_s"]
+    force = area * s["pressure_body_psi"] + damping * opening
+    power = force * opening - damping * opening**2 - model.body_stiffness.force(s["body_m"]) * opening
+    kinetic = 0.5 * model["head_mass_kg"] * s["velocity_head_m_s"] ** 2
+    kinetic += 0.5 * model["tail_mass_kg"] * s["velocity_tail_m_s"] ** 2
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(time))]) - kinetic
+    taken = work[::500]  # a step each 10 ms: the trapezoid's error at the jerks is then small against the work
+    assert taken[-1] > 0.1
+    assert np.diff(taken).min() > -2e-4

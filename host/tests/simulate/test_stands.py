@@ -1,0 +1,110 @@
+"""Single actuators: against SciPy's LSODA, closed forms, and the paper's forces."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from bifa import robot, simulate
+from bifa.simulate import SimulationError
+
+
+def _lsoda_step(model, name, curve, mass, time, on, off, pressure):
+    """Eq. (1)-(3) as they stand; smooth but for x_th."""
+    b, a = model[f"{name}_damping_Ns_m"], model[f"{name}_area_N_psi"]
+    fast, slow = model[f"{name}_alpha_n_per_s"], model[f"{name}_alpha_s_per_s"]
+    vacuum = model["supply_negative_psi"]
+    start = np.array([-0.005, 0.0, vacuum * a])
+
+    def rates(source):
+        def right_hand_side(_, y):
+            alpha = slow if y[0] > curve.unstable_m and source < 0.0 else fast
+            return [y[1], (-float(curve.force(y[0])) - b * y[1] + y[2]) / mass, alpha * (source * a - y[2])]
+
+        return right_hand_side
+
+    options = {"method": "LSODA", "rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
+    state = solve_ivp(rates(vacuum), (-10.0, 0.0), start, **options).y[:, -1]
+    rows = []
+    for first, last, source in ((0.0, on, vacuum), (on, off, pressure), (off, time[-1] + 0.01, vacuum)):
+        inside = time[(time >= first) & (time < last)]
+        part = solve_ivp(rates(source), (first, last), state, t_eval=[*inside, last], **options).y
+        rows.append(part[:, :-1])
+        state = part[:, -1]
+    y = np.concatenate(rows, axis=1)
+    return 1e3 * (y[0] - curve.contracted_m), (y[2] - b * y[1]) / a
+
+
+@pytest.mark.parametrize("actuator", ["large", "small"])
+def test_step_response_agrees_with_lsoda(actuator):
+    model = robot.nominal()
+    time = np.arange(0.0, 8.0, 0.01)
+    command = np.where((time >= 0.5) & (time < 4.0), 1.0, 0.0)
+    large = actuator == "large"
+    displacement, pressure = _lsoda_step(
+        model,
+        "body" if large else "small",
+        model.body_stiffness if large else model.small_stiffness,
+        model["head_mass_kg"] if large else model["small_mass_kg"],
+        time,
+        0.5,
+        4.0,
+        7.0,
+    )
+    record = simulate.step_response(model, actuator, time, command, 7.0, tolerance_m=1e-8)
+    np.testing.assert_allclose(record["displacement_mm"], displacement, atol=2e-3)
+    np.testing.assert_allclose(record["pressure_psi"], pressure, atol=2e-3)
+
+
+def test_error_falls_with_the_tolerance():
+    model = robot.nominal()
+    exact = simulate.step_response(model, "large", tolerance_m=1e-11)["displacement_mm"]
+    errors = [
+        np.abs(simulate.step_response(model, "large", tolerance_m=t)["displacement_mm"] - exact).max()
+        for t in (1e-5, 1e-6, 1e-7, 1e-8)
+    ]
+    assert all(later < 0.4 * earlier for earlier, later in pairwise(errors))
+    assert errors[-1] < 1e-3
+
+
+def test_static_loading_is_spring_minus_pressure():
+    model = robot.nominal()
+    time = np.arange(0.0, 20.0, 0.02)
+    path = np.interp(time, [0.0, 10.0, 20.0], [0.0, 50.0, 0.0])
+    for pressure in (0.0, 4.0, 8.5):
+        record = simulate.static_loading(model, "large", time, path, pressure)
+        curve = model.body_stiffness
+        expected = curve.force(curve.contracted_m + path / 1e3) - model["body_area_N_psi"] * pressure
+        np.testing.assert_allclose(record["force_N"], expected, atol=1e-4)
+        np.testing.assert_allclose(record["pressure_psi"], pressure, atol=1e-9)
+
+
+def test_anchor_holds_what_the_paper_says_and_slides_with_less():
+    model = robot.nominal()
+    time = np.arange(0.0, 2.0, 1e-3)
+    for pressure, holds in ((8.5, 33.0), (0.0, 5.0)):
+        force = simulate.anchor_pull(model, time, 20.0, pressure)["force_N"]
+        assert force.max() == pytest.approx(holds, abs=0.15)
+        assert force[-1] == pytest.approx(holds * model["mu_k"] / model["mu_s"], abs=0.03)
+        assert force[10] == pytest.approx(5000.0 * 0.020 * time[10])
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda m: simulate.step_response(m, "medium"), "medium"),
+        (lambda m: simulate.step_response(m, "large", [0.0, np.nan], [0, 0]), "numbers"),
+        (lambda m: simulate.step_response(m, "large", [0.0, 1.0], [0]), "one command"),
+        (lambda m: simulate.static_loading(m, "large", [0.0, 1.0], [0.0], 1.0), "one finite displacement"),
+        (lambda m: simulate.static_loading(m, "large", [0.0, 1.0], [0.0, 1.0], 99.0), r"-14\.7 to 14\.7"),
+        (lambda m: simulate.anchor_pull(m, [0.0, 1.0], 0.0, 8.5), "rate"),
+        (lambda m: simulate.walk(m), "gait"),
+        (lambda m: simulate.walk(m, robot.BASELINE, time_s=[1.0, 0.5]), "rise"),
+        (lambda m: simulate.walk(m, robot.BASELINE, inclination_deg=100.0), "-90 to 90"),
+        (lambda m: simulate.walk(m, robot.BASELINE, tolerance_m=0.0), "tolerance"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused(call, told):
+    with pytest.raises(SimulationError, match=told):
+        call(robot.nominal())

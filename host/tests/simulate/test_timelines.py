@@ -1,0 +1,49 @@
+"""Commands: from gaits, from phases, from records."""
+
+import numpy as np
+import pytest
+
+from bifa import simulate
+from bifa.robot import Gait, cpg
+from bifa.simulate import TimelineError
+
+GAITS = [Gait(2.7, 250.0, 80.0, 0.62, 0.45, 0.5), Gait(5.7, 0.0, 359.0, 0.5, 0.0, 1.0)]
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_settled_switching_is_the_thresholds(gait):
+    line = simulate.of_gait(gait, 20.0)
+    time = np.arange(0.0005, 20.0, 0.0137)
+    phases = 2 * np.pi * time[:, None] / gait.period_s + cpg.phase_offsets_rad(gait)
+    expected = np.array([cpg.outputs(phase, gait) for phase in phases])
+    np.testing.assert_array_equal(line.at(time), expected)
+
+
+def test_settled_phases_of_the_oscillators_switch_alike():
+    gait = GAITS[0]
+    settled = simulate.of_gait(gait, 10.0)
+    integrated = simulate.of_phases(gait, 10.0, cpg.phase_offsets_rad(gait))
+    np.testing.assert_array_equal(integrated.command, settled.command)
+    np.testing.assert_allclose(integrated.time_s, settled.time_s, atol=1.1e-3)
+
+
+@pytest.mark.parametrize("clock", [1.0, 1.004])
+def test_switches_are_found_well_within_a_sample(clock):
+    gait = Gait(2.7131, 250.0, 80.0, 0.62, 0.45, 0.5)  # no multiple of a sample: then switches show where they are
+    true = simulate.of_gait(gait, 40.0)
+    sample = np.arange(0.0, 38.0, 0.01)
+    seen = true.at(sample / clock).astype(float).T
+    found = simulate.refine(simulate.of_samples(sample, seen), gait, 0.01)
+    late = true.time_s[true.time_s * clock < 37.99]
+    np.testing.assert_allclose(found.time_s[3:], late[3:] * clock, atol=1e-3)
+
+
+def test_off_is_vented_and_nan_in_a_record():
+    line = simulate.of_samples(np.array([0.0, 0.1, 0.2]), np.array([[1, 1, np.nan], [0, 1, 1], [np.nan] * 3]))
+    np.testing.assert_array_equal(line.at([0.05, 0.25]), [[1, 0, 2], [2, 1, 2]])
+
+
+@pytest.mark.parametrize("row", [(0.0, 3, 1), (0.0, 0, 5), (np.nan, 0, 1)])
+def test_a_switch_that_does_not_exist_is_refused(row):
+    with pytest.raises(TimelineError, match="0"):
+        simulate.timeline([row])
