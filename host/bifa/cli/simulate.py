@@ -20,7 +20,12 @@ def register(app: typer.Typer) -> None:
         inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
         plot: Annotated[Path | None, typer.Option(help="Picture of commands, pressures, displacement.")] = None,
         csv: Annotated[Path | None, typer.Option(help="All channels at 100 Hz, as a data set's locomotion.")] = None,
-        paper: Annotated[bool, typer.Option("--paper", help="Table: the paper's figures beside the model's.")] = False,
+        paper: Annotated[
+            bool,
+            typer.Option(
+                "--paper", help="Table: the paper's figures beside the model's, which walks --gait as its fastest."
+            ),
+        ] = False,
     ) -> None:
         """Simulate a walk and say how far each cycle carried the robot.
 
@@ -34,7 +39,7 @@ def register(app: typer.Typer) -> None:
         chosen = robot.load_model(model) if model else robot.nominal()
         steps = robot.load_gait(gait) if gait else robot.BASELINE
         if paper:
-            _print_paper(console, chosen)
+            _print_paper(console, chosen if model else None, steps if gait else None)
             return
         with console.status("simulating"):
             from bifa.simulate import gait_rows, speeds, walk
@@ -70,18 +75,23 @@ def _print_walk(console, model, gait, progress) -> None:
         )
 
 
-def _print_paper(console, model) -> None:
+def _print_paper(console, model, gait) -> None:
+    """Both shipped models, or the one given, with its fastest gait."""
     from rich.table import Table
 
-    with console.status("simulating every experiment"):
-        from bifa.simulate.paper import compare
+    from bifa import robot
 
-        rows = compare(model)
-    table = Table(title=f"The paper and the model {model.name!r}", title_justify="left")
-    for heading in ("", "paper", "model", "fits", "remark"):
+    with console.status("simulating every experiment"):
+        from bifa.simulate.paper import FAST, FAST_STRONG, compare
+
+        pairs = [(model, gait or FAST)] if model else [(robot.nominal(), FAST), (robot.strong_push(), FAST_STRONG)]
+        tables = [compare(*pair) for pair in pairs]
+    table = Table(title="The paper and the model; [red]red[/red]: does not fit", title_justify="left")
+    for heading in ("", "paper", *(chosen.name for chosen, _ in pairs), "remark on the first"):
         table.add_column(heading)
-    for row in rows:
-        table.add_row(row.what, row.paper, row.ours, "yes" if row.fits else "[red]no[/red]", row.remark)
+    for rows in zip(*tables, strict=True):
+        shown = (row.ours if row.fits else f"[red]{row.ours}[/red]" for row in rows)
+        table.add_row(rows[0].what, rows[0].paper, *shown, rows[0].remark)
     console.print(table)
 
 

@@ -2,7 +2,7 @@
 
 from bifa.robot.gait import BASELINE, Gait, GaitError, load_gait, save_gait
 from bifa.robot.model import Covariance, Model
-from bifa.robot.model_file import ModelFileError, load_model, nominal, save_model
+from bifa.robot.model_file import ModelFileError, load_model, nominal, save_model, strong_push
 from bifa.robot.parameters import BASE_PARAMETERS, Parameter, ParameterError
 from bifa.robot.stiffness import StiffnessCurve
 
@@ -22,4 +22,5 @@ __all__ = [
     "nominal",
     "save_gait",
     "save_model",
+    "strong_push",
 ]

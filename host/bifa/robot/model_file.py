@@ -23,7 +23,16 @@ class ModelFileError(BifaError):
 
 def nominal() -> Model:
     """The set that reproduces the paper's figures, shipped with the package."""
-    return _parse(resources.files("bifa.robot").joinpath("nominal.toml").read_text("utf-8"), "nominal.toml")
+    return _shipped("nominal.toml")
+
+
+def strong_push() -> Model:
+    """A set that reproduces the same and also the paper's push of 150 N, with a larger body area."""
+    return _shipped("strong_push.toml")
+
+
+def _shipped(name: str) -> Model:
+    return _parse(resources.files("bifa.robot").joinpath(name).read_text("utf-8"), name)
 
 
 def load_model(path: str | Path) -> Model:

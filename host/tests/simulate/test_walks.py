@@ -6,7 +6,7 @@ import pytest
 from bifa import robot, simulate
 from bifa.robot import Gait
 from bifa.simulate import layout
-from bifa.simulate.paper import FAST, SLOW, compare
+from bifa.simulate.paper import FAST, FAST_STRONG, SLOW, compare
 
 BACKWARD = Gait(5.7, 90.0, 270.0, 0.5, 0.5, 0.5)
 
@@ -97,7 +97,13 @@ def test_record_and_metric_tell_the_same():
     assert record["displacement_head_mm"][-1] == pytest.approx(1e3 * progress.advance_m.sum(), abs=0.6)
 
 
-def test_table_against_the_paper():
-    rows = {row.what: row for row in compare(robot.nominal())}
-    wrong = {what for what, row in rows.items() if not row.fits}
-    assert wrong == {"push of the body at 8.5 psi, N", "offset of the model's ends, mm"}
+@pytest.mark.parametrize(
+    ("model", "fast", "wrong"),
+    [
+        (robot.nominal(), FAST, {"push of the body at 8.5 psi, N", "offset of the model's ends, mm"}),
+        (robot.strong_push(), FAST_STRONG, {"offset of the model's ends, mm"}),
+    ],
+    ids=["nominal", "strong push"],
+)
+def test_table_against_the_paper(model, fast, wrong):
+    assert {row.what for row in compare(model, fast) if not row.fits} == wrong
