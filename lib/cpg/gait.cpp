@@ -19,7 +19,7 @@ struct Fraction {
 };
 
 /// Divides bit by bit, for a proper fraction; denominator < 2^31.
-Fraction divide(uint32_t numerator, uint32_t denominator) {
+__attribute__((noinline)) Fraction divide(uint32_t numerator, uint32_t denominator) {
   Fraction quotient = {0, 0};
   for (uint8_t bit = 0; bit < 40; ++bit) {
     quotient.whole = quotient.whole << 1 | quotient.rest >> 7;
