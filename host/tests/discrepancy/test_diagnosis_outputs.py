@@ -1,0 +1,26 @@
+"""What a diagnosis is handed on as: a page, and an exit status where the input is unusable."""
+
+import subprocess
+import sys
+
+from bifa.discrepancy.diagnosis import diagnose
+from bifa.discrepancy.record import as_record
+from bifa.discrepancy.toy import hide
+from bifa.report.diagnosis import diagnosis_page
+from bifa.report.page import render
+
+
+def test_page_says_the_effect_and_loads_nothing():
+    record = as_record(diagnose(hide({"delay.delay_s": 0.02}, seed=30)))
+    page = render(diagnosis_page("toy", record))
+    assert "delay" in page
+    assert record["signature"]["text"].split(".")[0] in page
+    assert 'src="http' not in page
+    assert "<script" not in page
+
+
+def test_unusable_input_ends_with_status_2(tmp_path):
+    command = [sys.executable, "-c", "from bifa.cli import main; main()", "diagnose", str(tmp_path / "nothing")]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 2
+    assert "nothing" in ended.stderr
