@@ -5,12 +5,16 @@ from frame import OPEN_SEED, frame
 from tables import NAME_BYTES, CommandTable, Message
 
 
+def words(name: str, entries: list[str]) -> str:
+    """The definition of a list of texts in flash, each ended by a zero."""
+    return f"const char {name}[] BIFA_FLASH =\n" + "\n".join(f'    {text(entry)[:-1]}\\0"' for entry in entries) + ";"
+
+
 def command_header(table: CommandTable) -> str:
     typed = [c for c in table.commands if c.usage]
-    width = max(len(c.name) for c in typed) + 1
     results = "\n".join(f"  {constant(name)}," for name, _ in table.results)
     ids = "\n".join(f"  {constant(c.name)}," for c in typed)
-    words = "\n".join(f"extern const char k{name}Words[] BIFA_FLASH;" for name in table.words)
+    lists = "\n".join(f"extern const char k{name}Words[] BIFA_FLASH;" for name in table.words)
     return f"""{NOTICE}#pragma once
 
 #include <stdint.h>
@@ -24,25 +28,16 @@ enum class Result : uint8_t {{
 {results}
 }};
 
-/// What went wrong, in words.
-FlashText result_text(Result result);
-
 /// The commands that people type.
 enum class CommandId : uint8_t {{
 {ids}
 }};
 const uint8_t kCommandCount = {len(typed)};
 
-/// What is known of one typed command; lives in flash.
-struct CommandDescriptor {{
-  char name[{width}];
-  FlashText usage;
-  FlashText help;
-}};
-extern const CommandDescriptor kCommandDescriptors[kCommandCount];
-
-// Words for numbers, one after the other, each ended by a zero; see word() in print.h.
-{words}
+// Lists of texts, one after the other, each ended by a zero; read them with flash_text().
+extern const char kCommandTexts[] BIFA_FLASH;  ///< of each command: how it is typed, what it does
+extern const char kResultTexts[] BIFA_FLASH;   ///< of each result: what went wrong
+{lists}
 
 }}  // namespace bifa
 """
@@ -50,43 +45,14 @@ extern const CommandDescriptor kCommandDescriptors[kCommandCount];
 
 def command_source(table: CommandTable) -> str:
     typed = [c for c in table.commands if c.usage]
-    texts = "\n".join(
-        f"const char {constant(c.name)}Usage[] BIFA_FLASH = {text(c.usage)};\n"
-        f"const char {constant(c.name)}Help[] BIFA_FLASH = {text(c.help)};"
-        for c in typed
-    )
-    rows = "\n".join(
-        f"    {{{text(c.name)}, reinterpret_cast<FlashText>({constant(c.name)}Usage), "
-        f"reinterpret_cast<FlashText>({constant(c.name)}Help)}},"
-        for c in typed
-    )
-    words = "\n".join(
-        f"const char k{name}Words[] BIFA_FLASH =\n    " + " ".join(text(word + "\0") for word in words) + ";"
-        for name, words in table.words.items()
-    )
-    cases = "\n".join(
-        f"    case Result::{constant(name)}:\n      return BIFA_TEXT({text(words)});" for name, words in table.results
-    )
+    lists = "\n".join(words(f"k{name}Words", entries) for name, entries in table.words.items())
     return f"""{NOTICE}#include "command_table.h"
 
 namespace bifa {{
 
-namespace {{
-{texts}
-}}  // namespace
-
-const CommandDescriptor kCommandDescriptors[kCommandCount] BIFA_FLASH = {{
-{rows}
-}};
-
-{words}
-
-FlashText result_text(Result result) {{
-  switch (result) {{
-{cases}
-  }}
-  return BIFA_TEXT("?");
-}}
+{words("kCommandTexts", [entry for c in typed for entry in (c.usage, c.help)])}
+{words("kResultTexts", [entry for _, entry in table.results])}
+{lists}
 
 }}  // namespace bifa
 """

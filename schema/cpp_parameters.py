@@ -17,8 +17,6 @@ def text(value: str) -> str:
 
 def header(table: ParameterTable) -> str:
     size = sum(WIRE_BYTES[p.wire] for p in table.parameters)
-    longest = max(len(p.name) for p in table.parameters) + 1
-    unit = max(len(p.unit) for p in table.parameters) + 1
     fields = "\n".join(f"  {C_TYPE[p.wire]} {p.field};  ///< {p.name}: {p.help}" for p in table.parameters)
     ids = "\n".join(f"  {constant(p.name)}," for p in table.parameters)
     name_size = max(len(p.name) for p in table.presets) + 1
@@ -45,17 +43,16 @@ const uint8_t kParameterCount = {len(table.parameters)};
 
 /// What is known of one parameter; lives in flash, read it with the functions of parameters.h and flash_*().
 struct ParameterDescriptor {{
-  char name[{longest}];
-  char unit[{unit}];
   uint32_t minimum;
   uint32_t maximum;
   uint8_t decimals;
   uint8_t offset;
   uint8_t width;
   uint8_t since;
-  FlashText help;
 }};
 extern const ParameterDescriptor kParameterDescriptors[kParameterCount];
+/// Name, unit and help of each, in flash, each ended by a zero; read them with flash_text().
+extern const char kParameterTexts[];
 
 /// A preset that every Uno has from the factory; lives in flash.
 struct FactoryPreset {{
@@ -73,11 +70,10 @@ const uint8_t kStorageFormat = {table.storage_format};
 
 
 def source(table: ParameterTable) -> str:
-    helps = "\n".join(f"const char {constant(p.name)}Help[] BIFA_FLASH = {text(p.help)};" for p in table.parameters)
+    texts = "\n".join(f'    {text(entry)[:-1]}\\0"' for p in table.parameters for entry in (p.name, p.unit, p.help))
     rows = "\n".join(
-        f"    {{{text(p.name)}, {text(p.unit)}, {p.minimum}UL, {p.maximum}UL, {p.decimals}, "
-        f"offsetof(ParameterSet, {p.field}), {WIRE_BYTES[p.wire]}, {p.since}, "
-        f"reinterpret_cast<FlashText>({constant(p.name)}Help)}},"
+        f"    {{{p.minimum}UL, {p.maximum}UL, {p.decimals}, offsetof(ParameterSet, {p.field}), {WIRE_BYTES[p.wire]}, "
+        f"{p.since}}},  // {p.name}"
         for p in table.parameters
     )
     presets = "\n".join(
@@ -88,9 +84,8 @@ def source(table: ParameterTable) -> str:
 
 namespace bifa {{
 
-namespace {{
-{helps}
-}}  // namespace
+const char kParameterTexts[] BIFA_FLASH =
+{texts};
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {{
 {rows}

@@ -90,6 +90,7 @@ def cycles_of(source: str, seconds: float, *definitions: str) -> tuple[int, floa
         image = Path(folder) / "step.elf"
         includes = [f"-I{path}" for path in sorted((PROJECT / "lib").iterdir())]
         sources = [*(PROJECT / "lib/cpg").glob("*.cpp"), *(PROJECT / "lib/parameters").glob("*.cpp")]
+        sources += (PROJECT / "lib/flash").glob("*.cpp")
         flags = "-mmcu=atmega328p -DF_CPU=16000000UL -Os -flto -std=gnu++11 -ffunction-sections -mcall-prologues"
         command = ["avr-g++", *flags.split(), "-Wl,--gc-sections", "-Wl,--relax", *definitions, *includes]
         subprocess.run([*command, SOURCES / source, *sources, "-lm", "-o", image], check=True)

@@ -4,113 +4,88 @@
 
 namespace bifa {
 
-namespace {
-const char kHelpUsage[] BIFA_FLASH = "help [NAME]";
-const char kHelpHelp[] BIFA_FLASH = "list everything, or explain one";
-const char kVersionUsage[] BIFA_FLASH = "version";
-const char kVersionHelp[] BIFA_FLASH = "versions, and why the Uno last restarted";
-const char kStatusUsage[] BIFA_FLASH = "status";
-const char kStatusHelp[] BIFA_FLASH = "state, fault, pressures, valves, link";
-const char kShowUsage[] BIFA_FLASH = "show [NAME]";
-const char kShowHelp[] BIFA_FLASH = "print one parameter or all";
-const char kSetUsage[] BIFA_FLASH = "set NAME VALUE";
-const char kSetHelp[] BIFA_FLASH = "change a parameter, also while running";
-const char kRunUsage[] BIFA_FLASH = "run";
-const char kRunHelp[] BIFA_FLASH = "walk";
-const char kStopUsage[] BIFA_FLASH = "stop";
-const char kStopHelp[] BIFA_FLASH = "stop walking or holding; all chambers vent";
-const char kHoldUsage[] BIFA_FLASH = "hold CHAMBER positive|vacuum|off";
-const char kHoldHelp[] BIFA_FLASH = "inflate, evacuate or vent body, head or tail";
-const char kClearUsage[] BIFA_FLASH = "clear";
-const char kClearHelp[] BIFA_FLASH = "release a stop (!) or a fault whose cause is gone";
-const char kStreamUsage[] BIFA_FLASH = "stream on|off";
-const char kStreamHelp[] BIFA_FLASH = "telemetry: one line (>) a sample";
-const char kPlotUsage[] BIFA_FLASH = "plot on|off";
-const char kPlotHelp[] BIFA_FLASH = "telemetry for the Serial Plotter";
-const char kSaveUsage[] BIFA_FLASH = "save [NAME]";
-const char kSaveHelp[] BIFA_FLASH = "keep the parameters; without a name, for power-up";
-const char kLoadUsage[] BIFA_FLASH = "load PRESET";
-const char kLoadHelp[] BIFA_FLASH = "take the parameters of a preset";
-const char kPresetsUsage[] BIFA_FLASH = "presets";
-const char kPresetsHelp[] BIFA_FLASH = "list the presets";
-const char kForgetUsage[] BIFA_FLASH = "forget PRESET";
-const char kForgetHelp[] BIFA_FLASH = "delete a preset from EEPROM";
-const char kDefaultsUsage[] BIFA_FLASH = "defaults confirm";
-const char kDefaultsHelp[] BIFA_FLASH = "erase all presets and settings";
-const char kZeroUsage[] BIFA_FLASH = "zero confirm|factory";
-const char kZeroHelp[] BIFA_FLASH = "take the present pressures as zero; or undo that";
-const char kEchoUsage[] BIFA_FLASH = "echo on|off";
-const char kEchoHelp[] BIFA_FLASH = "repeat what you type (for a bare terminal)";
-}  // namespace
-
-const CommandDescriptor kCommandDescriptors[kCommandCount] BIFA_FLASH = {
-    {"help", reinterpret_cast<FlashText>(kHelpUsage), reinterpret_cast<FlashText>(kHelpHelp)},
-    {"version", reinterpret_cast<FlashText>(kVersionUsage), reinterpret_cast<FlashText>(kVersionHelp)},
-    {"status", reinterpret_cast<FlashText>(kStatusUsage), reinterpret_cast<FlashText>(kStatusHelp)},
-    {"show", reinterpret_cast<FlashText>(kShowUsage), reinterpret_cast<FlashText>(kShowHelp)},
-    {"set", reinterpret_cast<FlashText>(kSetUsage), reinterpret_cast<FlashText>(kSetHelp)},
-    {"run", reinterpret_cast<FlashText>(kRunUsage), reinterpret_cast<FlashText>(kRunHelp)},
-    {"stop", reinterpret_cast<FlashText>(kStopUsage), reinterpret_cast<FlashText>(kStopHelp)},
-    {"hold", reinterpret_cast<FlashText>(kHoldUsage), reinterpret_cast<FlashText>(kHoldHelp)},
-    {"clear", reinterpret_cast<FlashText>(kClearUsage), reinterpret_cast<FlashText>(kClearHelp)},
-    {"stream", reinterpret_cast<FlashText>(kStreamUsage), reinterpret_cast<FlashText>(kStreamHelp)},
-    {"plot", reinterpret_cast<FlashText>(kPlotUsage), reinterpret_cast<FlashText>(kPlotHelp)},
-    {"save", reinterpret_cast<FlashText>(kSaveUsage), reinterpret_cast<FlashText>(kSaveHelp)},
-    {"load", reinterpret_cast<FlashText>(kLoadUsage), reinterpret_cast<FlashText>(kLoadHelp)},
-    {"presets", reinterpret_cast<FlashText>(kPresetsUsage), reinterpret_cast<FlashText>(kPresetsHelp)},
-    {"forget", reinterpret_cast<FlashText>(kForgetUsage), reinterpret_cast<FlashText>(kForgetHelp)},
-    {"defaults", reinterpret_cast<FlashText>(kDefaultsUsage), reinterpret_cast<FlashText>(kDefaultsHelp)},
-    {"zero", reinterpret_cast<FlashText>(kZeroUsage), reinterpret_cast<FlashText>(kZeroHelp)},
-    {"echo", reinterpret_cast<FlashText>(kEchoUsage), reinterpret_cast<FlashText>(kEchoHelp)},
-};
-
+const char kCommandTexts[] BIFA_FLASH =
+    "help [NAME]\0"
+    "list everything, or explain one\0"
+    "version\0"
+    "versions, and why the Uno last restarted\0"
+    "status\0"
+    "state, fault, pressures, valves, link\0"
+    "show [NAME]\0"
+    "print one parameter or all\0"
+    "set NAME VALUE\0"
+    "change a parameter, also while running\0"
+    "run\0"
+    "walk\0"
+    "stop\0"
+    "stop walking or holding; all chambers vent\0"
+    "hold CHAMBER positive|vacuum|off\0"
+    "inflate, evacuate or vent body, head or tail\0"
+    "clear\0"
+    "release a stop (!) or a fault whose cause is gone\0"
+    "stream on|off\0"
+    "telemetry: one line (>) a sample\0"
+    "plot on|off\0"
+    "telemetry for the Serial Plotter\0"
+    "save [NAME]\0"
+    "keep the parameters; without a name, for power-up\0"
+    "load PRESET\0"
+    "take the parameters of a preset\0"
+    "presets\0"
+    "list the presets\0"
+    "forget PRESET\0"
+    "delete a preset from EEPROM\0"
+    "defaults confirm\0"
+    "erase all presets and settings\0"
+    "zero confirm|factory\0"
+    "take the present pressures as zero; or undo that\0"
+    "echo on|off\0"
+    "repeat what you type (for a bare terminal)\0";
+const char kResultTexts[] BIFA_FLASH =
+    "ok\0"
+    "no such command; type help\0"
+    "wrong arguments\0"
+    "no such parameter; type show\0"
+    "out of range\0"
+    "stopped: type clear first\0"
+    "not in this state; type status\0"
+    "no such preset; type presets\0"
+    "a name is 1 to 12 of a-z 0-9 _ -, not a factory preset's\0"
+    "no room left; forget a preset first\0"
+    "the EEPROM failed\0"
+    "busy saving; try again\0"
+    "no begin, or a field was refused\0"
+    "the set arrived damaged\0"
+    "its cause is still there; type status\0"
+    "times must not go backwards\0";
 const char kChamberWords[] BIFA_FLASH =
-    "body\0" "head\0" "tail\0";
+    "body\0"
+    "head\0"
+    "tail\0";
 const char kChamberStateWords[] BIFA_FLASH =
-    "off\0" "vacuum\0" "positive\0";
+    "off\0"
+    "vacuum\0"
+    "positive\0";
 const char kStateWords[] BIFA_FLASH =
-    "idle\0" "running\0" "holding\0" "stopped\0" "fault\0";
+    "idle\0"
+    "running\0"
+    "holding\0"
+    "stopped\0"
+    "fault\0";
 const char kFaultWords[] BIFA_FLASH =
-    "none\0" "over_pressure\0" "sensor_range\0" "sensor_stuck\0" "regulator\0" "supply_control\0" "host_silent\0" "watchdog\0" "brown_out\0";
+    "none\0"
+    "over_pressure\0"
+    "sensor_range\0"
+    "sensor_stuck\0"
+    "regulator\0"
+    "supply_control\0"
+    "host_silent\0"
+    "watchdog\0"
+    "brown_out\0";
 const char kStartCauseWords[] BIFA_FLASH =
-    "power\0" "external\0" "brown_out\0" "watchdog\0";
-
-FlashText result_text(Result result) {
-  switch (result) {
-    case Result::kOk:
-      return BIFA_TEXT("ok");
-    case Result::kUnknown:
-      return BIFA_TEXT("no such command; type help");
-    case Result::kUsage:
-      return BIFA_TEXT("wrong arguments");
-    case Result::kNoParameter:
-      return BIFA_TEXT("no such parameter; type show");
-    case Result::kRange:
-      return BIFA_TEXT("out of range");
-    case Result::kLatched:
-      return BIFA_TEXT("stopped: type clear first");
-    case Result::kRefused:
-      return BIFA_TEXT("not in this state; type status");
-    case Result::kNoPreset:
-      return BIFA_TEXT("no such preset; type presets");
-    case Result::kName:
-      return BIFA_TEXT("a name is 1 to 12 of a-z 0-9 _ -, not a factory preset's");
-    case Result::kFull:
-      return BIFA_TEXT("no room left; forget a preset first");
-    case Result::kEeprom:
-      return BIFA_TEXT("the EEPROM failed");
-    case Result::kBusy:
-      return BIFA_TEXT("busy saving; try again");
-    case Result::kTransaction:
-      return BIFA_TEXT("no begin, or a field was refused");
-    case Result::kCheck:
-      return BIFA_TEXT("the set arrived damaged");
-    case Result::kFault:
-      return BIFA_TEXT("its cause is still there; type status");
-    case Result::kOrder:
-      return BIFA_TEXT("times must not go backwards");
-  }
-  return BIFA_TEXT("?");
-}
+    "power\0"
+    "external\0"
+    "brown_out\0"
+    "watchdog\0";
 
 }  // namespace bifa

@@ -28,9 +28,6 @@ enum class Result : uint8_t {
   kOrder,
 };
 
-/// What went wrong, in words.
-FlashText result_text(Result result);
-
 /// The commands that people type.
 enum class CommandId : uint8_t {
   kHelp,
@@ -54,15 +51,9 @@ enum class CommandId : uint8_t {
 };
 const uint8_t kCommandCount = 18;
 
-/// What is known of one typed command; lives in flash.
-struct CommandDescriptor {
-  char name[9];
-  FlashText usage;
-  FlashText help;
-};
-extern const CommandDescriptor kCommandDescriptors[kCommandCount];
-
-// Words for numbers, one after the other, each ended by a zero; see word() in print.h.
+// Lists of texts, one after the other, each ended by a zero; read them with flash_text().
+extern const char kCommandTexts[] BIFA_FLASH;  ///< of each command: how it is typed, what it does
+extern const char kResultTexts[] BIFA_FLASH;   ///< of each result: what went wrong
 extern const char kChamberWords[] BIFA_FLASH;
 extern const char kChamberStateWords[] BIFA_FLASH;
 extern const char kStateWords[] BIFA_FLASH;

@@ -9,15 +9,24 @@ const char kBackspace = 0x08;
 const char kDelete = 0x7F;
 const uint8_t kRoomForSample = 96;
 
-FlashText name_of(const CommandDescriptor& row) { return reinterpret_cast<FlashText>(row.name); }
-FlashText name_of(ParameterId id) { return reinterpret_cast<FlashText>(descriptor(id).name); }
-uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
-
-FlashText text_at(const FlashText& in_flash) {
-  FlashText text;
-  flash_copy(&text, &in_flash, sizeof text);
-  return text;
+FlashText usage_of(uint8_t command) { return flash_text(kCommandTexts, 2 * command); }
+FlashText help_of(uint8_t command) { return flash_text(kCommandTexts, 2 * command + 1); }
+FlashText name_of(ParameterId id) { return text_of(id, ParameterText::kName); }
+/// The command whose usage begins with that word; kCommandCount if there is none.
+uint8_t find_command(const char* name) {
+  for (uint8_t i = 0; i < kCommandCount; ++i) {
+    const char* usage = reinterpret_cast<const char*>(usage_of(i));
+    const char* given = name;
+    while (*given != '\0' && static_cast<char>(flash_byte(usage)) == *given) {
+      ++usage;
+      ++given;
+    }
+    const char next = static_cast<char>(flash_byte(usage));
+    if (*given == '\0' && given != name && (next == ' ' || next == '\0')) return i;
+  }
+  return kCommandCount;
 }
+uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
 }  // namespace
 
 void Console::greet() {
@@ -85,9 +94,8 @@ void Console::execute() {
     while (*at != '\0' && *at != ' ' && *at != '\t') ++at;
   }
   if (word_count_ == 0) return answer(Result::kOk);
-  for (uint8_t i = 0; i < kCommandCount; ++i) {
-    if (is(0, name_of(kCommandDescriptors[i]))) return dispatch(static_cast<CommandId>(i));
-  }
+  const uint8_t command = find_command(words_[0]);
+  if (command < kCommandCount) return dispatch(static_cast<CommandId>(command));
   answer(Result::kUnknown);
 }
 
@@ -160,13 +168,13 @@ void Console::dispatch(CommandId id) {
 
 void Console::answer(Result result) {
   if (result != Result::kOk) print(out_, BIFA_TEXT("error "));
-  print(out_, result_text(result));
+  print(out_, flash_text(kResultTexts, static_cast<uint8_t>(result)));
   print(out_, '\n');
 }
 
 void Console::answer_usage(CommandId id) {
   print(out_, BIFA_TEXT("error usage: "));
-  print(out_, text_at(kCommandDescriptors[static_cast<uint8_t>(id)].usage));
+  print(out_, usage_of(static_cast<uint8_t>(id)));
   print(out_, '\n');
 }
 
@@ -204,13 +212,11 @@ void Console::switch_to(CommandId id, bool& flag) {
 }
 
 void Console::help() {
-  for (const CommandDescriptor& row : kCommandDescriptors) {
-    print_help(text_at(row.usage), text_at(row.help));
-  }
+  for (uint8_t i = 0; i < kCommandCount; ++i) print_help(usage_of(i), help_of(i));
   print(out_, BIFA_TEXT("[!  (at any time, no Enter) stop: all chambers vent until clear\n[parameters:"));
-  for (const ParameterDescriptor& row : kParameterDescriptors) {
+  for (uint8_t i = 0; i < kParameterCount; ++i) {
     print(out_, ' ');
-    print(out_, reinterpret_cast<FlashText>(row.name));
+    print(out_, name_of(static_cast<ParameterId>(i)));
   }
   print(out_, BIFA_TEXT("\n[try: set period_s 6, run, hold head positive, stop, help period_s\n"));
   answer(Result::kOk);
@@ -227,7 +233,7 @@ void Console::print_help(FlashText name, FlashText text) {
 void Console::help_on(const char* name) {
   ParameterId id;
   if (find_parameter(name, id)) {
-    print_help(name_of(id), text_at(descriptor(id).help));
+    print_help(name_of(id), text_of(id, ParameterText::kHelp));
     print(out_, BIFA_TEXT("[range "));
     print_range(id);
     print(out_, BIFA_TEXT(", default "));
@@ -237,9 +243,9 @@ void Console::help_on(const char* name) {
     print(out_, '\n');
     return answer(Result::kOk);
   }
-  for (const CommandDescriptor& row : kCommandDescriptors) {
-    if (!is(1, name_of(row))) continue;
-    print_help(text_at(row.usage), text_at(row.help));
+  const uint8_t command = find_command(name);
+  if (command < kCommandCount) {
+    print_help(usage_of(command), help_of(command));
     return answer(Result::kOk);
   }
   answer(Result::kUnknown);
@@ -249,7 +255,7 @@ void Console::print_range(ParameterId id) {
   print_decimal(out_, minimum_of(id), decimals_of(id));
   print(out_, BIFA_TEXT(" to "));
   print_decimal(out_, maximum_of(id), decimals_of(id));
-  const FlashText unit = reinterpret_cast<FlashText>(descriptor(id).unit);
+  const FlashText unit = text_of(id, ParameterText::kUnit);
   if (flash_byte(unit) != 0) print(out_, ' ');
   print(out_, unit);
 }
@@ -265,14 +271,14 @@ void Console::version() {
   print(out_, BIFA_TEXT(", table "));
   print_number(out_, kTableHash);
   print(out_, BIFA_TEXT(", started by "));
-  print(out_, word(kStartCauseWords, static_cast<uint8_t>(session_.cause())));
+  print(out_, flash_text(kStartCauseWords, static_cast<uint8_t>(session_.cause())));
   print(out_, '\n');
 }
 
 void Console::status() {
   const Status status = commands_.controller().status();
   print(out_, BIFA_TEXT("[state "));
-  print(out_, word(kStateWords, static_cast<uint8_t>(status.state)));
+  print(out_, flash_text(kStateWords, static_cast<uint8_t>(status.state)));
   if (status.scheduled) print(out_, BIFA_TEXT(", timed holds"));
   if (status.emergency_stop) print(out_, BIFA_TEXT(", emergency stop pressed"));
   print(out_, '\n');
@@ -282,11 +288,11 @@ void Console::status() {
   print(out_, BIFA_TEXT("\n[valves"));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(out_, ' ');
-    print(out_, word(kChamberWords, i));
+    print(out_, flash_text(kChamberWords, i));
     print(out_, ' ');
     // the two bits of a chamber, positive and vacuum, in the order of ChamberState
     const uint8_t bits = status.valves >> (2 * i) & 3;
-    print(out_, word(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0));
+    print(out_, flash_text(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0));
   }
   print(out_, BIFA_TEXT("\n[link: frames bad "));
   print_number(out_, counters_.frames_bad);
@@ -302,7 +308,7 @@ void Console::status() {
 void Console::print_triple(const int16_t (&pressure_mpsi)[kChamberCount]) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     if (i > 0) print(out_, ' ');
-    print(out_, word(kChamberWords, i));
+    print(out_, flash_text(kChamberWords, i));
     print(out_, ' ');
     print_signed(out_, pressure_mpsi[i], 3);
   }
@@ -310,10 +316,10 @@ void Console::print_triple(const int16_t (&pressure_mpsi)[kChamberCount]) {
 
 void Console::print_fault(const FaultReport& fault) {
   print(out_, BIFA_TEXT("[fault "));
-  print(out_, word(kFaultWords, static_cast<uint8_t>(fault.fault)));
+  print(out_, flash_text(kFaultWords, static_cast<uint8_t>(fault.fault)));
   if (fault.channel < kChamberCount) {
     print(out_, ' ');
-    print(out_, word(kChamberWords, fault.channel));
+    print(out_, flash_text(kChamberWords, fault.channel));
   }
   print(out_, BIFA_TEXT(" value "));
   print_signed(out_, fault.value, 0);
@@ -369,9 +375,9 @@ void Console::set() {
 
 void Console::hold() {
   for (uint8_t chamber = 0; chamber < kChamberCount; ++chamber) {
-    if (!is(1, word(kChamberWords, chamber))) continue;
+    if (!is(1, flash_text(kChamberWords, chamber))) continue;
     for (uint8_t state = 0; state <= static_cast<uint8_t>(ChamberState::kPositive); ++state) {
-      if (is(2, word(kChamberStateWords, state))) return answer(commands_.hold(chamber, state));
+      if (is(2, flash_text(kChamberStateWords, state))) return answer(commands_.hold(chamber, state));
     }
   }
   answer_usage(CommandId::kHold);
@@ -413,14 +419,14 @@ void Console::print_stream(const Sample& sample) {
   print(out_, ',');
   print_number(out_, sample.time_us);
   print(out_, ',');
-  print(out_, word(kStateWords, static_cast<uint8_t>(sample.state)));
+  print(out_, flash_text(kStateWords, static_cast<uint8_t>(sample.state)));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(out_, ',');
     print_signed(out_, sample.pressure_mpsi[i], 3);
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(out_, ',');
-    print(out_, word(kChamberStateWords, static_cast<uint8_t>(sample.command[i])));
+    print(out_, flash_text(kChamberStateWords, static_cast<uint8_t>(sample.command[i])));
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(out_, ',');
@@ -432,7 +438,7 @@ void Console::print_stream(const Sample& sample) {
 void Console::print_plot(const Sample& sample) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     if (i > 0) print(out_, '\t');
-    print(out_, word(kChamberWords, i));
+    print(out_, flash_text(kChamberWords, i));
     print(out_, BIFA_TEXT("_psi:"));
     print_signed(out_, sample.pressure_mpsi[i], 3);
   }

@@ -32,4 +32,7 @@ inline void flash_copy(void* to, const void* from, uint16_t size) { memcpy(to, f
 inline bool flash_equal(const char* text, const char* in_flash) { return strcmp(text, in_flash) == 0; }
 #endif
 
+/// Text number `index` of a list in flash, in which each ends in a zero.
+FlashText flash_text(const char* texts, uint8_t index);
+
 }  // namespace bifa

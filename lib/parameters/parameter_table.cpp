@@ -4,28 +4,45 @@
 
 namespace bifa {
 
-namespace {
-const char kPeriodSHelp[] BIFA_FLASH = "time of one cycle (1/f)";
-const char kPsi12DegHelp[] BIFA_FLASH = "phase of the head ahead of the body (psi_12)";
-const char kPsi13DegHelp[] BIFA_FLASH = "phase of the tail ahead of the body (psi_13)";
-const char kDutyBodyHelp[] BIFA_FLASH = "part of the cycle at vacuum: contracting (d_1)";
-const char kDutyHeadHelp[] BIFA_FLASH = "part of the cycle at vacuum: not gripping (d_2)";
-const char kDutyTailHelp[] BIFA_FLASH = "part of the cycle at vacuum: not gripping (d_3)";
-const char kCouplingPerSHelp[] BIFA_FLASH = "how fast the oscillators pull into their phases (alpha_phi)";
-const char kPressurePsiHelp[] BIFA_FLASH = "set-point of the positive supply";
-const char kHostTimeoutSHelp[] BIFA_FLASH = "vent after such a silence of the computer; 0 = never";
-}  // namespace
+const char kParameterTexts[] BIFA_FLASH =
+    "period_s\0"
+    "s\0"
+    "time of one cycle (1/f)\0"
+    "psi12_deg\0"
+    "deg\0"
+    "phase of the head ahead of the body (psi_12)\0"
+    "psi13_deg\0"
+    "deg\0"
+    "phase of the tail ahead of the body (psi_13)\0"
+    "duty_body\0"
+    "\0"
+    "part of the cycle at vacuum: contracting (d_1)\0"
+    "duty_head\0"
+    "\0"
+    "part of the cycle at vacuum: not gripping (d_2)\0"
+    "duty_tail\0"
+    "\0"
+    "part of the cycle at vacuum: not gripping (d_3)\0"
+    "coupling_per_s\0"
+    "1/s\0"
+    "how fast the oscillators pull into their phases (alpha_phi)\0"
+    "pressure_psi\0"
+    "psi\0"
+    "set-point of the positive supply\0"
+    "host_timeout_s\0"
+    "s\0"
+    "vent after such a silence of the computer; 0 = never\0";
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {
-    {"period_s", "s", 500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1, reinterpret_cast<FlashText>(kPeriodSHelp)},
-    {"psi12_deg", "deg", 0UL, 360000UL, 3, offsetof(ParameterSet, psi12_mdeg), 4, 1, reinterpret_cast<FlashText>(kPsi12DegHelp)},
-    {"psi13_deg", "deg", 0UL, 360000UL, 3, offsetof(ParameterSet, psi13_mdeg), 4, 1, reinterpret_cast<FlashText>(kPsi13DegHelp)},
-    {"duty_body", "", 0UL, 10000UL, 4, offsetof(ParameterSet, duty_body_e4), 2, 1, reinterpret_cast<FlashText>(kDutyBodyHelp)},
-    {"duty_head", "", 0UL, 10000UL, 4, offsetof(ParameterSet, duty_head_e4), 2, 1, reinterpret_cast<FlashText>(kDutyHeadHelp)},
-    {"duty_tail", "", 0UL, 10000UL, 4, offsetof(ParameterSet, duty_tail_e4), 2, 1, reinterpret_cast<FlashText>(kDutyTailHelp)},
-    {"coupling_per_s", "1/s", 0UL, 20000UL, 3, offsetof(ParameterSet, coupling_milli_per_s), 2, 1, reinterpret_cast<FlashText>(kCouplingPerSHelp)},
-    {"pressure_psi", "psi", 0UL, 14000UL, 3, offsetof(ParameterSet, pressure_mpsi), 2, 1, reinterpret_cast<FlashText>(kPressurePsiHelp)},
-    {"host_timeout_s", "s", 0UL, 60000UL, 3, offsetof(ParameterSet, host_timeout_ms), 2, 2, reinterpret_cast<FlashText>(kHostTimeoutSHelp)},
+    {500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1},  // period_s
+    {0UL, 360000UL, 3, offsetof(ParameterSet, psi12_mdeg), 4, 1},  // psi12_deg
+    {0UL, 360000UL, 3, offsetof(ParameterSet, psi13_mdeg), 4, 1},  // psi13_deg
+    {0UL, 10000UL, 4, offsetof(ParameterSet, duty_body_e4), 2, 1},  // duty_body
+    {0UL, 10000UL, 4, offsetof(ParameterSet, duty_head_e4), 2, 1},  // duty_head
+    {0UL, 10000UL, 4, offsetof(ParameterSet, duty_tail_e4), 2, 1},  // duty_tail
+    {0UL, 20000UL, 3, offsetof(ParameterSet, coupling_milli_per_s), 2, 1},  // coupling_per_s
+    {0UL, 14000UL, 3, offsetof(ParameterSet, pressure_mpsi), 2, 1},  // pressure_psi
+    {0UL, 60000UL, 3, offsetof(ParameterSet, host_timeout_ms), 2, 2},  // host_timeout_s
 };
 
 const FactoryPreset kFactoryPresets[kFactoryPresetCount] BIFA_FLASH = {

@@ -39,17 +39,16 @@ const uint8_t kParameterCount = 9;
 
 /// What is known of one parameter; lives in flash, read it with the functions of parameters.h and flash_*().
 struct ParameterDescriptor {
-  char name[15];
-  char unit[4];
   uint32_t minimum;
   uint32_t maximum;
   uint8_t decimals;
   uint8_t offset;
   uint8_t width;
   uint8_t since;
-  FlashText help;
 };
 extern const ParameterDescriptor kParameterDescriptors[kParameterCount];
+/// Name, unit and help of each, in flash, each ended by a zero; read them with flash_text().
+extern const char kParameterTexts[];
 
 /// A preset that every Uno has from the factory; lives in flash.
 struct FactoryPreset {

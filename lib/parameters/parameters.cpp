@@ -12,6 +12,11 @@ uint32_t flash_long(const uint32_t& in_flash) {
 
 }  // namespace
 
+FlashText text_of(ParameterId id, ParameterText which) {
+  const uint8_t kTexts = 3;
+  return flash_text(kParameterTexts, static_cast<uint8_t>(id) * kTexts + static_cast<uint8_t>(which));
+}
+
 uint32_t minimum_of(ParameterId id) { return flash_long(descriptor(id).minimum); }
 uint32_t maximum_of(ParameterId id) { return flash_long(descriptor(id).maximum); }
 
@@ -32,7 +37,7 @@ bool in_range(ParameterId id, uint32_t value) { return value >= minimum_of(id) &
 bool find_parameter(const char* name, ParameterId& id) {
   for (uint8_t i = 0; i < kParameterCount; ++i) {
     id = static_cast<ParameterId>(i);
-    if (flash_equal(name, descriptor(id).name)) return true;
+    if (flash_equal(name, reinterpret_cast<const char*>(text_of(id, ParameterText::kName)))) return true;
   }
   return false;
 }

@@ -8,6 +8,9 @@ namespace bifa {
 /// What is known of a parameter, in flash.
 inline const ParameterDescriptor& descriptor(ParameterId id) { return kParameterDescriptors[static_cast<uint8_t>(id)]; }
 
+enum class ParameterText : uint8_t { kName, kUnit, kHelp };
+FlashText text_of(ParameterId id, ParameterText which);
+
 /// Bounds of its value in wire units.
 uint32_t minimum_of(ParameterId id);
 uint32_t maximum_of(ParameterId id);

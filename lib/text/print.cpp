@@ -14,14 +14,6 @@ void print(Sink& sink, const char* text) {
   for (; *text != '\0'; ++text) print(sink, *text);
 }
 
-FlashText word(const char* words, uint8_t index) {
-  for (; index > 0; --index) {
-    while (flash_byte(words++) != 0) {
-    }
-  }
-  return reinterpret_cast<FlashText>(words);
-}
-
 void print_decimal(Sink& sink, uint32_t value, uint8_t decimals) {
   while (decimals > 0 && value % 10 == 0) {
     value /= 10;

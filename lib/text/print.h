@@ -10,9 +10,6 @@ void print(Sink& sink, char character);
 void print(Sink& sink, FlashText text);
 void print(Sink& sink, const char* text);
 
-/// Word number `index` of a list in flash, in which each ends in a zero.
-FlashText word(const char* words, uint8_t index);
-
 /// Prints value / 10^decimals without trailing zeros: (5700000, 6) -> "5.7".
 void print_decimal(Sink& sink, uint32_t value, uint8_t decimals);
 void print_signed(Sink& sink, int32_t value, uint8_t decimals);

@@ -29,7 +29,7 @@ ffi, lib = load(
     int bench_load(Bench*, const char* name, void* set); int bench_load_settings(Bench*, uint8_t*);
     int bench_name_at(Bench*, uint8_t index, char* name);
     """,
-    ("storage/*.cpp", "parameters/*.cpp", "commands/command_table.cpp"),
+    ("storage/*.cpp", "parameters/*.cpp", "flash/*.cpp"),
 )
 
 
