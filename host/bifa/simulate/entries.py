@@ -6,10 +6,12 @@ simulator and of the effects.
 
 from __future__ import annotations
 
+import inspect
+from importlib import import_module
 from pathlib import Path
 
-import bifa.effects
-from bifa.simulate import generated
+from bifa import effects
+from bifa.simulate import generated, hooks
 
 _ENTRIES = {
     "walk_record": "locomotion",
@@ -26,9 +28,10 @@ _PLAIN = {"__init__.py", "entries.py", "gaits.py", "paper.py", "records.py", "ri
 
 
 def _sources() -> list[str]:
-    folders = (Path(__file__).parent, Path(bifa.effects.__path__[0]))
-    paths = [path for folder in folders for path in sorted(folder.glob("*.py")) if path.name not in _PLAIN]
-    return [path.read_text("utf-8") for path in paths]
+    """Of the simulator, of every effect wherever its file lies, and of the chains that join them."""
+    paths = [path for path in sorted(Path(__file__).parent.glob("*.py")) if path.name not in _PLAIN]
+    own = [path.read_text("utf-8") for path in paths]
+    return [*own, *(inspect.getsource(module) for module in effects.modules().values()), hooks.chain_source()]
 
 
 def _entry_source() -> str:
@@ -43,11 +46,8 @@ def _entry_source() -> str:
 
 
 def _arguments(module: str, name: str) -> list[str]:
-    from importlib import import_module
-    from inspect import signature
-
     function = getattr(import_module(f"bifa.simulate.{module}"), name)
-    return list(signature(function.py_func).parameters)
+    return list(inspect.signature(function.py_func).parameters)
 
 
 entries = generated.load("entries", _entry_source())

@@ -1,7 +1,11 @@
 """The library: every effect declares what it does, does it only there, and vanishes with its size."""
 
 import inspect
+import re
+import subprocess
+import sys
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,3 +166,30 @@ def test_an_effect_that_asks_for_what_there_is_not_is_refused(with_new_effect):
 def test_an_effect_without_a_hook_is_refused(with_new_effect):
     with pytest.raises(EffectError, match="swelling acts nowhere"):
         with_new_effect()
+
+
+PAGE = Path(__file__).parents[3] / "docs" / "adding-an-effect.md"
+
+
+def test_the_page_lists_every_hook():
+    listed = re.findall(r"^\| `(\w+)` \|", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert sorted(listed) == sorted(hooks._HOOKS)
+
+
+@pytest.mark.soak
+def test_the_pages_example_works_as_it_stands(tmp_path):
+    code = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL).group(1)
+    (tmp_path / "swelling.py").write_text(code, encoding="utf-8")
+    check = f"""
+import numpy as np
+import bifa.effects
+bifa.effects.__path__.append({str(tmp_path)!r})
+from bifa import robot, simulate
+model = robot.nominal()
+swollen = model.with_effects({{"swelling": {{"growth": 0.2}}}})
+time = np.array([0.0, 10.0])
+path = np.array([0.0, 1e3 * model.body_stiffness.stroke_m])
+plain, more = (simulate.static_loading(m, "large", time, path, 5.0)["force_N"] for m in (model, swollen))
+np.testing.assert_allclose(more - plain, [0.0, -0.2 * 9.0 * 5.0], atol=1e-6)
+"""
+    subprocess.run([sys.executable, "-c", check], check=True)
