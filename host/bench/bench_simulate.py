@@ -20,7 +20,7 @@ from bifa.robot import Gait, Model, StiffnessCurve
 
 CYCLES = 4
 THRESHOLDS_M_S = (1e-2, 1e-3)
-LONGEST_S = 20.0  # after which LSODA is stopped
+LONGEST_S = 40.0  # after which LSODA is stopped
 GAITS = (
     robot.BASELINE,
     Gait(2.516, 208.9, 331.9, 0.649, 0.4425, 0.4425),  # near the fastest
