@@ -20,6 +20,7 @@ from .recording import LEAD_S, Recording
 CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
 SNAP_PSI = 8.5  # extends every actuator
+TICK_S = 1e-3  # the Uno switches valves at its ticks
 SETTLE_S = 6.0  # of a pressure: five of the slowest time constants of about 1 s
 RELIEF_S = 12.0  # the regulator lets air out more slowly
 
@@ -86,7 +87,7 @@ def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         tape.wait(STEP_END_S + LEAD_S)
     i = CHAMBERS.index(chamber)
     command = tape.commands[:, i]
-    up_s = _scheduled_start(tape.uno_s, command)
+    up_s, error_s = _scheduled_start(tape.uno_s, command)
     begin_s = up_s - STEP_UP_S
     keep = (tape.uno_s >= begin_s) & (tape.uno_s <= begin_s + STEP_END_S) & np.isfinite(command)
     time_s = tape.uno_s[keep]
@@ -99,12 +100,13 @@ def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         "pressure_psi": tape.pressures_psi[keep, i],
     }
     switches = [up_s - time_s[0], up_s - time_s[0] + STEP_DOWN_S - STEP_UP_S]
-    return columns, _noted(tape.clock) | {"switch_time_s": [float(t) for t in switches]}, tape.lost_samples
+    known = {"switch_time_s": [float(t) for t in switches], "switch_error_s": error_s}
+    return columns, _noted(tape.clock) | known, tape.lost_samples
 
 
 def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
     walk = record_walk(rig, uno, planned.gait, planned.cycles, on_progress, **planned.settings)
-    return walk.columns, _noted(walk.clock), walk.lost_samples
+    return walk.columns, _noted(walk.clock) | {"switch_error_s": TICK_S / 2}, walk.lost_samples
 
 
 _RUNS: dict[str, Callable[..., tuple[dict[str, np.ndarray], dict[str, Any], int]]] = {
@@ -139,9 +141,9 @@ def _pass(rig, uno: Uno, duration_s: float) -> None:
         uno.keep_alive()
 
 
-def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> float:
-    """When the positive pressure was switched on, on the Uno's clock: each switch of the schedule happened between two
-    samples, and the two are known to be STEP_DOWN_S - STEP_UP_S apart."""
+def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, float]:
+    """When the positive pressure was switched on, on the Uno's clock, and by how much that may be off: each switch of
+    the schedule happened between two samples, and the two are known to be STEP_DOWN_S - STEP_UP_S apart."""
     changes = np.flatnonzero(np.diff(np.nan_to_num(command, nan=0.0)) != 0.0) + 1
     if len(changes) != 2:
         raise BifaError(
@@ -150,7 +152,7 @@ def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> float:
     apart_s = STEP_DOWN_S - STEP_UP_S
     low = max(uno_s[changes[0] - 1], uno_s[changes[1] - 1] - apart_s)
     high = min(uno_s[changes[0]], uno_s[changes[1]] - apart_s)
-    return float(0.5 * (low + high))
+    return float(0.5 * (low + high)), float(0.5 * (high - low))
 
 
 def _moving_span(time_s: np.ndarray) -> slice:

@@ -13,7 +13,7 @@ from bifa.identify.system import Theta
 from bifa.simulate import Plant, Timeline
 
 from .motion import imposed_motion
-from .switches import elapsed_s, step_timeline, walk_timeline
+from .switches import elapsed_s, shifted, step_timeline, switch_sd_s, walk_timeline
 
 STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
 _MM = 1e3
@@ -59,15 +59,15 @@ class StepInputs:
     time_s: np.ndarray
     commands: Timeline
     pressure_psi: float
+    switch_sd_s: float = 0.0
     channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
     positive_psi: None = None
 
     def simulate(
         self, plant: Plant, zeros_m: tuple[float, float], tolerance_m: float, nuisances: Theta
     ) -> dict[str, np.ndarray]:
-        record = simulate.step_response(
-            plant, self.actuator, self.time_s, self.commands, self.pressure_psi, tolerance_m
-        )
+        commands = shifted(self.commands, nuisances.get("switch_late_s", 0.0))
+        record = simulate.step_response(plant, self.actuator, self.time_s, commands, self.pressure_psi, tolerance_m)
         zero_mm = zeros_m[self.actuator == "small"] * _MM
         return dict(record.columns) | {"displacement_mm": record["displacement_mm"] + zero_mm}
 
@@ -119,6 +119,7 @@ class WalkInputs:
     inclination_deg: float
     positive_psi: float | None
     channels: tuple[str, ...]
+    switch_sd_s: float = 0.0
     actuator: None = None
 
     def simulate(
@@ -126,7 +127,7 @@ class WalkInputs:
     ) -> dict[str, np.ndarray]:
         record = simulate.walk(
             plant,
-            commands=self.commands,
+            commands=shifted(self.commands, nuisances.get("switch_late_s", 0.0)),
             time_s=self.time_s,
             inclination_deg=self.inclination_deg,
             tolerance_m=tolerance_m,
@@ -145,7 +146,7 @@ def _static(trial: Trial) -> StaticInputs:
 
 
 def _step(trial: Trial) -> StepInputs:
-    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), trial.pressure_psi)
+    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), trial.pressure_psi, switch_sd_s(trial))
 
 
 def _pull(trial: Trial) -> PullInputs:
@@ -180,6 +181,7 @@ def _walk(trial: Trial) -> WalkInputs:
         inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
         positive_psi=trial.pressure_psi,
         channels=(*displacements, *pressures),
+        switch_sd_s=switch_sd_s(trial),
     )
 
 

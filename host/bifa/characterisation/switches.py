@@ -27,6 +27,25 @@ def elapsed_s(trial: Trial) -> np.ndarray:
     return trial.time_s if 0.0 <= begin_s < 1.5 * sample_s else trial.time_s - begin_s
 
 
+def shifted(commands: Timeline, late_s: float) -> Timeline:
+    """All switches later by `late_s`; the state at time 0 stays."""
+    if late_s == 0.0:
+        return commands
+    time_s = np.where(commands.time_s > 0.0, commands.time_s + late_s, commands.time_s)
+    return Timeline(time_s, commands.chamber, commands.command)
+
+
+def switch_sd_s(trial: Trial) -> float:
+    """How well the switching times of a trial are known as a whole, as a standard deviation; 0: exactly."""
+    noted = trial.extra.get("switch_error_s")
+    if noted is not None:
+        return float(noted) / np.sqrt(3.0)
+    if trial.experiment != "step_response" or "switch_time_s" in trial.extra:
+        return 0.0
+    sample_s = float(np.median(np.diff(trial.time_s)))
+    return 0.0 if _is_scripted(_shown(trial)) else 0.5 * sample_s / np.sqrt(3.0)
+
+
 def step_timeline(trial: Trial) -> Timeline:
     """Of a step response, as chamber 0; times as `elapsed_s` gives them."""
     time_s = elapsed_s(trial)
@@ -36,9 +55,7 @@ def step_timeline(trial: Trial) -> Timeline:
     if noted is not None and len(noted) == len(at):
         times = np.asarray(noted, float)
     else:
-        shown = trial.time_s[at]
-        scripted = np.abs(shown - _ROUND_S * np.round(shown / _ROUND_S)) < _SPARE_S
-        times = time_s[at] if scripted.all() else 0.5 * (time_s[at - 1] + time_s[at])
+        times = time_s[at] if _is_scripted(_shown(trial)) else 0.5 * (time_s[at - 1] + time_s[at])
     return timeline([(0.0, 0, state[0]), *((t, 0, state[i]) for t, i in zip(times, at, strict=True))])
 
 
@@ -55,6 +72,15 @@ def walk_timeline(trial: Trial) -> Timeline:
     gait = Gait(**{name: trial.gait[name] for name in Gait.__dataclass_fields__})
     settled = _settled(gait, recorded, time_s)
     return settled or refine(recorded, gait, float(np.median(np.diff(time_s))))
+
+
+def _shown(trial: Trial) -> np.ndarray:
+    """Times of the samples that first show a new command."""
+    return trial.time_s[np.flatnonzero(np.diff((trial.columns["command"] > 0.5).astype(int))) + 1]
+
+
+def _is_scripted(shown_s: np.ndarray) -> bool:
+    return bool((np.abs(shown_s - _ROUND_S * np.round(shown_s / _ROUND_S)) < _SPARE_S).all())
 
 
 def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeline:

@@ -124,17 +124,22 @@ class RobotSystem(System):
         return regressors.of(trial, prediction)
 
     def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
-        if trial.experiment not in (ANCHOR, WALK):
-            return ()
-        friction = Parameter(
-            "friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source="friction differs from run to run"
-        )
-        if trial.experiment == WALK:
-            return (friction,)
+        found = []
+        if trial.experiment in (ANCHOR, WALK):
+            source = "friction differs from run to run"
+            found.append(Parameter("friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source=source))
+        if trial.experiment in (STEP, WALK) and (sd := trial.payload.switch_sd_s) > 0.0:
+            source = "the valves switched between two samples"
+            found.append(Parameter("switch_late_s", "s", 0.0, -3.0 * sd, 3.0 * sd, scale=sd, source=source))
+        if trial.experiment == ANCHOR:
+            found.append(self._slip_late(trial))
+        return tuple(found)
+
+    def _slip_late(self, trial: Trial) -> Parameter:
         # Repeats are sampled alike, so that the same half sample may be missed in all of them.
         half_s = 0.5 * trial.payload.sample_s
         alike = sum(other.condition == trial.condition for other in self.trials)
-        late = Parameter(
+        return Parameter(
             "slip_late_s",
             "s",
             0.0,
@@ -143,7 +148,6 @@ class RobotSystem(System):
             scale=half_s * np.sqrt(max(alike, 1) / 3.0),
             source="the peak lies between two samples",
         )
-        return friction, late
 
     def matters(self, parameter: str, trial: Trial) -> bool:
         actuator = trial.payload.actuator

@@ -48,6 +48,7 @@ def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(r
     switches = step.extra["switch_time_s"]
     assert switches[1] - switches[0] == pytest.approx(STEP_DOWN_S - STEP_UP_S)
     changes = step.time_s[np.flatnonzero(np.diff(step.columns["command"])) + 1]
+    assert 0.0 < step.extra["switch_error_s"] <= 0.0026
     assert ((changes - switches >= 0.0) & (changes - switches <= 0.0101)).all()
     rising = (step.time_s > switches[0]) & (step.time_s < switches[1])
     speed = np.gradient(step.columns["displacement_mm"], step.time_s)

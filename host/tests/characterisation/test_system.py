@@ -119,7 +119,7 @@ def test_effects_act_where_they_are_said_to(system, theta, effect):
         without, with_ = system.predict(theta, (), trial), system.predict(active, (effect,), trial)
         change = max(np.abs(with_[c] - without[c]).max() for c in without)
         if trial.experiment not in system.effects[effect].experiments:
-            assert change < 1e-3, trial.name  # mm, N or psi: a hundredth of the noise
+            assert change < 1e-2, trial.name  # mm, N or psi: a tenth of the noise
     shown = [t for t in system.trials if t.experiment in system.effects[effect].experiments]
     assert any(
         not np.allclose(system.predict(active, (effect,), t)[c], system.predict(theta, (), t)[c])
