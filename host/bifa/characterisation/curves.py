@@ -20,6 +20,7 @@ from bifa.robot.stiffness import StiffnessCurve
 from .stiffness import StiffnessFit
 
 _WIDEST = 60.0  # standard deviations that a shape may move
+_PRIOR_SD = 5.0  # a shape further off belies the static data: an effect is at work, which no curve should absorb
 _SCALE = 150.0  # derivatives step by 0.3 to 3 standard deviations: well above the integrator's own error
 _FELT_N = 0.01  # a shape that changes K by less does not change a walk that one could measure
 
@@ -45,7 +46,10 @@ class FittedCurve:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         source = "one standard deviation of the static fit each"
-        return tuple(Parameter(n, "sd", 0.0, -_WIDEST, _WIDEST, scale=_SCALE, source=source) for n in self.names)
+        return tuple(
+            Parameter(n, "sd", 0.0, -_WIDEST, _WIDEST, scale=_SCALE, source=source, prior_sd=_PRIOR_SD)
+            for n in self.names
+        )
 
     @cached_property
     def felt(self) -> frozenset[str]:

@@ -79,10 +79,14 @@ class Problem:
 
     def prior_cost(self, point: Point) -> float:
         """Minus log of the priors on the nuisances and on the learnt curves."""
-        cost = 0.5 * point.values @ self._prior @ point.values
+        cost = 0.5 * self.prior_shift(point) @ self._prior @ self.prior_shift(point)
         for values, parameters in zip(point.nuisances, self.nuisances, strict=True):
             cost += 0.5 * sum(((v - p.value) / p.step_scale) ** 2 for v, p in zip(values, parameters, strict=True))
         return float(cost)
+
+    def prior_shift(self, point: Point) -> np.ndarray:
+        """How far the structure's vector is from the mean of its prior."""
+        return point.values - self.structure.prior_mean()
 
     @property
     def prior_precision(self) -> np.ndarray:

@@ -140,7 +140,7 @@ def _linearise(problem, point, free, residuals, jacobians) -> _Linearised:
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     prior = problem.prior_precision
     normal[:p, :p] = prior[np.ix_(free, free)]
-    gradient[:p] = (prior @ point.values)[list(free)]
+    gradient[:p] = (prior @ problem.prior_shift(point))[list(free)]
     at = p
     for r, (j, k), nuisance, parameters in zip(residuals, jacobians, point.nuisances, problem.nuisances, strict=True):
         q = len(nuisance)

@@ -50,6 +50,9 @@ class Structure:
             values |= dict.fromkeys(effect.size_names, effect.absent)
         return self.values(values)
 
+    def prior_mean(self) -> np.ndarray:
+        return np.array([p.value for p in self.parameters])
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
 
@@ -70,8 +73,9 @@ class Structure:
         return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
 
     def prior_precision(self) -> np.ndarray:
-        """Prior on the curves, shape (P, P): knots within 10 scales of zero, and bending against 3 scales a knot."""
-        precision = np.zeros((len(self.names),) * 2)
+        """Precision of the prior around the parameters' starts, shape (P, P): what was known of each, and for learnt
+        curves knots within 10 scales of zero and bending within 3 scales a knot."""
+        precision = np.diag([p.prior_sd**-2.0 if p.prior_sd else 0.0 for p in self.parameters])
         bend = np.diff(np.eye(_KNOTS), 2, axis=0)
         for name in self.sites:
             site = self.system.correction_sites[name]

@@ -29,7 +29,8 @@ class Parameter:
     which a sane value lies (None: nothing is known): a fit that leaves it is evidence against the model,
     not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
     a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
-    deviation of its spread.
+    deviation of its spread. `prior_sd`: standard deviation of what was known about it beforehand, around
+    `value`; None: nothing was.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Parameter:
     plausible: tuple[float, float] | None = None
     scale: float | None = None
     source: str = ""
+    prior_sd: float | None = None
 
     def __post_init__(self) -> None:
         if not self.lower < self.upper:

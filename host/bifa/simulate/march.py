@@ -34,7 +34,7 @@ from bifa.simulate.stepper import (
 LONGEST_S = 0.1
 SHORTEST_S = 1e-5
 _FIRST_S = 1e-3
-_HOPELESS_S = 1e-12  # where even shorter steps are asked for there is no solution: the run goes on as NaN
+_HOPELESS_S = 1e-6  # where even shorter steps are asked for there is no solution: the run goes on as NaN
 _ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
 # Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
