@@ -32,7 +32,7 @@ class NominalSpeed:
 
 
 class RobustSpeed:
-    """The `SEARCH_QUANTILE` of the speed over draws of the model, every gait meeting the same draws.
+    """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws.
 
     Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so
     the r-th smallest met so far bounds it from above: a gait whose bound is below `_ABANDON` of the best value
@@ -40,11 +40,17 @@ class RobustSpeed:
     """
 
     def __init__(
-        self, runs: Simulations, nominal: Plant, draws: Sequence[Plant], space: SearchSpace, metric: Metric | Passage
+        self,
+        runs: Simulations,
+        nominal: Plant,
+        draws: Sequence[Plant],
+        space: SearchSpace,
+        metric: Metric | Passage,
+        share: float = SEARCH_QUANTILE,
     ):
         self._runs, self._space, self._metric = runs, space, metric
         self._plants = [nominal, *draws]
-        self._rank = max(1, math.ceil(SEARCH_QUANTILE * len(draws)))
+        self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
         self._best = 0.0
 
