@@ -59,7 +59,7 @@ bool read_record(Eeprom& eeprom, uint8_t slot, Record& record) {
   read_bytes(eeprom, address + kHeadBytes + size, &stored, sizeof stored);
   if (crc16(bytes_of(record) + 1, kHeadBytes - 1 + size) != stored) return false;
   if (record.sequence > kSequenceLimit) return false;
-  if (!is_name(record.name) && strncmp(record.name, kSettingsName, kNameSize) != 0) return false;
+  if (!is_name(record.name) && memcmp(record.name, kSettingsName, kNameSize) != 0) return false;
   if (record.format < kStorageFormat) migrate(record, record.format);
   seal(record);
   return true;

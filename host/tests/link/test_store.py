@@ -266,7 +266,7 @@ def test_good_checks_do_not_excuse_bad_values():
     for payload in (b"\xff" * 24, bytes(24)):
         image = (old_record(2, 5, b"evil", payload) + BLANK)[:SIZE]
         assert Bench(image).load("evil") is None
-    for name, sequence in ((b"Evil!\n", 5), (b"evil", 0xFFFFFFFF), (b"", 5)):
+    for name, sequence in ((b"Evil!\n", 5), (b"evil", 0xFFFFFFFF), (b"", 5), (b"#settings\0x", 5)):
         bench = Bench((old_record(2, sequence, name, parameter_set(1)) + BLANK)[:SIZE])
         assert bench.names() == []
         assert bench.save("evil", parameter_set(2)) == OK
