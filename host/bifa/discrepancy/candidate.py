@@ -17,8 +17,8 @@ from bifa.identify.structure import Structure
 from bifa.identify.system import Parameter
 from bifa.identify.uncertainty import effective_samples
 
-_PROFILE_STEPS = 2
-_REFIT_ITERATIONS = 10
+_PROFILE_STEPS = 3
+_REFIT_ITERATIONS = 14
 _IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
 
 
@@ -95,7 +95,7 @@ def profile(parent: Fit, effect: str, split: Split, floor: NoiseFloor) -> Profil
     return Profile(effect, problem, found[0][0], tuple(point for _, point in found))
 
 
-def refit(profiled: Profile, *, starts: int = 1) -> Fit:
+def refit(profiled: Profile, *, starts: int = 2) -> Fit:
     """Release everything from the best points of a profile."""
     solutions = [solve(profiled.problem, point, max_iterations=_REFIT_ITERATIONS) for point in profiled.points[:starts]]
     return best_of(profiled.problem, solutions)

@@ -16,9 +16,9 @@ from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
-_BEAM = 2
-_REFITTED = {1: 5, 2: 3, 3: 2}  # effects fully refitted for each parent, by the size of the set
-_PROFILED = 6  # effects profiled on a parent that has one already, by the gain of a linear regression
+_BEAM = 3
+_REFITTED = {1: 8, 2: 5, 3: 3}  # effects fully refitted for each parent, by the size of the set
+_PROFILED = 10  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
 _SEEN = 3.0  # log-likelihood of a linear regression, below which a small effect is not worth a fit

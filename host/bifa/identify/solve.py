@@ -11,9 +11,9 @@ from bifa.identify.problem import Point, Problem
 
 Jacobians = list[tuple[np.ndarray, np.ndarray]]  # of each trial: by the free parameters, by its nuisances
 _ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
-_RELATIVE = 1e-4  # of the cost: far from the floor no more is needed
+_RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
 _NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
-_REACH = 10.0  # scales that a parameter may move in one step: further the derivatives say nothing
+_REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 
 
@@ -91,7 +91,7 @@ def solve(
         if accepted:
             gain = cost - trial_cost
             x, point, residuals, cost = x + step, trial_point, trial_residuals, trial_cost
-            if keep or (fresh and 0.8 < ratio < 1.25):
+            if keep or (fresh and 0.9 < ratio < 1.1):
                 fresh = False
                 continue
             if gain < max(_ENOUGH, _RELATIVE * cost) and fresh:
