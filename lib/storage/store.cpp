@@ -102,7 +102,8 @@ Result Store::save_settings(const void* payload) {
 }
 
 Result Store::save_record(const char* name, const void* payload) {
-  scan();  // a repair may have been under way
+  scan();                                                   // a repair may have been under way
+  if (sequence_ >= kSequenceLimit) return Result::kEeprom;  // what would be written could not be read again
   memcpy(record_.name, name, kNameSize);
   memcpy(record_.payload, payload, sizeof record_.payload);
   record_.sequence = sequence_ + 1;

@@ -262,6 +262,17 @@ def test_records_of_a_later_format_are_left_alone():
     assert bench.names() == ["one"]
 
 
+def test_a_sequence_that_is_used_up_is_said_and_erasing_begins_anew():
+    """No Uno lives that long, but a stranger's EEPROM may say so: nothing is "saved" that cannot be read again."""
+    bench = Bench((old_record(2, 0xFFFFFF00, b"last", parameter_set(1)) + BLANK)[:SIZE])
+    assert bench.load("last") == parameter_set(1)
+    assert bench.save("next", parameter_set(2)) == EEPROM
+    assert bench.load("last") == parameter_set(1)
+    assert bench.erase() == OK
+    assert bench.save("next", parameter_set(2)) == OK
+    assert bench.load("next") == parameter_set(2)
+
+
 def test_good_checks_do_not_excuse_bad_values():
     for payload in (b"\xff" * 24, bytes(24)):
         image = (old_record(2, 5, b"evil", payload) + BLANK)[:SIZE]
