@@ -35,6 +35,7 @@ LONGEST_S = 0.1
 SHORTEST_S = 1e-5
 _FIRST_S = 1e-3
 _HOPELESS_S = 1e-6  # where even shorter steps are asked for there is no solution: the run goes on as NaN
+_MOST_STEPS = 600_000  # in a run: several times what two minutes of walking take. Beyond, it only crawls: NaN
 _ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
 # Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
@@ -44,7 +45,7 @@ _WEIGHTS = np.array(
 
 
 class Run(NamedTuple):
-    """What a march works on. `y`, `z`: the state now; `clock`: time, proposed step; `slip`: both ends'
+    """What a march works on. `y`, `z`: the state now; `clock`: time, proposed step, steps tried; `slip`: both ends'
     travel while both slide, the lesser one summed; `command`: (3,) of the chambers; the rest is scratch."""
 
     y: np.ndarray
@@ -70,7 +71,7 @@ def new_run(states_of_effects):
     return Run(
         np.zeros(STATES),
         np.zeros(n),
-        np.array([0.0, _FIRST_S]),
+        np.array([0.0, _FIRST_S, 0.0]),
         np.zeros(1),
         np.full(3, 2),
         np.zeros(2),
@@ -129,6 +130,10 @@ def march(plant, rig, run, until, tolerance):
         return
     while until - clock[0] > 1e-12:
         left = until - clock[0]
+        clock[2] += 1.0
+        if clock[2] > _MOST_STEPS:
+            y[:] = np.nan
+            break
         h = min(clock[1], LONGEST_S)
         if h > 0.5 * left:
             h = left if h >= left else 0.5 * left
