@@ -109,8 +109,15 @@ class VirtualRig:
     """
 
     def __init__(
-        self, uno: Uno, plant: Plant, world: World, instruments: Instruments, bootloader_s: float = 0.0
+        self,
+        uno: Uno,
+        plant: Plant,
+        world: World,
+        instruments: Instruments,
+        bootloader_s: float,
+        effects: Mapping[str, Mapping[str, float]],
     ) -> None:
+        self._effects = effects
         self.uno = uno
         self.plant = plant
         self.world = world
@@ -121,6 +128,10 @@ class VirtualRig:
     @property
     def truth(self) -> dict[str, float]:
         return dict(self.plant.parameters)
+
+    def open_seal(self) -> dict[str, dict[str, float]]:
+        """The effects that this robot has, with their parameters: for when the verdict is in."""
+        return {name: dict(values) for name, values in self._effects.items()}
 
     def break_sensor(self, chamber: str, volts: float | None) -> None:
         """Fix a pressure sensor's output ("body", "head", "tail", "regulator"); None = in order again."""
@@ -170,12 +181,14 @@ def open_rig(
     Raises VirtualRobotError, saying what to do.
     """
     random = np.random.default_rng([seed, 0x51D])
-    numbers, curves = _profile(profile), None
+    numbers, curves, inside = _profile(profile), None, dict(effects or {})
     if sealed is not None:
         draw = np.random.default_rng(sealed)
         own, curves = specimen(draw)
-        numbers |= own | plant_parameters(draw_effects("single", draw)[0])
-    numbers |= plant_parameters(effects or {}) | dict(parameters or {})
+        drawn, _ = draw_effects("single", draw)
+        inside |= drawn
+        numbers |= own
+    numbers |= plant_parameters(inside) | dict(parameters or {})
     image = Path(firmware) if firmware is not None else FIRMWARE
     if not image.is_file():
         raise FirmwareError(image)
@@ -189,7 +202,7 @@ def open_rig(
     world = World(uno, clock_hz)
     instruments = Instruments(world, plant, noise, _WOBBLE[profile], random)
     instruments.mount("locomotion")
-    return VirtualRig(uno, plant, world, instruments, _BOOTLOADER_S[profile])
+    return VirtualRig(uno, plant, world, instruments, _BOOTLOADER_S[profile], inside)
 
 
 _profile = profile  # open_rig has a parameter of that name

@@ -32,6 +32,7 @@ class Stage:
     needs, makes: names of artefacts (files or folders, relative to the campaign's folder).
     run(inputs, outputs): `inputs` is the campaign's folder, `outputs` the scratch folder to write `makes` into.
     settings: whatever else decides the result (seed, gait, port); plain JSON.
+    resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Stage:
     makes: tuple[str, ...]
     run: Callable[[Path, Path], None]
     settings: Mapping[str, object] = field(default_factory=dict)
+    resumes: bool = False
 
 
 def digest(path: Path) -> str:
@@ -107,8 +109,9 @@ def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool
 
 
 def _run(folder: Path, stage: Stage) -> None:
-    scratch = folder / _SCRATCH
-    scratch.mkdir()
+    scratch = folder / (f".{stage.name}-unfinished" if stage.resumes else _SCRATCH)
+    scratch.mkdir(exist_ok=stage.resumes)
+    done = False
     try:
         stage.run(folder, scratch)
         missing = [name for name in stage.makes if not (scratch / name).exists()]
@@ -116,8 +119,10 @@ def _run(folder: Path, stage: Stage) -> None:
             raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
         for name in stage.makes:
             _replace(scratch / name, folder / name)
+        done = True
     finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        if done or not stage.resumes:
+            shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _replace(new: Path, target: Path) -> None:

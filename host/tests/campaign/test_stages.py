@@ -89,3 +89,19 @@ def test_a_damaged_provenance_is_refused_with_advice(tmp_path):
     (tmp_path / PROVENANCE).write_text("{")
     with pytest.raises(StageError, match="delete it"):
         run_stages(tmp_path, [])
+
+
+def test_a_stage_that_resumes_finds_what_an_interrupted_run_left(tmp_path):
+    def run(inputs, outputs):
+        marker = outputs / "trial_1"
+        if not marker.exists():
+            marker.write_text("recorded")
+            raise KeyboardInterrupt
+        (outputs / "data").write_text("whole")
+
+    stage = Stage("measure", "measure", (), ("data",), run, resumes=True)
+    with pytest.raises(KeyboardInterrupt):
+        run_stages(tmp_path, [stage])
+    assert not (tmp_path / "data").exists()
+    run_stages(tmp_path, [stage])
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["data", PROVENANCE]

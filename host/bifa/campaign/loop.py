@@ -1,0 +1,131 @@
+"""The whole loop: measure, fit, walk, find what is missing, optimise with it, walk again, compare."""
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from bifa.campaign.bench import Bench
+from bifa.campaign.compare import compare
+from bifa.campaign.stages import Stage
+from bifa.campaign.walks import measure_walks
+from bifa.characterisation import plan
+from bifa.characterisation.identification import identify
+from bifa.characterisation.session import run_session
+from bifa.characterisation.system import prepare
+from bifa.data import read_dataset, write_dataset
+from bifa.discrepancy.diagnosis import diagnose
+from bifa.discrepancy.record import as_record
+from bifa.gait import Settings, optimise, simulations
+from bifa.gait.library import provenance
+from bifa.robot import load_model, save_model
+from bifa.robot.gait import BASELINE, load_gait, save_gait
+
+Part = Callable[[str, float], None]
+
+KNOWN = {"head_mass_kg": 0.175, "tail_mass_kg": 0.175, "supply_positive_psi": 8.5, "supply_negative_psi": -13.0}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured: `quick` takes one condition less of each experiment, twice instead of three times."""
+
+    quick: bool = False
+    cycles: int = 7
+    repeats: int = 3
+
+
+def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
+    """The stages of a campaign on `bench`; `part(what, share)` is told how the running stage is getting on."""
+    stages = [
+        _measure(bench, effort, part),
+        _fit(bench, part),
+        _optimise("optimise-base", "gait from the base model", "model-base.toml", "gait-base.toml", bench, part),
+        _walk("walk-base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
+        _diagnose(bench, part),
+        _optimise(
+            "optimise-completed",
+            "gait from the completed model",
+            "model-completed.toml",
+            "gait-completed.toml",
+            bench,
+            part,
+        ),
+        _walk("walk-completed", {"completed": "gait-completed.toml"}, 2, bench, effort, part),
+    ]
+    if bench.is_virtual:
+        stages.append(_unseal(bench))
+    stages.append(compare(sealed=bench.is_virtual))
+    return stages
+
+
+def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
+    trials = plan.session(quick=effort.quick)
+
+    def run(inputs: Path, outputs: Path) -> None:
+        with bench.open(0) as rig:
+            run_session(
+                rig,
+                outputs / "bench",
+                trials,
+                name="campaign: characterisation",
+                known=KNOWN,
+                provenance=bench.settings(0),
+                on_event=lambda e: part(e.planned.file, (e.number - 1 + e.share) / e.total),
+            )
+
+    settings = bench.settings(0) | {"effort": asdict(effort), "known": KNOWN}
+    return Stage("measure", "characterise the robot on its bench", (), ("bench",), run, settings, resumes=True)
+
+
+def _fit(bench: Bench, part: Part) -> Stage:
+    def run(inputs: Path, outputs: Path) -> None:
+        found = identify(read_dataset(inputs / "bench"), seed=bench.seed, progress=lambda what: part(what, 0.0))
+        save_model(outputs / "model-base.toml", found.model)
+
+    return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run, {"seed": bench.seed})
+
+
+def _optimise(name: str, title: str, model: str, gait: str, bench: Bench, part: Part) -> Stage:
+    def run(inputs: Path, outputs: Path) -> None:
+        robot = load_model(inputs / model)
+        with simulations() as runs:
+            best = optimise(robot, runs, Settings(seed=bench.seed), lambda what, share, _: part(what, share))
+        save_gait(outputs / gait, best.gait, provenance(best, robot.name, "bifa campaign"))
+
+    return Stage(name, title, (model,), (gait,), run, {"seed": bench.seed})
+
+
+def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, effort: Effort, part: Part) -> Stage:
+    walks = f"walks-{name.removeprefix('walk-')}"
+
+    def run(inputs: Path, outputs: Path) -> None:
+        loaded = {key: load_gait(inputs / file) if file else BASELINE for key, file in gaits.items()}
+        with bench.open(number) as rig:
+            write_dataset(outputs / walks, measure_walks(rig, loaded, effort.cycles, effort.repeats, part))
+
+    needs = tuple(file for file in gaits.values() if file)
+    settings = bench.settings(number) | {"effort": asdict(effort)}
+    return Stage(name, f"walk: {' and '.join(gaits)}", needs, (walks,), run, settings)
+
+
+def _diagnose(bench: Bench, part: Part) -> Stage:
+    def run(inputs: Path, outputs: Path) -> None:
+        system = prepare(read_dataset(inputs / "bench"))
+        found = diagnose(system, seed=bench.seed, progress=lambda what: part(what, 0.0))
+        record = as_record(found)
+        del record["seconds"]  # the same seed gives the same bytes
+        (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
+        completed = system.model_at(found.final.theta, found.final.structure.effects)
+        save_model(outputs / "model-completed.toml", completed)
+
+    makes = ("diagnosis.json", "model-completed.toml")
+    return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, {"seed": bench.seed})
+
+
+def _unseal(bench: Bench) -> Stage:
+    def run(inputs: Path, outputs: Path) -> None:
+        with bench.open(0) as rig:
+            (outputs / "truth.json").write_text(json.dumps(rig.open_seal(), indent=1) + "\n")
+
+    return Stage("unseal", "open the seal", ("diagnosis.json",), ("truth.json",), run, bench.settings(0))

@@ -1,0 +1,121 @@
+"""The report of a campaign: the answer first, then the evidence."""
+
+from collections.abc import Mapping, Sequence
+
+from bifa.report.animation import animate_walk
+from bifa.report.evidence import draw_errors, draw_probabilities
+from bifa.report.page import Page, Section, Table, both_palettes
+from bifa.report.walks import Walk, draw_walks
+
+GAIT_NAMES = {
+    "baseline": "baseline",
+    "base": "from the base model",
+    "completed": "from the completed model",
+}
+
+
+def campaign_page(summary: Mapping, diagnosis: Mapping, walks: Sequence[Walk]) -> Page:
+    """The page of a campaign; `summary` and `diagnosis` as in summary.json and diagnosis.json."""
+    gaits = {gait["gait"]: gait for gait in summary["gaits"]}
+    error = diagnosis["error"]
+    facts = [
+        (f"{gaits['baseline']['measured']:.1f} mm/s", "baseline gait, measured"),
+        (f"{gaits['base']['measured']:.1f} mm/s", "gait from the base model, measured"),
+        (f"{gaits['completed']['measured']:.1f} mm/s", "gait from the completed model, measured"),
+        (
+            f"{error['before']['held_out']:.1f} → {error['after']['held_out']:.2f}",
+            "error on held-out trials, in units of the noise",
+        ),
+    ]
+    sections = [
+        Section(
+            "The robot, walking",
+            ["The gait from the completed model, as the motion capture saw it."],
+            svg=animate_walk(
+                walks[-1].measured, 3 * walks[-1].period_s, "The robot walks with the gait from the completed model"
+            ),
+        ),
+        Section(
+            "What the base model lacks",
+            _evidence(summary, diagnosis),
+            figures=[
+                both_palettes(
+                    lambda stream, dark: draw_errors(error, stream, dark),
+                    "Error before and after per experiment, on a logarithmic axis",
+                    "Residual of each experiment before and after the effect was added, against the noise floor.",
+                ),
+                *_probabilities(diagnosis),
+            ],
+        ),
+        Section(
+            "The gaits",
+            ["What the gaits ask of the three chambers, what the pressures did, and how far the robot got."],
+            tables=[speed_table(summary["gaits"])],
+            figures=[
+                both_palettes(
+                    lambda stream, dark: draw_walks(walks, stream, dark=dark),
+                    "CPG outputs, pressures and displacement of the gaits side by side",
+                    "In the manner of the paper's Fig. 7; dashed: predicted by the completed model.",
+                )
+            ],
+        ),
+    ]
+    return Page("What this robot does that the paper's model does not", _lead(summary), facts, sections, _seal(summary))
+
+
+def speed_table(gaits: Sequence[Mapping]) -> Table:
+    """Predicted and measured speeds of the gaits."""
+    rows = [
+        [
+            GAIT_NAMES[gait["gait"]],
+            f"{gait['base_model']:.2f}",
+            f"{gait['completed_model']:.2f}",
+            f"{gait['measured']:.2f} ± {gait['spread']:.2f}",
+            f"{gait['paper']:.1f}",
+        ]
+        for gait in gaits
+    ]
+    columns = ["gait", "base model predicts", "completed model predicts", "measured", "paper"]
+    return Table(columns, rows, "Settled speed in mm/s; measured: mean and spread of the repeats.", len(rows) - 1)
+
+
+def _lead(summary: Mapping) -> str:
+    names = " and ".join(effect["name"].replace("_", " ") for effect in summary["effects"])
+    return {
+        "identified": f"The residual of the paper's model is traced to {names}; with it the model predicts this robot.",
+        "none": "The residual of the paper's model is noise: nothing is missing that these experiments can show.",
+        "unexplained": "Structure remains that no effect of the library accounts for; its signature is below.",
+    }[summary["verdict"]]
+
+
+def _evidence(summary: Mapping, diagnosis: Mapping) -> list[str]:
+    return [diagnosis["signature"]["text"], *_named(summary["effects"])]
+
+
+def _named(effects: Sequence[Mapping]) -> list[str]:
+    named = []
+    for effect in effects:
+        values = ", ".join(f"{name} = {value:.3g}" for name, value in effect["parameters"].items())
+        named.append(f"{effect['name'].replace('_', ' ')}: {values}; probability {effect['probability']:.2f}.")
+    return named
+
+
+def _probabilities(diagnosis: Mapping) -> list:
+    if not diagnosis["effects"]:
+        return []
+    return [
+        both_palettes(
+            lambda stream, dark: draw_probabilities(diagnosis["effects"], stream, dark),
+            "Probability of each effect named",
+        )
+    ]
+
+
+def _seal(summary: Mapping) -> str:
+    if summary["truth"] is None:
+        return "Made by bifa campaign."
+    inside = "; ".join(
+        name.replace("_", " ") + " (" + ", ".join(f"{key} = {value:.3g}" for key, value in values.items()) + ")"
+        for name, values in summary["truth"].items()
+    )
+    return f"The seal, opened after the verdict: {inside or 'nothing'}. Made by bifa campaign."

@@ -1,0 +1,57 @@
+"""`bifa campaign`: measure, fit, find what is missing, optimise, walk, compare."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = """Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
+bifa campaign --rerun diagnose   |   bifa campaign --port /dev/ttyACM0 --out out/monday"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EPILOG)(campaign)
+
+
+def campaign(
+    out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/campaign"),
+    port: Annotated[str, typer.Option(help="`virtual`, or a serial port whose rig has instruments.")] = "virtual",
+    seed: Annotated[int, typer.Option(min=0, help="Draws the virtual robot's undeclared effect, noise, searches.")] = 0,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer conditions, each twice.")] = False,
+    rerun: Annotated[list[str], typer.Option(help="Run this stage again although it is up to date.")] = [],  # noqa: B006
+) -> None:
+    """Run the whole loop on a robot; on a virtual one it has an effect that nobody declared.
+
+    Every stage can be interrupted and resumed, and is run again only when something that it depends on has changed.
+    """
+    import json
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from bifa.campaign.bench import Bench
+    from bifa.campaign.loop import Effort, campaign
+    from bifa.campaign.page import speed_table
+    from bifa.campaign.progress import stage_progress
+    from bifa.campaign.stages import run_stages
+
+    console = Console()
+    bench = Bench(port, seed, {"sealed": seed} if port == "virtual" else {})
+    with stage_progress(console) as progress:
+        stages = campaign(bench, Effort(quick), progress.part)
+        run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
+
+    summary = json.loads((out / "summary.json").read_text())
+    effects = ", ".join(effect["name"] for effect in summary["effects"]) or "no effect"
+    console.print(f"verdict: [bold]{summary['verdict']}[/bold] ({effects})", highlight=False)
+    if summary["truth"] is not None:
+        console.print(f"the seal: {', '.join(summary['truth']) or 'nothing'}", highlight=False)
+    speeds = speed_table(summary["gaits"])
+    table = Table(title=speeds.caption, title_justify="left")
+    for i, heading in enumerate(speeds.columns):
+        table.add_column(heading, justify="right" if i else "left")
+    for row in speeds.rows:
+        table.add_row(*row)
+    console.print(table)
+    console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
