@@ -15,7 +15,7 @@ from bifa.link import Uno
 from .alignment import ClockLine
 from .locomotion import record_walk
 from .plan import PULL_MM, PlannedTrial
-from .recording import LEAD_S, Recording
+from .recording import LEAD_S, Recording, instruments_of
 
 CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
@@ -37,6 +37,7 @@ def record_trial(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = l
     `extra` notes how well the clocks were lined up (`clock_error_s`) and, of a step, when the valves switched.
     Raises BifaError where telemetry keeps getting lost or the clocks do not line up.
     """
+    instruments_of(rig)
     for _ in range(_TRIALS_LOST):
         columns, extra, lost = _RUNS[planned.experiment](rig, uno, planned, on_progress)
         if not lost:

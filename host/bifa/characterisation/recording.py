@@ -15,56 +15,63 @@ LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both 
 _PIECE_S = 0.25
 
 
+def instruments_of(rig):
+    """The rig's instruments; BifaError where it has none."""
+    if rig.instruments is None:
+        raise BifaError(
+            "this port has no instruments: use `--port virtual`, or record with your own and give their file "
+            "with --instrument"
+        )
+    return rig.instruments
+
+
 class Recording:
     """A context manager: the instrument and the Uno's stream run inside it; afterwards the valves are off.
 
-    When it has ended well: `uno_s` (n,) the Uno's sample times; `pressures_psi`, `commands` (n, 3) of body, head and
-    tail; `record` what the instrument measured; `instrument_s` its times on the Uno's clock; `clock` how the two were
-    lined up; `lost_samples`.
+    `samples`: the Uno's own. When it has ended well: `uno_s` (n,) the Uno's sample times; `pressures_psi`,
+    `commands` (n, 3) of body, head and tail; `record` what the instrument measured; `instrument_s` its times on the
+    Uno's clock; `clock` how the two were lined up; `lost_samples`.
     """
 
     def __init__(self, rig, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
-        if rig.instruments is None:
-            raise BifaError(
-                "this port has no instruments: use `--port virtual`, or record with your own and give their file "
-                "with --instrument"
-            )
+        self._instruments = instruments_of(rig)
         self._rig, self._uno, self._on_progress = rig, uno, on_progress
-        self._samples: list = []
+        self.samples: list = []
 
     def __enter__(self) -> Recording:
         self._uno.samples(0.0)  # what is left of an earlier recording
         self._uno.stream(True)
-        self._rig.instruments.start()
+        self._instruments.start()
         self._started_s = self._rig.clock.now()
         return self
 
     def __exit__(self, kind, *_) -> None:
         self._uno.halt()
-        self.record = self._rig.instruments.stop()
+        self.record = self._instruments.stop()
         self._uno.stream(False)
         if kind is None:
             self._line_up()
 
-    def wait(self, duration_s: float) -> None:
-        """Let `duration_s` pass, and keep what the Uno says meanwhile."""
+    def wait(self, duration_s: float, report: bool = True) -> None:
+        """Let `duration_s` pass, and keep what the Uno says meanwhile; report: how far that is, as progress."""
         begun_s = self._rig.clock.now()
         while (left_s := begun_s + duration_s - self._rig.clock.now()) > 0:
-            self._samples += self._uno.samples(min(left_s, _PIECE_S))
-            self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
+            self.samples += self._uno.samples(min(left_s, _PIECE_S))
+            if report:
+                self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
 
     def wait_while(self, condition: Callable[[], bool], expected_s: float) -> None:
         """Wait for as long as `condition()` holds, about `expected_s`; BifaError after three times as long."""
         begun_s = self._rig.clock.now()
         while condition():
-            self._samples += self._uno.samples(_PIECE_S)
+            self.samples += self._uno.samples(_PIECE_S)
             elapsed_s = self._rig.clock.now() - begun_s
             self._on_progress(min(elapsed_s / expected_s, 1.0))
             if elapsed_s > 3.0 * expected_s + 5.0:
                 raise BifaError(f"the cross-head is still moving after {elapsed_s:.0f} s: look at the stand")
 
     def _line_up(self) -> None:
-        samples = self._samples
+        samples = self.samples
         if not samples:
             raise BifaError("the Uno sent no samples: check the link's counters with `bifa monitor`")
         self.uno_s = np.array([sample.time_us for sample in samples]) * 1e-6

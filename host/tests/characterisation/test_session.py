@@ -1,9 +1,11 @@
 """Sessions on the virtual bench: the real firmware, instruments with clocks of their own, interruptions."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from bifa.characterisation.experiments import STEP_DOWN_S, STEP_UP_S
+from bifa.characterisation.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
 from bifa.characterisation.plan import BRISK, EXPERIMENTS, PlannedTrial, session
 from bifa.characterisation.session import run_session
 from bifa.data import DatasetError, read_dataset
@@ -28,6 +30,12 @@ def recorded(tmp_path_factory):
     with open_rig("virtual", profile="ideal", seed=3) as rig:
         run(rig, folder)
         return read_dataset(folder), dict(rig.truth)
+
+
+@pytest.mark.parametrize("planned", PLAN, ids=lambda planned: planned.experiment)
+def test_a_port_without_instruments_is_told_so_before_anything_moves(planned):
+    with pytest.raises(BifaError, match="this port has no instruments"):
+        record_trial(SimpleNamespace(instruments=None), None, planned)
 
 
 @pytest.mark.uno
