@@ -1,8 +1,7 @@
 // Wiring only: which part knows which.
-#include <Arduino.h>
+#include <avr/interrupt.h>
 #include <avr/sleep.h>
 
-#include "board/cells.h"
 #include "board/converter.h"
 #include "board/pins.h"
 #include "board/regulator.h"
@@ -15,11 +14,8 @@
 
 namespace {
 
-board::Pins pins;
-board::Uart uart;
-board::Cells cells;
-bifa::Controller controller(pins);
-bifa::HostPort port(controller, cells, uart);
+bifa::Controller controller;
+bifa::HostPort port(controller);
 
 const uint16_t kSupplyEvery_ms = 100;
 
@@ -59,24 +55,23 @@ void board::on_byte(uint8_t byte) {
 void board::on_emergency_stop() { controller.stop_in_interrupt(); }
 void board::on_round(const bifa::RawRound& round) { controller.converted_in_interrupt(round); }
 
-void setup() {
-  TIMSK0 = 0;
-  TCCR0B = TCCR2B = 0;  // Arduino starts them for PWM, which nothing here uses
-  pins.begin();
-  uart.begin();
+/// Instead of Arduino's, which would start three timers for PWM and the converter as nothing here uses them.
+int main() {
+  board::pins_begin();
+  board::uart_begin();
+  sei();
   const bifa::StartCause cause = board::start_cause();
   port.begin(board::boot_nonce(), cause);
   board::regulator_begin();
   board::converter_begin();
   board::tick_begin();
   board::watchdog_begin();
-}
-
-void loop() {
-  while (!attend) sleep_mode();  // an interrupt between the two costs a tick at most
-  attend = false;
-  board::watchdog_feed();
-  port.poll();
-  tell_supply();
-  if (port.has_input()) attend = true;
+  while (true) {
+    while (!attend) sleep_mode();  // an interrupt between the two costs a tick at most
+    attend = false;
+    board::watchdog_feed();
+    port.poll();
+    tell_supply();
+    if (port.has_input()) attend = true;
+  }
 }

@@ -1,27 +1,27 @@
-#include "cells.h"
-
+// The chip's EEPROM: reads at once; a write goes on by itself for 3.4 ms.
 #include <avr/io.h>
 
 #include "critical.h"
+#include "eeprom.h"
 
-namespace board {
+namespace bifa {
 
-uint8_t Cells::read(uint16_t address) {
-  while (busy()) continue;
+uint8_t eeprom_read(uint16_t address) {
+  while (eeprom_busy()) continue;
   EEAR = address;
   EECR |= 1 << EERE;
   return EEDR;
 }
 
-void Cells::write(uint16_t address, uint8_t value) {
-  while (busy()) continue;
+void eeprom_write(uint16_t address, uint8_t value) {
+  while (eeprom_busy()) continue;
   EEAR = address;
   EEDR = value;
-  const bifa::Critical guard;  // the second bit must follow the first within four cycles
+  const Critical guard;  // the second bit must follow the first within four cycles
   EECR = 1 << EEMPE;
   EECR = 1 << EEMPE | 1 << EEPE;
 }
 
-bool Cells::busy() { return EECR & (1 << EEPE); }
+bool eeprom_busy() { return EECR & (1 << EEPE); }
 
-}  // namespace board
+}  // namespace bifa

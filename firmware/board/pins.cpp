@@ -3,6 +3,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "valve_pattern.h"
 #include "wires.h"
 
 namespace board {
@@ -14,7 +15,7 @@ const uint8_t kEmergencyStop = 1 << PD2;
 const uint8_t kLed = 1 << PB5;
 }  // namespace
 
-void Pins::begin() {
+void pins_begin() {
   vent();
   DDRD |= kValvesOnD;
   DDRB |= kValvesOnB | kLed;
@@ -23,12 +24,6 @@ void Pins::begin() {
   EICRA = (EICRA & ~(1 << ISC00)) | 1 << ISC01;  // falling edge; the tick looks at the level
   EIFR = 1 << INTF0;
   EIMSK |= 1 << INT0;
-}
-
-void Pins::write(bifa::ValvePattern pattern) {
-  const uint8_t bits = pattern.bits();
-  PORTD = (PORTD & static_cast<uint8_t>(~kValvesOnD)) | static_cast<uint8_t>(bits << 4);
-  PORTB = (PORTB & static_cast<uint8_t>(~kValvesOnB)) | bits >> 4;
 }
 
 void vent() {
@@ -47,5 +42,13 @@ void light(bool on) {
 }
 
 }  // namespace board
+
+/// D4 to D9, as the pattern has them: bits 0 to 3 on port D from bit 4, bits 4 and 5 on port B from bit 0.
+void bifa::set_valves(ValvePattern pattern) {
+  using namespace board;
+  const uint8_t bits = pattern.bits();
+  PORTD = (PORTD & static_cast<uint8_t>(~kValvesOnD)) | static_cast<uint8_t>(bits << 4);
+  PORTB = (PORTB & static_cast<uint8_t>(~kValvesOnB)) | bits >> 4;
+}
 
 ISR(INT0_vect) { board::on_emergency_stop(); }

@@ -4,6 +4,7 @@
 #include <avr/io.h>
 #include <avr/sleep.h>
 
+#include "output.h"
 #include "wires.h"
 
 namespace board {
@@ -21,26 +22,28 @@ uint8_t after(uint8_t place) { return place + 1 == kRingBytes ? 0 : place + 1; }
 
 }  // namespace
 
-void Uart::begin() {
+void uart_begin() {
   UBRR0 = F_CPU / 8 / kBaud - 1;
   UCSR0A = 1 << U2X0;
   UCSR0C = 1 << UCSZ01 | 1 << UCSZ00;  // 8N1
   UCSR0B = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
 }
 
-void Uart::write(uint8_t byte) {
-  while (room() == 0) sleep_mode();
+}  // namespace board
+
+void bifa::output(uint8_t byte) {
+  using namespace board;
+  while (output_room() == 0) sleep_mode();
   ring[head] = byte;
   head = after(head);
   UCSR0B |= 1 << UDRIE0;
 }
 
-uint8_t Uart::room() const {
+uint8_t bifa::output_room() {
+  using namespace board;
   const uint8_t out = tail;
   return out > head ? out - head - 1 : kRingBytes + out - head - 1;
 }
-
-}  // namespace board
 
 ISR(USART_RX_vect) { board::on_byte(UDR0); }
 

@@ -12,7 +12,7 @@ const char kStartPreset[kNameSize + 1] = "startup";
 
 class Commands {
  public:
-  Commands(Controller& controller, Store& store) : controller_(controller), store_(store) {}
+  explicit Commands(Controller& controller) : controller_(controller) {}
 
   /// Starts the controller with the settings and the start preset from EEPROM, or with the baseline; call once.
   void begin(StartCause cause);
@@ -61,7 +61,7 @@ class Commands {
   Result take_over_soon(const ParameterSet& set);
 
   Controller& controller_;
-  Store& store_;
+  Store store_;
   ParameterSet wanted_;
   ParameterSet draft_;
   Draft draft_state_ = Draft::kNone;

@@ -1,6 +1,7 @@
 #include "console.h"
 
 #include "decimal.h"
+#include "output.h"
 
 namespace bifa {
 
@@ -31,7 +32,7 @@ uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals
 
 void Console::greet() {
   version();
-  print(out_, BIFA_TEXT("[type help\n"));
+  print(BIFA_TEXT("[type help\n"));
 }
 
 void Console::feed(uint8_t byte) {
@@ -52,7 +53,7 @@ void Console::feed(uint8_t byte) {
   if (c == kBackspace || c == kDelete) {
     if (length_ == 0) return;
     --length_;
-    if (echo_) print(out_, BIFA_TEXT("\b \b"));
+    if (echo_) print(BIFA_TEXT("\b \b"));
     return;
   }
   if (c == '\t' || (c >= ' ' && c <= '~')) {
@@ -61,20 +62,20 @@ void Console::feed(uint8_t byte) {
       return;
     }
     line_[length_++] = c;
-    if (echo_) print(out_, c);
+    if (echo_) print(c);
     return;
   }
   spoilt_ = true;
 }
 
 void Console::end_line() {
-  if (echo_) print(out_, '\n');
+  if (echo_) print('\n');
   line_[length_] = '\0';
   length_ = 0;
   if (spoilt_) {
-    print(out_, BIFA_TEXT("error the line arrived damaged\n"));
+    print(BIFA_TEXT("error the line arrived damaged\n"));
   } else if (too_long_) {
-    print(out_, BIFA_TEXT("error the line is longer than 63 characters\n"));
+    print(BIFA_TEXT("error the line is longer than 63 characters\n"));
   } else {
     execute();
   }
@@ -167,15 +168,15 @@ void Console::dispatch(CommandId id) {
 }
 
 void Console::answer(Result result) {
-  if (result != Result::kOk) print(out_, BIFA_TEXT("error "));
-  print(out_, flash_text(kResultTexts, static_cast<uint8_t>(result)));
-  print(out_, '\n');
+  if (result != Result::kOk) print(BIFA_TEXT("error "));
+  print(flash_text(kResultTexts, static_cast<uint8_t>(result)));
+  print('\n');
 }
 
 void Console::answer_usage(CommandId id) {
-  print(out_, BIFA_TEXT("error usage: "));
-  print(out_, usage_of(static_cast<uint8_t>(id)));
-  print(out_, '\n');
+  print(BIFA_TEXT("error usage: "));
+  print(usage_of(static_cast<uint8_t>(id)));
+  print('\n');
 }
 
 void Console::finish_later(Result started) {
@@ -191,7 +192,7 @@ void Console::poll(const LinkCounters& counters) {
   const State state = commands_.controller().state();
   if (state != last_state_) {
     last_state_ = state;
-    if (state == State::kStopped) print(out_, BIFA_TEXT("[stopped: all valves off until clear\n"));
+    if (state == State::kStopped) print(BIFA_TEXT("[stopped: all valves off until clear\n"));
     if (state == State::kFault) print_fault(commands_.controller().status().fault);
   }
   if (!waiting_ || commands_.store().busy()) return;
@@ -205,42 +206,41 @@ void Console::switch_to(CommandId id, bool& flag) {
   if (!on && !is(1, BIFA_TEXT("off"))) return answer_usage(id);
   flag = on;
   if (on && id == CommandId::kStream) {
-    print(out_,
-          BIFA_TEXT("[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\n"));
+    print(BIFA_TEXT("[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\n"));
   }
   answer(Result::kOk);
 }
 
 void Console::help() {
   for (uint8_t i = 0; i < kCommandCount; ++i) print_help(usage_of(i), help_of(i));
-  print(out_, BIFA_TEXT("[!  (at any time, no Enter) stop: all chambers vent until clear\n[parameters:"));
+  print(BIFA_TEXT("[!  (at any time, no Enter) stop: all chambers vent until clear\n[parameters:"));
   for (uint8_t i = 0; i < kParameterCount; ++i) {
-    print(out_, ' ');
-    print(out_, name_of(static_cast<ParameterId>(i)));
+    print(' ');
+    print(name_of(static_cast<ParameterId>(i)));
   }
-  print(out_, BIFA_TEXT("\n[try: set period_s 6, run, hold head positive, stop, help period_s\n"));
+  print(BIFA_TEXT("\n[try: set period_s 6, run, hold head positive, stop, help period_s\n"));
   answer(Result::kOk);
 }
 
 void Console::print_help(FlashText name, FlashText text) {
-  print(out_, '[');
-  print(out_, name);
-  print(out_, BIFA_TEXT("  "));
-  print(out_, text);
-  print(out_, '\n');
+  print('[');
+  print(name);
+  print(BIFA_TEXT("  "));
+  print(text);
+  print('\n');
 }
 
 void Console::help_on(const char* name) {
   ParameterId id;
   if (find_parameter(name, id)) {
     print_help(name_of(id), text_of(id, ParameterText::kHelp));
-    print(out_, BIFA_TEXT("[range "));
+    print(BIFA_TEXT("[range "));
     print_range(id);
-    print(out_, BIFA_TEXT(", default "));
-    print_decimal(out_, value_of(factory_preset(0), id), decimals_of(id));
-    print(out_, BIFA_TEXT(", now "));
-    print_decimal(out_, value_of(commands_.wanted(), id), decimals_of(id));
-    print(out_, '\n');
+    print(BIFA_TEXT(", default "));
+    print_decimal(value_of(factory_preset(0), id), decimals_of(id));
+    print(BIFA_TEXT(", now "));
+    print_decimal(value_of(commands_.wanted(), id), decimals_of(id));
+    print('\n');
     return answer(Result::kOk);
   }
   const uint8_t command = find_command(name);
@@ -252,94 +252,94 @@ void Console::help_on(const char* name) {
 }
 
 void Console::print_range(ParameterId id) {
-  print_decimal(out_, minimum_of(id), decimals_of(id));
-  print(out_, BIFA_TEXT(" to "));
-  print_decimal(out_, maximum_of(id), decimals_of(id));
+  print_decimal(minimum_of(id), decimals_of(id));
+  print(BIFA_TEXT(" to "));
+  print_decimal(maximum_of(id), decimals_of(id));
   const FlashText unit = text_of(id, ParameterText::kUnit);
-  if (flash_byte(unit) != 0) print(out_, ' ');
-  print(out_, unit);
+  if (flash_byte(unit) != 0) print(' ');
+  print(unit);
 }
 
 void Console::version() {
-  print(out_, BIFA_TEXT("[bifa "));
+  print(BIFA_TEXT("[bifa "));
   for (uint8_t i = 0; i < sizeof kFirmwareVersion; ++i) {
-    if (i > 0) print(out_, '.');
-    print_number(out_, kFirmwareVersion[i]);
+    if (i > 0) print('.');
+    print_number(kFirmwareVersion[i]);
   }
-  print(out_, BIFA_TEXT(", protocol "));
-  print_number(out_, kProtocolVersion);
-  print(out_, BIFA_TEXT(", table "));
-  print_number(out_, kTableHash);
-  print(out_, BIFA_TEXT(", started by "));
-  print(out_, flash_text(kStartCauseWords, static_cast<uint8_t>(session_.cause())));
-  print(out_, '\n');
+  print(BIFA_TEXT(", protocol "));
+  print_number(kProtocolVersion);
+  print(BIFA_TEXT(", table "));
+  print_number(kTableHash);
+  print(BIFA_TEXT(", started by "));
+  print(flash_text(kStartCauseWords, static_cast<uint8_t>(session_.cause())));
+  print('\n');
 }
 
 void Console::status() {
   const Status status = commands_.controller().status();
-  print(out_, BIFA_TEXT("[state "));
-  print(out_, flash_text(kStateWords, static_cast<uint8_t>(status.state)));
-  if (status.scheduled) print(out_, BIFA_TEXT(", timed holds"));
-  if (status.emergency_stop) print(out_, BIFA_TEXT(", emergency stop pressed"));
-  print(out_, '\n');
+  print(BIFA_TEXT("[state "));
+  print(flash_text(kStateWords, static_cast<uint8_t>(status.state)));
+  if (status.scheduled) print(BIFA_TEXT(", timed holds"));
+  if (status.emergency_stop) print(BIFA_TEXT(", emergency stop pressed"));
+  print('\n');
   if (status.fault.fault != Fault::kNone) print_fault(status.fault);
-  print(out_, BIFA_TEXT("[psi "));
+  print(BIFA_TEXT("[psi "));
   print_triple(status.pressure_mpsi);
-  print(out_, BIFA_TEXT("\n[valves"));
+  print(BIFA_TEXT("\n[valves"));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    print(out_, ' ');
-    print(out_, flash_text(kChamberWords, i));
-    print(out_, ' ');
+    print(' ');
+    print(flash_text(kChamberWords, i));
+    print(' ');
     // the two bits of a chamber, positive and vacuum, in the order of ChamberState
     const uint8_t bits = status.valves >> (2 * i) & 3;
-    print(out_, flash_text(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0));
+    print(flash_text(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0));
   }
-  print(out_, BIFA_TEXT("\n[link: frames bad "));
-  print_number(out_, counters_.frames_bad);
-  print(out_, BIFA_TEXT(", repeated "));
-  print_number(out_, session_.repeated());
-  print(out_, BIFA_TEXT(", bytes lost "));
-  print_number(out_, counters_.bytes_lost);
-  print(out_, BIFA_TEXT(", samples lost "));
-  print_number(out_, status.samples_lost);
-  print(out_, '\n');
+  print(BIFA_TEXT("\n[link: frames bad "));
+  print_number(counters_.frames_bad);
+  print(BIFA_TEXT(", repeated "));
+  print_number(session_.repeated());
+  print(BIFA_TEXT(", bytes lost "));
+  print_number(counters_.bytes_lost);
+  print(BIFA_TEXT(", samples lost "));
+  print_number(status.samples_lost);
+  print('\n');
 }
 
 void Console::print_triple(const int16_t (&pressure_mpsi)[kChamberCount]) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    if (i > 0) print(out_, ' ');
-    print(out_, flash_text(kChamberWords, i));
-    print(out_, ' ');
-    print_signed(out_, pressure_mpsi[i], 3);
+    if (i > 0) print(' ');
+    print(flash_text(kChamberWords, i));
+    print(' ');
+    print_signed(pressure_mpsi[i], 3);
   }
 }
 
 void Console::print_fault(const FaultReport& fault) {
-  print(out_, BIFA_TEXT("[fault "));
-  print(out_, flash_text(kFaultWords, static_cast<uint8_t>(fault.fault)));
+  print(BIFA_TEXT("[fault "));
+  print(flash_text(kFaultWords, static_cast<uint8_t>(fault.fault)));
   if (fault.channel < kChamberCount) {
-    print(out_, ' ');
-    print(out_, flash_text(kChamberWords, fault.channel));
+    print(' ');
+    print(flash_text(kChamberWords, fault.channel));
   }
-  print(out_, BIFA_TEXT(" value "));
-  print_signed(out_, fault.value, 0);
-  print(out_, BIFA_TEXT(" limit "));
-  print_signed(out_, fault.limit, 0);
-  print(out_, BIFA_TEXT(" at_ms "));
-  print_number(out_, fault.time_ms);
-  print(out_, BIFA_TEXT("\n[the second before, psi from "));
+  print(BIFA_TEXT(" value "));
+  print_signed(fault.value, 0);
+  print(BIFA_TEXT(" limit "));
+  print_signed(fault.limit, 0);
+  print(BIFA_TEXT(" at_ms "));
+  print_number(fault.time_ms);
+  print(BIFA_TEXT("\n[the second before, psi from "));
   print_triple(fault.lowest_mpsi);
-  print(out_, BIFA_TEXT(" to "));
+  print(BIFA_TEXT(" to "));
   print_triple(fault.highest_mpsi);
-  print(out_, '\n');
+  print('\n');
 }
 
 void Console::show_parameter(ParameterId id) {
-  print(out_, '[');
-  print(out_, name_of(id));
-  print(out_, ' ');
-  print_decimal(out_, value_of(commands_.wanted(), id), decimals_of(id));
-  print(out_, '\n');
+  print('[');
+  print(name_of(id));
+  print(' ');
+  print_decimal(value_of(commands_.wanted(), id), decimals_of(id));
+  print('\n');
 }
 
 void Console::show() {
@@ -361,16 +361,16 @@ void Console::set() {
     case DecimalResult::kOk:
       return answer(commands_.set(id, value));
     case DecimalResult::kNotANumber:
-      print(out_, BIFA_TEXT("error not a decimal number; "));
+      print(BIFA_TEXT("error not a decimal number; "));
       break;
     case DecimalResult::kOutOfRange:
-      print(out_, BIFA_TEXT("error out of range; "));
+      print(BIFA_TEXT("error out of range; "));
       break;
   }
-  print(out_, name_of(id));
-  print(out_, BIFA_TEXT(" is "));
+  print(name_of(id));
+  print(BIFA_TEXT(" is "));
   print_range(id);
-  print(out_, '\n');
+  print('\n');
 }
 
 void Console::hold() {
@@ -398,9 +398,9 @@ void Console::presets() {
   char name[kNameSize + 1];
   bool stored;
   for (uint8_t i = 0; commands_.preset_at(i, name, stored); ++i) {
-    print(out_, '[');
-    print(out_, name);
-    print(out_, stored ? BIFA_TEXT(" saved\n") : BIFA_TEXT(" factory\n"));
+    print('[');
+    print(name);
+    print(stored ? BIFA_TEXT(" saved\n") : BIFA_TEXT(" factory\n"));
   }
   answer(Result::kOk);
 }
@@ -408,41 +408,41 @@ void Console::presets() {
 void Console::sample(const Sample& sample) {
   if (!streaming_ && !plotting_) return;
   // A line is printed whole or not at all, and telemetry never makes anything wait.
-  if (out_.room() < kRoomForSample) return;
+  if (output_room() < kRoomForSample) return;
   if (streaming_) print_stream(sample);
   if (plotting_) print_plot(sample);
 }
 
 void Console::print_stream(const Sample& sample) {
-  print(out_, '>');
-  print_number(out_, sample.sequence);
-  print(out_, ',');
-  print_number(out_, sample.time_us);
-  print(out_, ',');
-  print(out_, flash_text(kStateWords, static_cast<uint8_t>(sample.state)));
+  print('>');
+  print_number(sample.sequence);
+  print(',');
+  print_number(sample.time_us);
+  print(',');
+  print(flash_text(kStateWords, static_cast<uint8_t>(sample.state)));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    print(out_, ',');
-    print_signed(out_, sample.pressure_mpsi[i], 3);
+    print(',');
+    print_signed(sample.pressure_mpsi[i], 3);
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    print(out_, ',');
-    print(out_, flash_text(kChamberStateWords, static_cast<uint8_t>(sample.command[i])));
+    print(',');
+    print(flash_text(kChamberStateWords, static_cast<uint8_t>(sample.command[i])));
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    print(out_, ',');
-    print_number(out_, static_cast<uint32_t>(sample.phase[i]) * 360 >> 16);
+    print(',');
+    print_number(static_cast<uint32_t>(sample.phase[i]) * 360 >> 16);
   }
-  print(out_, '\n');
+  print('\n');
 }
 
 void Console::print_plot(const Sample& sample) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    if (i > 0) print(out_, '\t');
-    print(out_, flash_text(kChamberWords, i));
-    print(out_, BIFA_TEXT("_psi:"));
-    print_signed(out_, sample.pressure_mpsi[i], 3);
+    if (i > 0) print('\t');
+    print(flash_text(kChamberWords, i));
+    print(BIFA_TEXT("_psi:"));
+    print_signed(sample.pressure_mpsi[i], 3);
   }
-  print(out_, '\n');
+  print('\n');
 }
 
 }  // namespace bifa

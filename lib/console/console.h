@@ -12,7 +12,7 @@ const uint8_t kLongestLine = 63;
 
 class Console {
  public:
-  Console(Commands& commands, const Session& session, Sink& out) : commands_(commands), session_(session), out_(out) {}
+  Console(Commands& commands, const Session& session) : commands_(commands), session_(session) {}
 
   /// What a person sees at start.
   void greet();
@@ -62,10 +62,7 @@ class Console {
 
   Commands& commands_;
   const Session& session_;
-  Sink& out_;
-  char line_[kLongestLine + 1];
   uint8_t length_ = 0;
-  char* words_[kWords];
   uint8_t word_count_ = 0;
   LinkCounters counters_ = {};
   State last_state_ = State::kIdle;
@@ -76,6 +73,8 @@ class Console {
   bool after_return_ = false;
   bool streaming_ = false;
   bool plotting_ = false;
+  char* words_[kWords];
+  char line_[kLongestLine + 1];
 };
 
 }  // namespace bifa

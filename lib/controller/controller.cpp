@@ -159,8 +159,8 @@ bool Controller::tick(bool emergency_stop_pressed) {
     emergency_stop_ = emergency_stop_pressed;
     if (emergency_stop_pressed) supervisor_.stop();
   }
-  if (--to_next_sample_ms_ == 0) {
-    to_next_sample_ms_ = kSamplePeriod_ms;
+  if (++since_sample_ms_ == kSamplePeriod_ms) {
+    since_sample_ms_ = 0;
     begin_sample();
   }
   step_oscillators();
@@ -171,7 +171,7 @@ bool Controller::tick(bool emergency_stop_pressed) {
   }
   watch_host();
   if (round_complete_) finish_sample();
-  return to_next_sample_ms_ == 1;
+  return since_sample_ms_ == kSamplePeriod_ms - 1;
 }
 
 void Controller::converted_in_interrupt(const RawRound& round) {

@@ -44,8 +44,6 @@ enum class StartCause : uint8_t { kPower, kExternal, kBrownOut, kWatchdog };
 
 class Controller {
  public:
-  explicit Controller(ValvePins& pins) : supervisor_(pins) {}
-
   // ---- main loop ----
 
   /// Once, before the first tick. After a watchdog reset or a brown-out the controller begins in a fault.
@@ -105,18 +103,9 @@ class Controller {
   bool cause_stands() const;
   uint16_t set_point_mpsi() const;
 
-  Supervisor supervisor_;
-  Oscillators oscillators_;
-  Schedule schedule_;
-  LastSecond last_second_;
-  TripLimit trip_limit_;
-  SensorWatch sensors_[kChamberCount];
-  DacWatch dac_;
-  RegulatorWatch regulator_;
-  Calibration calibration_ = {};
-
+  // What is small comes first: an AVR reaches 64 bytes from an object's beginning with its shortest instructions.
   uint32_t uptime_ms_ = 0;
-  uint8_t to_next_sample_ms_ = kSamplePeriod_ms;
+  uint8_t since_sample_ms_ = 0;
   volatile bool emergency_stop_ = false;
 
   uint16_t wanted_mpsi_ = 0;
@@ -131,6 +120,16 @@ class Controller {
   bool sample_waits_ = false;
   uint16_t samples_lost_ = 0;
   int32_t rest_[kChamberCount] = {};  ///< slow means of the raw pressures, mpsi * 2^kRestShift
+
+  TripLimit trip_limit_;
+  DacWatch dac_;
+  RegulatorWatch regulator_;
+  Calibration calibration_ = {};
+  SensorWatch sensors_[kChamberCount];
+  Supervisor supervisor_;
+  Oscillators oscillators_;
+  Schedule schedule_;
+  LastSecond last_second_;
 };
 
 }  // namespace bifa

@@ -29,7 +29,7 @@ class Schedule {
     uint8_t what;  ///< chamber in the upper half, state in the lower: memory is short
   };
 
-  Entry entries_[kCapacity];
+  Entry entries_[kCapacity] = {};
   uint8_t count_ = 0;
   uint8_t next_ = 0;
   uint32_t now_ms_ = 0;

@@ -44,8 +44,8 @@ class Oscillators {
   uint32_t couple();
 
   uint32_t body_ = 0;  ///< half a step ahead
-  uint32_t head_error_ = kHalfStep;
-  uint32_t tail_error_ = kHalfStep;
+  uint32_t head_error_ = 0;
+  uint32_t tail_error_ = 0;
   Pulls last_ = {0, 0};   ///< of the step before
   uint8_t fraction_ = 0;  ///< of body_, 1/256 of its unit
   uint8_t outputs_ = 0;

@@ -11,8 +11,8 @@ namespace bifa {
 
 class HostPort {
  public:
-  HostPort(Controller& controller, Eeprom& eeprom, Sink& out)
-      : store_(eeprom), commands_(controller, store_), session_(commands_, out), console_(commands_, session_, out) {}
+  explicit HostPort(Controller& controller)
+      : commands_(controller), session_(commands_), console_(commands_, session_) {}
 
   /// Loads what is in EEPROM, starts the controller and greets. `boot_nonce` differs from that of the last start.
   void begin(uint16_t boot_nonce, StartCause cause);
@@ -32,14 +32,13 @@ class HostPort {
   void take(uint8_t byte);
   void recover();
 
-  Receiver receiver_;
-  Store store_;
+  bool in_frame_ = false;
+  uint16_t frames_bad_ = 0;
+  FrameDecoder decoder_;
   Commands commands_;
   Session session_;
   Console console_;
-  FrameDecoder decoder_;
-  bool in_frame_ = false;
-  uint16_t frames_bad_ = 0;
+  Receiver receiver_;
 };
 
 }  // namespace bifa

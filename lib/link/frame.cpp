@@ -1,6 +1,7 @@
 #include "frame.h"
 
 #include "crc.h"
+#include "output.h"
 
 namespace bifa {
 
@@ -63,7 +64,7 @@ bool FrameDecoder::finish(uint32_t session) {
   return stored == checks(reinterpret_cast<const uint8_t*>(&frame_), kHeadBytes + size, seed);
 }
 
-void send_frame(Sink& sink, MessageId message, uint8_t sequence, const void* fields, uint8_t size, uint32_t seed) {
+void send_frame(MessageId message, uint8_t sequence, const void* fields, uint8_t size, uint32_t seed) {
   uint8_t body[kHeadBytes + kLongestOutward + kCheckBytes];
   body[0] = static_cast<uint8_t>(message);
   body[1] = sequence;
@@ -72,17 +73,17 @@ void send_frame(Sink& sink, MessageId message, uint8_t sequence, const void* fie
   memcpy(body + kHeadBytes + size, &check, sizeof check);
   const uint8_t length = kHeadBytes + size + kCheckBytes;
 
-  sink.write(0);
-  sink.write(0);
+  output(0);
+  output(0);
   uint8_t begin = 0;
   while (begin <= length) {
     uint8_t end = begin;
     while (end < length && body[end] != 0) ++end;
-    sink.write(end - begin + 1);
-    for (; begin < end; ++begin) sink.write(body[begin]);
+    output(end - begin + 1);
+    for (; begin < end; ++begin) output(body[begin]);
     ++begin;
   }
-  sink.write(0);
+  output(0);
 }
 
 }  // namespace bifa

@@ -4,7 +4,6 @@
 #pragma once
 
 #include "message_table.h"
-#include "sink.h"
 
 namespace bifa {
 
@@ -32,18 +31,18 @@ class FrameDecoder {
   const Frame& frame() const { return frame_; }
 
  private:
-  Frame frame_;
   uint8_t length_;     ///< bytes decoded
   uint8_t mask_;       ///< 0: not yet known
   uint8_t run_;        ///< bytes to the next code byte
   bool zero_follows_;  ///< whether the present run ends in a 0x00
   bool bad_;
+  Frame frame_;
 };
 
 /// Sends a message with its delimiters. The leading delimiter is doubled: one ends what may hang open at the receiver.
-void send_frame(Sink& sink, MessageId message, uint8_t sequence, const void* fields, uint8_t size, uint32_t seed);
+void send_frame(MessageId message, uint8_t sequence, const void* fields, uint8_t size, uint32_t seed);
 
-/// Room that a frame with fields of `size` bytes takes in a sink.
+/// Room that a frame with fields of `size` bytes takes in the output.
 inline uint8_t frame_room(uint8_t size) { return 2 + 1 + 2 + size + 4 + 1; }
 
 }  // namespace bifa

@@ -1,5 +1,7 @@
 #include "session.h"
 
+#include "output.h"
+
 namespace bifa {
 
 namespace {
@@ -52,7 +54,7 @@ void Session::hello() {
   message.boot_nonce = boot_nonce_;
   message.start_cause = static_cast<uint8_t>(cause_);
   message.session_key = key_;
-  send_frame(out_, MessageId::kHello, 0, &message, sizeof message, kOpenSeed);
+  send_frame(MessageId::kHello, 0, &message, sizeof message, kOpenSeed);
 }
 
 void Session::connect(const Frame& frame) {
@@ -157,7 +159,7 @@ Result Session::execute(const Frame& frame) {
 }
 
 void Session::send(MessageId message, uint8_t sequence, const void* fields, uint8_t size) {
-  send_frame(out_, message, sequence, fields, size, seed());
+  send_frame(message, sequence, fields, size, seed());
 }
 
 void Session::done(uint8_t sequence) {
@@ -200,7 +202,7 @@ void Session::send_preset(uint8_t sequence, uint8_t index) {
 void Session::sample(const Sample& sample) {
   if (!streaming_) return;
   SampleMessage message;
-  if (out_.room() < frame_room(sizeof message)) {
+  if (output_room() < frame_room(sizeof message)) {
     count(samples_dropped_);
     return;
   }
@@ -212,7 +214,7 @@ void Session::sample(const Sample& sample) {
   message.command = 0;
   for (uint8_t i = 0; i < kChamberCount; ++i) message.command |= static_cast<uint8_t>(sample.command[i]) << (2 * i);
   message.valves = sample.valves;
-  send_frame(out_, MessageId::kSample, static_cast<uint8_t>(sample.sequence), &message, sizeof message, kStreamSeed);
+  send_frame(MessageId::kSample, static_cast<uint8_t>(sample.sequence), &message, sizeof message, kStreamSeed);
 }
 
 }  // namespace bifa

@@ -3,7 +3,6 @@
 
 #include "commands.h"
 #include "frame.h"
-#include "sink.h"
 
 namespace bifa {
 
@@ -17,7 +16,7 @@ struct LinkCounters {
 
 class Session {
  public:
-  Session(Commands& commands, Sink& out) : commands_(commands), out_(out) {}
+  explicit Session(Commands& commands) : commands_(commands) {}
 
   /// `boot_nonce` differs from that of the last start.
   void begin(uint16_t boot_nonce, StartCause cause) {
@@ -55,7 +54,6 @@ class Session {
   void send_preset(uint8_t sequence, uint8_t index);
 
   Commands& commands_;
-  Sink& out_;
   uint16_t boot_nonce_ = 0;
   StartCause cause_ = StartCause::kPower;
   uint16_t key_ = 0;  ///< 0: no session is open

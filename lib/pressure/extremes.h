@@ -23,7 +23,7 @@ class LastSecond {
     int16_t highest[kChamberCount];
   };
 
-  Part parts_[kParts];
+  Part parts_[kParts] = {};
   uint8_t used_ = 0;  ///< parts that hold something
   uint8_t now_ = 0;
   uint8_t samples_ = 0;  ///< in the part under way

@@ -12,7 +12,7 @@ const uint16_t kGreatestSupply_mpsi = 14000;
 class SupplyCode {
  public:
   /// No pressure.
-  SupplyCode() : counts_(0) {}
+  constexpr SupplyCode() : counts_(0) {}
 
   /// The count for a pressure, at most that for 14 psi.
   static SupplyCode of(uint32_t pressure_mpsi) {

@@ -1,4 +1,4 @@
-// The EEPROM as the store sees it.
+// The EEPROM as the store sees it. The board provides these.
 #pragma once
 
 #include <stdint.h>
@@ -7,17 +7,10 @@ namespace bifa {
 
 const uint16_t kEepromBytes = 1024;
 
-/// Non-volatile bytes. A write takes 3.4 ms on the chip; the power may go at any moment of it.
-class Eeprom {
- public:
-  virtual uint8_t read(uint16_t address) = 0;
-  /// Starts to write one byte; only while not busy().
-  virtual void write(uint16_t address, uint8_t value) = 0;
-  /// Whether the last write is still under way.
-  virtual bool busy() = 0;
-
- protected:
-  ~Eeprom() = default;
-};
+uint8_t eeprom_read(uint16_t address);
+/// Starts to write one byte; only while not eeprom_busy(). It takes 3.4 ms; the power may go at any moment of it.
+void eeprom_write(uint16_t address, uint8_t value);
+/// Whether the last write is still under way.
+bool eeprom_busy();
 
 }  // namespace bifa

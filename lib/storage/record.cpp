@@ -7,9 +7,9 @@ namespace bifa {
 namespace {
 const uint8_t kHeadBytes = offsetof(Record, payload);
 
-void read_bytes(Eeprom& eeprom, uint16_t address, void* to, uint8_t size) {
+void read_bytes(uint16_t address, void* to, uint8_t size) {
   uint8_t* bytes = static_cast<uint8_t*>(to);
-  for (uint8_t i = 0; i < size; ++i) bytes[i] = eeprom.read(address + i);
+  for (uint8_t i = 0; i < size; ++i) bytes[i] = eeprom_read(address + i);
 }
 
 const uint8_t* bytes_of(const Record& record) { return reinterpret_cast<const uint8_t*>(&record); }
@@ -35,9 +35,9 @@ bool is_name(const char* name) {
   return length > 0;
 }
 
-uint32_t sequence_of(Eeprom& eeprom, uint8_t slot) {
+uint32_t sequence_of(uint8_t slot) {
   uint32_t sequence;
-  read_bytes(eeprom, slot_address(slot) + offsetof(Record, sequence), &sequence, sizeof sequence);
+  read_bytes(slot_address(slot) + offsetof(Record, sequence), &sequence, sizeof sequence);
   return sequence;
 }
 
@@ -49,14 +49,14 @@ uint8_t payload_size(uint8_t format) {
   return size;
 }
 
-bool read_record(Eeprom& eeprom, uint8_t slot, Record& record) {
+bool read_record(uint8_t slot, Record& record) {
   const uint16_t address = slot_address(slot);
-  read_bytes(eeprom, address, &record, kHeadBytes);
+  read_bytes(address, &record, kHeadBytes);
   if (record.mark != kRecordValid || record.format == 0 || record.format > kStorageFormat) return false;
   const uint8_t size = payload_size(record.format);
   uint16_t stored;
-  read_bytes(eeprom, address + kHeadBytes, record.payload, size);
-  read_bytes(eeprom, address + kHeadBytes + size, &stored, sizeof stored);
+  read_bytes(address + kHeadBytes, record.payload, size);
+  read_bytes(address + kHeadBytes + size, &stored, sizeof stored);
   if (crc16(bytes_of(record) + 1, kHeadBytes - 1 + size) != stored) return false;
   if (record.sequence > kSequenceLimit) return false;
   if (!is_name(record.name) && memcmp(record.name, kSettingsName, kNameSize) != 0) return false;
@@ -71,9 +71,9 @@ void seal(Record& record) {
   record.check = crc16(bytes_of(record) + 1, offsetof(Record, check) - 1);
 }
 
-bool is_from_the_future(Eeprom& eeprom, uint8_t slot) {
-  const uint8_t format = eeprom.read(slot_address(slot) + 1);
-  return eeprom.read(slot_address(slot)) == kRecordValid && format > kStorageFormat && format != 0xFF;
+bool is_from_the_future(uint8_t slot) {
+  const uint8_t format = eeprom_read(slot_address(slot) + 1);
+  return eeprom_read(slot_address(slot)) == kRecordValid && format > kStorageFormat && format != 0xFF;
 }
 
 }  // namespace bifa

@@ -33,19 +33,19 @@ inline uint16_t slot_address(uint8_t slot) { return static_cast<uint16_t>(slot) 
 bool is_name(const char* name);
 
 /// The sequence number in a slot, whatever else it holds.
-uint32_t sequence_of(Eeprom& eeprom, uint8_t slot);
+uint32_t sequence_of(uint8_t slot);
 
 /// Bytes of a parameter set in a storage format.
 uint8_t payload_size(uint8_t format);
 
 /// Reads a slot into `record`, brought to the present format: fields that the old one lacks take their defaults.
 /// False, unless mark, format, CRC, name and sequence are good.
-bool read_record(Eeprom& eeprom, uint8_t slot, Record& record);
+bool read_record(uint8_t slot, Record& record);
 
 /// Puts format, mark and CRC into a record whose sequence, name and payload are set.
 void seal(Record& record);
 
 /// Whether a slot holds a record of a later format than this firmware knows: left alone.
-bool is_from_the_future(Eeprom& eeprom, uint8_t slot);
+bool is_from_the_future(uint8_t slot);
 
 }  // namespace bifa

@@ -17,8 +17,8 @@ void Store::scan() {
   sequence_ = 0;
   Record record;
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
-    marks_[slot] = is_from_the_future(eeprom_, slot) ? kTaken : 0;
-    if (!read_record(eeprom_, slot, record)) continue;
+    marks_[slot] = is_from_the_future(slot) ? kTaken : 0;
+    if (!read_record(slot, record)) continue;
     marks_[slot] = kGood;
     if (record.sequence < sequence_) continue;
     sequence_ = record.sequence;
@@ -26,10 +26,10 @@ void Store::scan() {
   }
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
     if (!has(slot, kGood)) continue;
-    read_record(eeprom_, slot, record);
+    read_record(slot, record);
     bool is_newest = true;
     for (uint8_t i = 0; i < kSlotCount && is_newest; ++i) {
-      is_newest = !has(i, kGood) || !is_named(i, record.name) || sequence_of(eeprom_, i) <= record.sequence;
+      is_newest = !has(i, kGood) || !is_named(i, record.name) || sequence_of(i) <= record.sequence;
     }
     if (is_newest) marks_[slot] |= kLive;
   }
@@ -37,7 +37,7 @@ void Store::scan() {
 
 bool Store::newest(const char* name, Record& record) {
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
-    if (has(slot, kLive) && read_record(eeprom_, slot, record) && same_name(record.name, name)) return true;
+    if (has(slot, kLive) && read_record(slot, record) && same_name(record.name, name)) return true;
   }
   return false;
 }
@@ -63,7 +63,7 @@ bool Store::name_at(uint8_t index, char* name) {
   name[kNameSize] = '\0';
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
     if (!has(slot, kLive) || is_named(slot, kSettingsName)) continue;
-    for (uint8_t i = 0; i < kNameSize; ++i) name[i] = eeprom_.read(slot_address(slot) + offsetof(Record, name) + i);
+    for (uint8_t i = 0; i < kNameSize; ++i) name[i] = eeprom_read(slot_address(slot) + offsetof(Record, name) + i);
     bool is_second_copy = false;
     for (uint8_t i = 0; i < slot; ++i) is_second_copy = is_second_copy || (has(i, kLive) && is_named(i, name));
     if (!is_second_copy && index-- == 0) return true;
@@ -81,9 +81,9 @@ uint8_t Store::count() {
 /// Whether a slot with a good mark has this name.
 bool Store::is_named(uint8_t slot, const char* name) {
   const uint16_t address = slot_address(slot);
-  if (eeprom_.read(address) != kRecordValid) return false;
+  if (eeprom_read(address) != kRecordValid) return false;
   for (uint8_t i = 0; i < kNameSize; ++i) {
-    if (eeprom_.read(address + offsetof(Record, name) + i) != static_cast<uint8_t>(name[i])) return false;
+    if (eeprom_read(address + offsetof(Record, name) + i) != static_cast<uint8_t>(name[i])) return false;
   }
   return true;
 }
@@ -142,7 +142,7 @@ void Store::doom(const char* name) {
 
 void Store::repair() {
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
-    if (!has(slot, kLive) || !read_record(eeprom_, slot, record_)) continue;
+    if (!has(slot, kLive) || !read_record(slot, record_)) continue;
     uint8_t copies = 0;
     for (uint8_t i = 0; i < kSlotCount; ++i) copies += has(i, kLive) && is_named(i, record_.name);
     if (copies >= kCopies) continue;
@@ -166,7 +166,7 @@ void Store::next_copy() {
 }
 
 void Store::poll() {
-  if (job_ == Job::kNone || eeprom_.busy()) return;
+  if (job_ == Job::kNone || eeprom_busy()) return;
   if (job_ == Job::kVoid || copies_ == 0) {
     step_void();
   } else {
@@ -181,18 +181,18 @@ void Store::step_write() {
   while (at_ < sizeof record_) {
     const uint8_t value = at_ == 0 ? kRecordVoid : bytes[at_];
     const uint16_t place = address + at_++;
-    if (eeprom_.read(place) == value) continue;  // what is there already costs no wear
-    eeprom_.write(place, value);
+    if (eeprom_read(place) == value) continue;  // what is there already costs no wear
+    eeprom_write(place, value);
     return;
   }
   bool kept = true;
-  for (uint8_t i = 1; i < sizeof record_; ++i) kept = kept && eeprom_.read(address + i) == bytes[i];
+  for (uint8_t i = 1; i < sizeof record_; ++i) kept = kept && eeprom_read(address + i) == bytes[i];
   if (at_ == sizeof record_ && kept) {
     ++at_;
-    eeprom_.write(address, kRecordValid);
+    eeprom_write(address, kRecordValid);
     return;
   }
-  if (!kept || eeprom_.read(address) != kRecordValid) {
+  if (!kept || eeprom_read(address) != kRecordValid) {
     marks_[slot_] |= kFailed;
     return next_copy();
   }
@@ -205,13 +205,13 @@ void Store::step_void() {
   for (uint8_t pass = 0; pass < 2; ++pass) {
     for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
       if (!has(slot, kDoomed) || has(slot, kLive) != (pass == 1)) continue;
-      if (eeprom_.read(slot_address(slot)) != kRecordValid) {
+      if (eeprom_read(slot_address(slot)) != kRecordValid) {
         marks_[slot] &= ~kDoomed;
         continue;
       }
       if (has(slot, kFailed)) return finish(Result::kEeprom);
       marks_[slot] |= kFailed;  // unless it reads back as void the next time
-      eeprom_.write(slot_address(slot), kRecordVoid);
+      eeprom_write(slot_address(slot), kRecordVoid);
       return;
     }
   }

@@ -15,8 +15,6 @@ const uint8_t kPresetLimit = 8;  ///< besides the settings: (8 + 1) x 2 copies l
 
 class Store {
  public:
-  explicit Store(Eeprom& eeprom) : eeprom_(eeprom) {}
-
   /// Looks through the EEPROM; call once at start. A record of which only one copy is good gets its second again.
   void begin();
 
@@ -65,16 +63,15 @@ class Store {
   void step_void();
   void finish(Result result);
 
-  Eeprom& eeprom_;
-  uint8_t marks_[kSlotCount];
   uint32_t sequence_ = 0;  ///< of the newest record of all
   uint8_t cursor_ = 0;     ///< where to look for the next free slot
   Job job_ = Job::kNone;
   Result result_ = Result::kOk;
-  Record record_;  ///< being written
   uint8_t slot_ = 0;
   uint8_t at_ = 0;      ///< byte of the record to be written next
   uint8_t copies_ = 0;  ///< still to be written
+  uint8_t marks_[kSlotCount];
+  Record record_;  ///< being written
 };
 
 }  // namespace bifa

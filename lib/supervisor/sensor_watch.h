@@ -29,7 +29,7 @@ class TripLimit {
   int16_t mpsi() const { return limit_mpsi_; }
 
  private:
-  int16_t limit_mpsi_ = kTripMargin_mpsi;
+  int16_t limit_mpsi_ = 0;
 };
 
 /// Watches one sensor.

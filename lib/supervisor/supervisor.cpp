@@ -69,13 +69,13 @@ void Supervisor::vent() {
     sequencers_[i].vent();
   }
   on_pins_ = ValvePattern();
-  pins_.write(on_pins_);
+  set_valves(on_pins_);
 }
 
 void Supervisor::write(ValvePattern pattern) {
   if (pattern == on_pins_) return;
   on_pins_ = pattern;
-  pins_.write(pattern);
+  set_valves(pattern);
 }
 
 }  // namespace bifa

@@ -17,8 +17,6 @@ namespace bifa {
 
 class Supervisor {
  public:
-  explicit Supervisor(ValvePins& pins) : pins_(pins) {}
-
   State state() const { return state_; }
   bool is_latched() const { return state_ == State::kStopped || state_ == State::kFault; }
   bool moves_air() const { return state_ == State::kRunning || state_ == State::kHolding; }
@@ -49,7 +47,6 @@ class Supervisor {
   void vent();
   void write(ValvePattern pattern);
 
-  ValvePins& pins_;
   State state_ = State::kIdle;
   ChamberStates wanted_ = {{ChamberState::kOff, ChamberState::kOff, ChamberState::kOff}};
   ValveSequencer sequencers_[kChamberCount];

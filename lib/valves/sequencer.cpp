@@ -3,21 +3,17 @@
 namespace bifa {
 
 ChamberState ValveSequencer::tick(ChamberState wanted) {
-  if (fresh_) {
-    fresh_ = false;
-  } else if (elapsed_ms_ < kDwell_ms) {
-    ++elapsed_ms_;
-  }
+  if (rest_ > 0) --rest_;
   if (wanted == state_) return state_;
   if (wanted == ChamberState::kOff) {
     vent();
-  } else if (state_ == ChamberState::kOff) {
-    if (elapsed_ms_ < kDeadTime_ms) return state_;
-    state_ = wanted;
-    elapsed_ms_ = 0;
-    fresh_ = true;
-  } else if (elapsed_ms_ >= kDwell_ms) {
-    vent();
+  } else if (rest_ == 0) {
+    if (state_ == ChamberState::kOff) {
+      state_ = wanted;
+      rest_ = kDwell_ms + 1;
+    } else {
+      vent();
+    }
   }
   return state_;
 }
@@ -25,8 +21,7 @@ ChamberState ValveSequencer::tick(ChamberState wanted) {
 void ValveSequencer::vent() {
   if (state_ == ChamberState::kOff) return;
   state_ = ChamberState::kOff;
-  elapsed_ms_ = 0;
-  fresh_ = true;
+  rest_ = kDeadTime_ms + 1;
 }
 
 }  // namespace bifa

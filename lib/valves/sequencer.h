@@ -22,10 +22,9 @@ class ValveSequencer {
 
  private:
   ChamberState state_ = ChamberState::kOff;
-  // Whole milliseconds since the last change, at most kDwell_ms. A change may come just before a tick, so the first
-  // tick after it does not count: that makes every time a lower bound.
-  uint8_t elapsed_ms_ = kDwell_ms;
-  bool fresh_ = false;
+  // Ticks until the next change may come. A change may come just before a tick, so the first tick after it is one more:
+  // that makes every time a lower bound.
+  uint8_t rest_ = 0;
 };
 
 }  // namespace bifa

@@ -9,7 +9,7 @@ namespace bifa {
 class ValvePattern {
  public:
   /// All six valves off.
-  ValvePattern() : bits_(0) {}
+  constexpr ValvePattern() : bits_(0) {}
 
   explicit ValvePattern(const ChamberStates& states)
       : bits_(pair(states.of[0]) | pair(states.of[1]) << 2 | pair(states.of[2]) << 4) {}
@@ -29,14 +29,7 @@ class ValvePattern {
   uint8_t bits_;
 };
 
-/// The pins, as the controller sees them.
-class ValvePins {
- public:
-  /// Puts the pattern on the pins at once; called with interrupts off.
-  virtual void write(ValvePattern pattern) = 0;
-
- protected:
-  ~ValvePins() = default;
-};
+/// Puts the pattern on the pins at once; called with interrupts off. The board provides it.
+void set_valves(ValvePattern pattern);
 
 }  // namespace bifa

@@ -3,6 +3,7 @@
 
 #include "../suite.h"
 #include "decimal.h"
+#include "output.h"
 #include "parameters.h"
 #include "print.h"
 
@@ -13,15 +14,14 @@ void tearDown() {}
 
 namespace {
 
-class Line : public Sink {
- public:
-  void write(uint8_t byte) override {
-    if (length < sizeof text - 1) text[length++] = static_cast<char>(byte);
-  }
-  uint8_t room() const override { return 255; }
-  char text[40] = {};
-  uint8_t length = 0;
-};
+char printed[40];
+uint8_t length;
+
+/// From here on `printed` holds what is printed.
+void begin_line() {
+  memset(printed, 0, sizeof printed);
+  length = 0;
+}
 
 void expect_decimal(const char* text, DecimalResult result, uint32_t scaled) {
   uint32_t got = 12345;
@@ -30,6 +30,10 @@ void expect_decimal(const char* text, DecimalResult result, uint32_t scaled) {
 }
 
 }  // namespace
+
+void bifa::output(uint8_t byte) {
+  if (length < sizeof printed - 1) printed[length++] = static_cast<char>(byte);
+}
 
 static void test_decimals() {
   expect_decimal("5.7", DecimalResult::kOk, 5700);
@@ -47,9 +51,9 @@ static void test_decimals() {
 }
 
 static void expect_printed(const char* expected, int32_t value, uint8_t decimals) {
-  Line line;
-  print_signed(line, value, decimals);
-  TEST_ASSERT_EQUAL_STRING(expected, line.text);
+  begin_line();
+  print_signed(value, decimals);
+  TEST_ASSERT_EQUAL_STRING(expected, printed);
 }
 
 static void test_numbers_as_text() {
@@ -62,16 +66,16 @@ static void test_numbers_as_text() {
 }
 
 static void test_texts_in_flash() {
-  Line line;
-  print(line, BIFA_TEXT("a text in flash"));
-  TEST_ASSERT_EQUAL_STRING("a text in flash", line.text);
+  begin_line();
+  print(BIFA_TEXT("a text in flash"));
+  TEST_ASSERT_EQUAL_STRING("a text in flash", printed);
   ParameterId id;
   TEST_ASSERT_TRUE(find_parameter("duty_tail", id));
   TEST_ASSERT_EQUAL(static_cast<int>(ParameterId::kDutyTail), static_cast<int>(id));
   TEST_ASSERT_FALSE(find_parameter("duty", id));
-  Line unit;
-  print(unit, text_of(ParameterId::kCouplingPerS, ParameterText::kUnit));
-  TEST_ASSERT_EQUAL_STRING("1/s", unit.text);
+  begin_line();
+  print(text_of(ParameterId::kCouplingPerS, ParameterText::kUnit));
+  TEST_ASSERT_EQUAL_STRING("1/s", printed);
 }
 
 static void test_parameters_and_presets() {

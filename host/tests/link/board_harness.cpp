@@ -3,47 +3,23 @@
 #include <vector>
 
 #include "host_port.h"
+#include "output.h"
 
 namespace {
 
 const int kBytesPerMs = 25;  // 250000 baud
 
-class Valves : public bifa::ValvePins {
- public:
-  void write(bifa::ValvePattern pattern) override { bits = pattern.bits(); }
-  uint8_t bits = 0;
-};
-
-class Cells : public bifa::Eeprom {
- public:
-  uint8_t read(uint16_t address) override { return bytes[address % bifa::kEepromBytes]; }
-  void write(uint16_t address, uint8_t value) override {
-    bytes[address % bifa::kEepromBytes] = value;
-    busy_ms = 4;
-  }
-  bool busy() override { return busy_ms > 0; }
-  uint8_t bytes[bifa::kEepromBytes];
-  int busy_ms = 0;
-};
-
-class Output : public bifa::Sink {
- public:
-  void write(uint8_t byte) override { bytes.push_back(byte); }
-  uint8_t room() const override { return 127; }
-  std::vector<uint8_t> bytes;
-};
-
 // What a reset takes away.
 struct Program {
-  Program(Valves& valves, Cells& cells, Output& output) : controller(valves), port(controller, cells, output) {}
   bifa::Controller controller;
-  bifa::HostPort port;
+  bifa::HostPort port{controller};
 };
 
 struct Board {
-  Valves valves;
-  Cells cells;
-  Output output;
+  uint8_t valves = 0;
+  uint8_t cells[bifa::kEepromBytes];
+  int cells_busy_ms = 0;
+  std::vector<uint8_t> output;
   std::deque<uint8_t> input;
   Program* program = nullptr;
   uint16_t boots = 0;
@@ -51,40 +27,59 @@ struct Board {
   uint16_t wobble = 0;
   int32_t stopped_after_ms = -1;
 
-  void start(bifa::StartCause cause) {
-    delete program;
-    input.clear();
-    valves.bits = 0;
-    program = new Program(valves, cells, output);
-    program->port.begin(++boots, cause);
-  }
-
-  void step() {
-    ++now_ms;
-    if (cells.busy_ms > 0) --cells.busy_ms;
-    for (int i = 0; i < kBytesPerMs && !input.empty(); ++i) {
-      if (program->port.byte_in_interrupt(input.front())) program->controller.stop_in_interrupt();
-      input.pop_front();
-      if (i % 8 == 7) program->port.poll();
-    }
-    program->port.tick_in_interrupt();
-    if (program->controller.tick(false)) {
-      wobble = (wobble + 1) % 16;  // a sensor whose reading never moves counts as broken
-      const uint16_t rest = 4096 + wobble;
-      program->controller.converted_in_interrupt({{rest, rest, rest}, 0});
-    }
-    program->controller.supply_told(true);
-    program->port.poll();
-  }
+  void start(bifa::StartCause cause);
+  void step();
 };
 
+Board* running = nullptr;  ///< the one whose program is at work
+
+void Board::start(bifa::StartCause cause) {
+  running = this;
+  delete program;
+  input.clear();
+  valves = 0;
+  program = new Program;
+  program->port.begin(++boots, cause);
+}
+
+void Board::step() {
+  running = this;
+  ++now_ms;
+  if (cells_busy_ms > 0) --cells_busy_ms;
+  for (int i = 0; i < kBytesPerMs && !input.empty(); ++i) {
+    if (program->port.byte_in_interrupt(input.front())) program->controller.stop_in_interrupt();
+    input.pop_front();
+    if (i % 8 == 7) program->port.poll();
+  }
+  program->port.tick_in_interrupt();
+  if (program->controller.tick(false)) {
+    wobble = (wobble + 1) % 16;  // a sensor whose reading never moves counts as broken
+    const uint16_t rest = 4096 + wobble;
+    program->controller.converted_in_interrupt({{rest, rest, rest}, 0});
+  }
+  program->controller.supply_told(true);
+  program->port.poll();
+}
+
 }  // namespace
+
+namespace bifa {
+void set_valves(ValvePattern pattern) { running->valves = pattern.bits(); }
+uint8_t eeprom_read(uint16_t address) { return running->cells[address % kEepromBytes]; }
+void eeprom_write(uint16_t address, uint8_t value) {
+  running->cells[address % kEepromBytes] = value;
+  running->cells_busy_ms = 4;
+}
+bool eeprom_busy() { return running->cells_busy_ms > 0; }
+void output(uint8_t byte) { running->output.push_back(byte); }
+uint8_t output_room() { return 127; }
+}  // namespace bifa
 
 extern "C" {
 
 Board* board_new() {
   Board* board = new Board;
-  memset(board->cells.bytes, 0xFF, sizeof board->cells.bytes);
+  memset(board->cells, 0xFF, sizeof board->cells);
   board->start(bifa::StartCause::kPower);
   return board;
 }
@@ -100,18 +95,18 @@ void board_send(Board* board, const uint8_t* data, size_t size) {
 // Lets time pass; returns early once there is output.
 void board_run(Board* board, uint32_t duration_ms, int until_output) {
   for (uint32_t i = 0; i < duration_ms; ++i) {
-    if (until_output && !board->output.bytes.empty()) return;
+    if (until_output && !board->output.empty()) return;
     board->step();
   }
 }
 size_t board_receive(Board* board, uint8_t* data, size_t size) {
-  const size_t count = board->output.bytes.size() < size ? board->output.bytes.size() : size;
-  memcpy(data, board->output.bytes.data(), count);
-  board->output.bytes.erase(board->output.bytes.begin(), board->output.bytes.begin() + count);
+  const size_t count = board->output.size() < size ? board->output.size() : size;
+  memcpy(data, board->output.data(), count);
+  board->output.erase(board->output.begin(), board->output.begin() + count);
   return count;
 }
 uint32_t board_now_ms(Board* board) { return board->now_ms; }
-uint8_t board_valves(Board* board) { return board->valves.bits; }
+uint8_t board_valves(Board* board) { return board->valves; }
 uint8_t board_state(Board* board) { return static_cast<uint8_t>(board->program->controller.state()); }
-void board_eeprom(Board* board, uint8_t* image) { memcpy(image, board->cells.bytes, sizeof board->cells.bytes); }
+void board_eeprom(Board* board, uint8_t* image) { memcpy(image, board->cells, sizeof board->cells); }
 }

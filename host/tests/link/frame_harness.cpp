@@ -3,6 +3,7 @@
 
 #include "crc.h"
 #include "frame.h"
+#include "output.h"
 #include "receiver.h"
 
 namespace {
@@ -52,7 +53,11 @@ bool damage(Random& random, std::vector<uint8_t>& bytes, uint32_t rate_e4) {
   return changed;
 }
 
+std::vector<uint8_t> sent;
+
 }  // namespace
+
+void bifa::output(uint8_t byte) { sent.push_back(byte); }
 
 extern "C" {
 
@@ -78,14 +83,10 @@ int harness_decode(const uint8_t* data, size_t size, uint32_t session, uint8_t* 
 }
 
 size_t harness_encode(uint8_t message, uint8_t sequence, const uint8_t* fields, uint8_t size, uint32_t seed, uint8_t* to) {
-  struct Collect : bifa::Sink {
-    void write(uint8_t byte) override { bytes.push_back(byte); }
-    uint8_t room() const override { return 255; }
-    std::vector<uint8_t> bytes;
-  } sink;
-  bifa::send_frame(sink, static_cast<bifa::MessageId>(message), sequence, fields, size, seed);
-  memcpy(to, sink.bytes.data(), sink.bytes.size());
-  return sink.bytes.size();
+  sent.clear();
+  bifa::send_frame(static_cast<bifa::MessageId>(message), sequence, fields, size, seed);
+  memcpy(to, sent.data(), sent.size());
+  return sent.size();
 }
 
 // Damages `count` copies of good frames (in `pool`, each of `stride` bytes, its size in the first) and pushes them
@@ -97,12 +98,12 @@ void harness_damage(const uint8_t* pool, size_t frames, size_t stride, uint32_t 
   bifa::Receiver receiver;
   bifa::FrameDecoder decoder;
   bool in_frame = false;
-  std::vector<uint8_t> sent[2];
+  std::vector<uint8_t> last[2];
   for (uint64_t i = 0; i < count;) {
     const uint8_t* entry = pool + stride * random.below(frames);
     std::vector<uint8_t> bytes(entry + 1, entry + 1 + entry[0]);
-    sent[0] = sent[1];
-    sent[1].assign(entry + stride - 24, entry + stride);  // the message that it holds, padded with zeros
+    last[0] = last[1];
+    last[1].assign(entry + stride - 24, entry + stride);  // the message that it holds, padded with zeros
     const uint32_t rates[] = {300, 1000, 3000};
     const bool damaged = damage(random, bytes, rates[random.below(3)]);
     i += damaged;
@@ -124,7 +125,7 @@ void harness_damage(const uint8_t* pool, size_t frames, size_t stride, uint32_t 
         bifa::inward_size(decoder.frame().message, size);
         std::vector<uint8_t> got(24, 0);
         memcpy(got.data(), &decoder.frame(), 2 + size);
-        const bool known = got == sent[0] || got == sent[1];
+        const bool known = got == last[0] || got == last[1];
         ++results[known ? 1 : 2];
       }
     }

@@ -5,14 +5,14 @@
 
 namespace {
 
-class FakeEeprom : public bifa::Eeprom {
+class FakeEeprom {
  public:
-  uint8_t read(uint16_t address) override { return bytes[address]; }
-  bool busy() override {
+  uint8_t read(uint16_t address) const { return bytes[address]; }
+  bool busy() {
     if (busy_polls > 0) --busy_polls;
     return busy_polls > 0 || powerless;
   }
-  void write(uint16_t address, uint8_t value) override {
+  void write(uint16_t address, uint8_t value) {
     if (powerless) return;
     ++writes;
     ++wear[address];
@@ -39,17 +39,31 @@ class FakeEeprom : public bifa::Eeprom {
 
 struct Bench {
   FakeEeprom eeprom;
-  bifa::Store store{eeprom};
+  bifa::Store stored;
+
+  /// The store, with its own EEPROM in place.
+  bifa::Store& store();
 };
 
+FakeEeprom* in_place = nullptr;
+
+bifa::Store& Bench::store() {
+  in_place = &eeprom;
+  return stored;
+}
+
 }  // namespace
+
+uint8_t bifa::eeprom_read(uint16_t address) { return in_place->read(address); }
+void bifa::eeprom_write(uint16_t address, uint8_t value) { in_place->write(address, value); }
+bool bifa::eeprom_busy() { return in_place->busy(); }
 
 extern "C" {
 
 Bench* bench_new(const uint8_t* image) {
   Bench* bench = new Bench;
   memcpy(bench->eeprom.bytes, image, bifa::kEepromBytes);
-  bench->store.begin();
+  bench->store().begin();
   return bench;
 }
 void bench_free(Bench* bench) { delete bench; }
@@ -66,23 +80,23 @@ uint32_t bench_wear(Bench* bench, uint16_t address) { return bench->eeprom.wear[
 int bench_finish(Bench* bench) {
   for (uint32_t idle = 0, before = bench->eeprom.writes; idle < 200; ++idle) {
     if (bench->eeprom.powerless) return -1;
-    bench->store.poll();
-    if (bench->eeprom.writes != before || bench->store.busy()) idle = 0;
+    bench->store().poll();
+    if (bench->eeprom.writes != before || bench->store().busy()) idle = 0;
     before = bench->eeprom.writes;
   }
-  return static_cast<int>(bench->store.result());
+  return static_cast<int>(bench->store().result());
 }
 int bench_save(Bench* bench, const char* name, const void* set) {
-  return static_cast<int>(bench->store.save(name, *static_cast<const bifa::ParameterSet*>(set)));
+  return static_cast<int>(bench->store().save(name, *static_cast<const bifa::ParameterSet*>(set)));
 }
 int bench_save_settings(Bench* bench, const uint8_t* payload) {
-  return static_cast<int>(bench->store.save_settings(payload));
+  return static_cast<int>(bench->store().save_settings(payload));
 }
-int bench_forget(Bench* bench, const char* name) { return static_cast<int>(bench->store.forget(name)); }
-int bench_erase(Bench* bench) { return static_cast<int>(bench->store.erase_all()); }
+int bench_forget(Bench* bench, const char* name) { return static_cast<int>(bench->store().forget(name)); }
+int bench_erase(Bench* bench) { return static_cast<int>(bench->store().erase_all()); }
 int bench_load(Bench* bench, const char* name, void* set) {
-  return bench->store.load(name, *static_cast<bifa::ParameterSet*>(set));
+  return bench->store().load(name, *static_cast<bifa::ParameterSet*>(set));
 }
-int bench_load_settings(Bench* bench, uint8_t* payload) { return bench->store.load_settings(payload); }
-int bench_name_at(Bench* bench, uint8_t index, char* name) { return bench->store.name_at(index, name); }
+int bench_load_settings(Bench* bench, uint8_t* payload) { return bench->store().load_settings(payload); }
+int bench_name_at(Bench* bench, uint8_t index, char* name) { return bench->store().name_at(index, name); }
 }

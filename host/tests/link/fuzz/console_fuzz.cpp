@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (input.find("echo") != std::string::npos) return 0;
   FuzzBoard board;
   board.run_ms(2);
-  board.sink.text.clear();
+  text.clear();
   size_t lines = 0;
   for (const char c : input) {
     board.send(static_cast<uint8_t>(c));
@@ -26,9 +26,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   board.run_ms(4000);
   size_t answers = 0;
-  for (size_t at = 0; at < board.sink.text.size();) {
-    const size_t end = std::min(board.sink.text.find('\n', at), board.sink.text.size());
-    const std::string line = board.sink.text.substr(at, end - at);
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    const std::string line = text.substr(at, end - at);
     answers += line.compare(0, 2, "ok") == 0 || line.compare(0, 5, "error") == 0;
     at = end + 1;
   }

@@ -4,11 +4,11 @@
 #include "fuzz_board.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  FuzzEeprom eeprom;
-  memcpy(eeprom.bytes, data, size < sizeof eeprom.bytes ? size : sizeof eeprom.bytes);
+  memset(cells, 0xFF, sizeof cells);
+  memcpy(cells, data, size < sizeof cells ? size : sizeof cells);
   // Half of the records get a right CRC, so that what comes after it is tried as well.
   for (uint8_t slot = 0; slot < bifa::kSlotCount; ++slot) {
-    uint8_t* record = eeprom.bytes + bifa::slot_address(slot);
+    uint8_t* record = cells + bifa::slot_address(slot);
     if (record[0] % 2 == 0) continue;
     record[0] = bifa::kRecordValid;
     record[1] = 1 + record[1] % 3;
@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const uint16_t check = bifa::crc16(record + 1, bytes);
     memcpy(record + 1 + bytes, &check, sizeof check);
   }
-  bifa::Store store(eeprom);
+  bifa::Store store;
   store.begin();
   const uint8_t names = store.count();
   for (uint8_t i = 0; i < names; ++i) {
@@ -34,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (store.busy()) abort();
   if (store.result() != bifa::Result::kOk) return 0;
   bifa::ParameterSet read;
-  bifa::Store again(eeprom);
+  bifa::Store again;
   again.begin();
   if (!again.load(name, read) || read.period_us != 1234567) abort();
   return 0;

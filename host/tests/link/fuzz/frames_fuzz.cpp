@@ -18,9 +18,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   board.run_ms(30);
   board.send('\n');
   board.run_ms(5);
-  board.sink.text.clear();
+  text.clear();
   for (const char c : {'v', 'e', 'r', 's', 'i', 'o', 'n', '\n'}) board.send(static_cast<uint8_t>(c));
   board.run_ms(900);
-  if (board.sink.text.find("ok\n") == std::string::npos) abort();
+  if (text.find("ok\n") == std::string::npos) abort();
   return 0;
 }

@@ -6,40 +6,36 @@
 
 #include "crc.h"
 #include "host_port.h"
+#include "output.h"
 
-class FuzzEeprom : public bifa::Eeprom {
- public:
-  FuzzEeprom() { memset(bytes, 0xFF, sizeof bytes); }
-  uint8_t read(uint16_t address) override {
-    if (address >= sizeof bytes) __builtin_trap();
-    return bytes[address];
-  }
-  void write(uint16_t address, uint8_t value) override {
-    if (address >= sizeof bytes) __builtin_trap();
-    bytes[address] = value;
-  }
-  bool busy() override { return false; }
-  uint8_t bytes[bifa::kEepromBytes];
-};
+static uint8_t cells[bifa::kEepromBytes];
+static std::string text;  ///< what came out
 
-class FuzzSink : public bifa::Sink {
- public:
-  void write(uint8_t byte) override { text.push_back(static_cast<char>(byte)); }
-  uint8_t room() const override { return 127; }
-  std::string text;
-};
-
-class FuzzValves : public bifa::ValvePins {
- public:
-  void write(bifa::ValvePattern pattern) override {
-    const uint8_t bits = pattern.bits();
-    if (bits & (bits >> 1) & 0x15) __builtin_trap();  // both valves of a chamber
-  }
-};
+namespace bifa {
+uint8_t eeprom_read(uint16_t address) {
+  if (address >= sizeof cells) __builtin_trap();
+  return cells[address];
+}
+void eeprom_write(uint16_t address, uint8_t value) {
+  if (address >= sizeof cells) __builtin_trap();
+  cells[address] = value;
+}
+bool eeprom_busy() { return false; }
+void output(uint8_t byte) { text.push_back(static_cast<char>(byte)); }
+uint8_t output_room() { return 127; }
+void set_valves(ValvePattern pattern) {
+  const uint8_t bits = pattern.bits();
+  if (bits & (bits >> 1) & 0x15) __builtin_trap();  // both valves of a chamber
+}
+}  // namespace bifa
 
 class FuzzBoard {
  public:
-  FuzzBoard() : controller(valves), port(controller, eeprom, sink) { port.begin(1, bifa::StartCause::kPower); }
+  FuzzBoard() : port(controller) {
+    memset(cells, 0xFF, sizeof cells);
+    text.clear();
+    port.begin(1, bifa::StartCause::kPower);
+  }
 
   void send(uint8_t byte) {
     if (port.byte_in_interrupt(byte)) controller.stop_in_interrupt();
@@ -58,13 +54,8 @@ class FuzzBoard {
   }
 
   /// Whether something that adds lines by itself has been switched on.
-  bool is_noisy() const {
-    return sink.text.find("[>") != std::string::npos || sink.text.find("_psi:") != std::string::npos;
-  }
+  bool is_noisy() const { return text.find("[>") != std::string::npos || text.find("_psi:") != std::string::npos; }
 
-  FuzzValves valves;
-  FuzzEeprom eeprom;
-  FuzzSink sink;
   bifa::Controller controller;
   bifa::HostPort port;
   uint32_t sent = 0;
