@@ -158,6 +158,7 @@ def march(plant, rig, run, until, tolerance):
         error = 0.0
         for i in range(STATES):
             error = max(error, abs(halves[i] - whole[i]) / _WEIGHTS[i])
+        error = max(error, _cut_short(y, first, h))
         smooth = kind == kind_first and kind == kind_second
         error /= tolerance if smooth else _ABRUPT * tolerance
         if error > 1.0 and h > SHORTEST_S:
@@ -187,6 +188,17 @@ def _accept(plant, run, smooth):
     if plant.active:
         for i in range(z.size):
             z[i] = 2.0 * run.z_halves[i] - run.z_whole[i] if smooth else run.z_halves[i]
+
+
+@merged
+def _cut_short(before, first, h):
+    """Travel that is lost where an end already rests after the first half: whole and halves agree, and are wrong."""
+    lost = 0.0
+    if first[V_HEAD] == 0.0:
+        lost = abs(before[V_HEAD])
+    if first[V_TAIL] == 0.0:
+        lost = max(lost, abs(before[V_TAIL]))
+    return 0.25 * h * lost
 
 
 @merged
