@@ -18,16 +18,23 @@ def register(app: typer.Typer) -> None:
 def console(
     port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
 ) -> None:
-    """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D leaves, with all valves off.
+    """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D or Ctrl-C leaves, with all valves off.
 
     With its input from a pipe it sends the lines one by one, prints the answers, and ends with status 1 if one was an
     error.
     """
+    from rich.console import Console
+
     from bifa.link import Uno
+    from bifa.link.terminal import settle
+    from bifa.live.ending import end_like_ctrl_c
     from bifa.rig import open_rig
 
+    end_like_ctrl_c()
     with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
-        uno.connect()
+        with Console(stderr=True).status("waiting for the Uno"):
+            uno.connect()
+            settle(uno, rig.clock)
         if sys.stdin.isatty():
             from bifa.live.interactive import converse
 

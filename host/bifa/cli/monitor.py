@@ -27,17 +27,21 @@ def monitor(
 
     from bifa.link import Uno
     from bifa.link.gait_file import read_gait_file
+    from bifa.live.ending import end_like_ctrl_c
     from bifa.live.monitor import watch
     from bifa.rig import open_rig
 
     parameters = read_gait_file(gait) if gait else {}
+    console = Console()
+    end_like_ctrl_c()
     with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
-        uno.connect()
+        with console.status("waiting for the Uno"):
+            uno.connect()
         if parameters:
             uno.upload(parameters)
         if run:
             uno.run()
         try:
-            watch(uno, rig, Console(), seconds)
+            watch(uno, rig, console, seconds)
         except KeyboardInterrupt:
             typer.echo("valves off")

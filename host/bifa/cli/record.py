@@ -30,13 +30,19 @@ def record(
     """
     from rich.console import Console
 
+    from bifa.live.ending import end_like_ctrl_c
     from bifa.live.record import record_telemetry, record_walks
     from bifa.rig import open_rig
 
     console = Console()
+    end_like_ctrl_c()
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None
         if has_instruments:
-            record_walks(rig, out, gait, cycles, repeats, console)
+            try:
+                record_walks(rig, out, gait, cycles, repeats, console)
+            except KeyboardInterrupt:
+                console.print(f"valves off; finished walks are kept in {out}: the same command goes on from there")
+                raise typer.Exit(130) from None
     if not has_instruments:
         record_telemetry(lambda: open_rig(port), out, gait, seconds, console)

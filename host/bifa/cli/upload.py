@@ -28,10 +28,12 @@ def upload(
 
     from bifa.link import Uno
     from bifa.link.gait_file import read_gait_file
+    from bifa.live.ending import end_like_ctrl_c
     from bifa.rig import open_rig
 
     parameters = read_gait_file(gait)
     console = Console()
+    end_like_ctrl_c()
     with open_rig(port) as rig:
         uno = Uno(rig.transport, rig.clock)
         try:

@@ -34,6 +34,10 @@ class Counters:
     samples: int = 0
     lost: int = 0
 
+    def text(self) -> str:
+        """As people see it everywhere."""
+        return f"samples {self.samples}  lost {self.lost}  bad frames {self.bad}  sent again {self.resent}"
+
 
 @dataclass(frozen=True)
 class Hello:
@@ -195,7 +199,7 @@ class Session:
                 if request.answer.name == "done" and request.answer["result"] != 0 and refused is None:
                     refused = RefusedError(request.name, request.answer["result"])
                     queue.clear()  # what is under way already is still carried out
-            self._raise_if_restarted()
+            self.raise_if_restarted()
             if self.clock.now() > probe_s:
                 self.transport.write(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
                 probe_s += GREET_EVERY_S
@@ -236,7 +240,8 @@ class Session:
         request.sent_s = now
         self.transport.write(request.data)
 
-    def _raise_if_restarted(self) -> None:
+    def raise_if_restarted(self) -> None:
+        """RestartedError if the Uno has greeted, and not for this session."""
         while self._hellos:
             hello = self._hellos.popleft()
             if hello.session_key != self._key:

@@ -3,6 +3,7 @@
 from bifa.link.errors import NoAnswerError
 from bifa.link.uno import Uno
 
+SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
 
 
@@ -11,14 +12,29 @@ def is_answer(line: str) -> bool:
     return line.startswith(("ok", "error"))
 
 
+def settle(uno: Uno, clock) -> None:
+    """End what may stand unfinished in the Uno's line, and drop what it answers to that."""
+    uno.session.transport.write(b"\n")
+    deadline = clock.now() + SETTLE_S
+    while clock.now() < deadline:
+        uno.session.poll(0.02)
+    lines = [line for line in uno.session.lines if not is_answer(line)]
+    uno.session.lines.clear()
+    uno.session.lines.extend(lines)
+
+
 def type_line(uno: Uno, line: str, clock) -> list[str]:
-    """Send one console line; returns the lines up to its answer, that included. Frames go on meanwhile."""
+    """Send one console line; returns the lines up to its answer, that included. Frames go on meanwhile.
+
+    Raises NoAnswerError, and RestartedError if the Uno restarts meanwhile.
+    """
     uno.session.lines.clear()
     uno.session.transport.write(line.encode("ascii", "replace") + b"\n")
     deadline = clock.now() + LONGEST_ANSWER_S
     lines: list[str] = []
     while clock.now() < deadline:
         uno.session.poll(0.02)
+        uno.session.raise_if_restarted()
         while uno.session.lines:
             lines.append(uno.session.lines.popleft())
             if is_answer(lines[-1]):

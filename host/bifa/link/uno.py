@@ -34,6 +34,11 @@ class Sample:
     phase_rad: tuple[float, float, float]
     valves: int  # bit per valve: body +, body -, head +, head -, tail +, tail -
 
+    @property
+    def connected(self) -> tuple[str, str, str]:
+        """What the valves connect each chamber to: "positive", "vacuum" or "off"."""
+        return tuple({1: "positive", 2: "vacuum"}.get(self.valves >> 2 * i & 3, "off") for i in range(3))
+
 
 @dataclass(frozen=True)
 class Status:
@@ -92,7 +97,7 @@ class Uno:
         self._streaming = False
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
-        self._plan_exchanges(self._read_set()[0]["host_timeout_s"])
+        self._read_set()
         return hello
 
     @property
@@ -122,7 +127,7 @@ class Uno:
     def _plan_exchanges(self, host_timeout_wire: int) -> None:
         timeout_s = from_wire("host_timeout_s", host_timeout_wire)
         self._exchange_every_s = min(CLOCK_EVERY_S, timeout_s / 4) if timeout_s > 0 else CLOCK_EVERY_S
-        self._next_exchange_s = self._clock.now() + self._exchange_every_s
+        self._next_exchange_s = min(self._next_exchange_s, self._clock.now() + self._exchange_every_s)
 
     # -- parameters -------------------------------------------------------------------------------------------
 
@@ -154,7 +159,6 @@ class Uno:
         self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
         if self._read_set()[0] != wanted:
             raise LinkError("the parameters read back are not those sent; upload again")
-        self._plan_exchanges(wanted["host_timeout_s"])
         if wait:
             self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
         if save is not None:
@@ -169,7 +173,9 @@ class Uno:
 
     def _read_set(self) -> tuple[dict[str, int], bool]:
         report = self.session.call("read_set")
-        return unpack_set(report["set"]), bool(report["pending"])
+        values = unpack_set(report["set"])
+        self._plan_exchanges(values["host_timeout_s"])
+        return values, bool(report["pending"])
 
     # -- presets ----------------------------------------------------------------------------------------------
 
@@ -180,7 +186,7 @@ class Uno:
     def load(self, preset: str) -> None:
         """Take the parameters of a preset."""
         self.session.call("load", _name_field(preset))
-        self._plan_exchanges(self._read_set()[0]["host_timeout_s"])
+        self._read_set()
 
     def forget(self, preset: str) -> None:
         """Delete a preset from EEPROM."""
@@ -269,11 +275,15 @@ class Uno:
         self._streaming = on
 
     def samples(self, timeout_s: float) -> list[Sample]:
-        """The samples that have arrived, waiting at most `timeout_s` for the first; keeps the link alive."""
+        """The samples that have arrived, waiting at most `timeout_s` for the first; keeps the link alive.
+
+        Raises RestartedError as soon as the Uno says that it restarted.
+        """
         deadline = self._clock.now() + timeout_s
         self.keep_alive()
         while not self._samples and (left := deadline - self._clock.now()) > 0:
             self.session.poll(min(left, self._exchange_every_s))
+            self.session.raise_if_restarted()
             self.keep_alive()
         samples = list(self._samples)
         self._samples.clear()

@@ -1,6 +1,7 @@
 """Recording: walks on a rig with instruments, telemetry on a bare Uno."""
 
 import csv
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -9,11 +10,13 @@ from rich.console import Console
 from rich.progress import Progress
 
 from bifa.errors import BifaError
-from bifa.link import Counters, LinkError, Sample, Uno
+from bifa.link import NoAnswerError, RestartedError, Sample, Uno
 from bifa.link.gait_file import read_gait_file
 from bifa.link.table import CHAMBERS
+from bifa.rig import RigError
 
 RETRY_S = 1.0
+GONE = (ConnectionError, NoAnswerError, RestartedError, RigError)  # RigError: no Uno is plugged in
 HEADER = [
     "time_s",
     "host_time_s",
@@ -27,10 +30,6 @@ HEADER = [
 
 class RecordError(BifaError):
     """A recording cannot be made there."""
-
-
-def _link_text(counters: Counters) -> str:
-    return f"samples {counters.samples}  lost {counters.lost}  bad frames {counters.bad}  sent again {counters.resent}"
 
 
 def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
@@ -53,7 +52,7 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
             writer.add(
                 Trial(trial.file, "locomotion", walk.columns, gait=trial.gait, repeat=repeat, session_order=repeat)
             )
-            progress.console.print(f"walk {repeat}: {_link_text(uno.counters)}")
+            progress.console.print(f"walk {repeat}: {uno.counters.text()}")
     writer.finish()
     console.print(
         f"{out}: {repeats} walks of {cycles} cycles, firmware {hello.firmware}; look at it with: bifa check {out}"
@@ -68,22 +67,26 @@ def record_telemetry(
     if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
         raise RecordError(f"{out} holds something else; name a new folder")
     out.mkdir(parents=True, exist_ok=True)
-    end_s = None if duration_s is None else time.monotonic() + duration_s
+    end_s = math.inf if duration_s is None else time.monotonic() + duration_s
+    waiting = f"when the Uno is back, it {'walks and records' if parameters else 'records'} on (Ctrl-C ends)"
+    is_told = False
     try:
-        while end_s is None or time.monotonic() < end_s:
+        while time.monotonic() < end_s:
             path = out / f"telemetry_{1 + len(list(out.glob('telemetry_*.csv')))}.csv"
             try:
                 _record_until_gone(open_rig, path, parameters, end_s, console)
-            except (ConnectionError, LinkError) as error:
-                console.print(f"{error}\nwhat was recorded is in {out}; waiting for the Uno (Ctrl-C ends)")
+            except GONE as error:
+                if path.exists() or not is_told:
+                    console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
+                    is_told = True
                 time.sleep(RETRY_S)
     except KeyboardInterrupt:
-        console.print("ended; valves off")
+        console.print("ended")
     console.print(f"{out} holds the telemetry; a data set needs the displacement from your own instrument beside it")
 
 
 def _record_until_gone(
-    open_rig: Callable, path: Path, parameters: dict[str, float], end_s: float | None, console: Console
+    open_rig: Callable, path: Path, parameters: dict[str, float], end_s: float, console: Console
 ) -> None:
     with open_rig() as rig, Uno(rig.transport, rig.clock) as uno:
         uno.connect()
@@ -92,14 +95,16 @@ def _record_until_gone(
         uno.stream(True)
         if parameters:
             uno.run()
-        with path.open("x", newline="") as file, console.status("recording") as status:
-            writer = csv.writer(file)
-            writer.writerow(HEADER)
-            while end_s is None or time.monotonic() < end_s:
-                writer.writerows(_row(uno, sample) for sample in uno.samples(0.5))
-                file.flush()
-                status.update(f"recording  {_link_text(uno.counters)}")
-        console.print(f"{path}: {_link_text(uno.counters)}")
+        try:
+            with path.open("x", newline="") as file, console.status("recording") as status:
+                writer = csv.writer(file)
+                writer.writerow(HEADER)
+                while time.monotonic() < end_s:
+                    writer.writerows(_row(uno, sample) for sample in uno.samples(0.5))
+                    file.flush()
+                    status.update(f"recording  {uno.counters.text()}")
+        finally:
+            console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
 
 
 def _row(uno: Uno, sample: Sample) -> list:

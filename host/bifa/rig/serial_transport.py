@@ -28,7 +28,7 @@ class SerialTransport:
         try:
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from error
+            raise self._gone() from error
 
     def read(self, timeout_s: float) -> bytes:
         """See Transport."""
@@ -37,7 +37,7 @@ class SerialTransport:
             first = self._port.read(1)
             return first + self._port.read(self._port.in_waiting) if first else b""
         except (serial.SerialException, OSError, TypeError) as error:  # pyserial: TypeError when closed meanwhile
-            raise self._gone(error) from error
+            raise self._gone() from error
 
     def reset(self) -> None:
         """Pulse DTR, which is wired to the Uno's reset; where there is no DTR (a pty), do nothing."""
@@ -53,5 +53,5 @@ class SerialTransport:
         """See Transport."""
         self._port.close()
 
-    def _gone(self, error: Exception) -> PortGoneError:
-        return PortGoneError(f"{self.device} is gone ({error}); plug the Uno in again and repeat the command")
+    def _gone(self) -> PortGoneError:
+        return PortGoneError(f"{self.device} is gone; plug the Uno in again")

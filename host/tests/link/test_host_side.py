@@ -1,19 +1,9 @@
 """The host's own part: units, gait files, versions, ports, the commands."""
 
-import contextlib
-import os
-import pty
 import random
-import threading
-import time
 from decimal import Decimal
 
 import pytest
-from board import Board
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from typer.testing import CliRunner
-
 from bifa.cli import app
 from bifa.link import MismatchError, NoAnswerError, ParameterError, PortGoneError, Uno
 from bifa.link.clock_relation import ClockRelation
@@ -21,8 +11,13 @@ from bifa.link.frames import Report
 from bifa.link.gait_file import read_gait_file
 from bifa.link.table import PARAMETERS, TABLE_HASH
 from bifa.link.units import from_wire, to_wire
-from bifa.live.interactive import words_after
 from bifa.rig import RigError, SerialRig, open_rig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from board import Board
+from pty_uno import PtyUno
 
 GAIT = (
     "period_s = 2.72\npsi12_deg = 204.5\npsi13_deg = 331.7\nduty_body = 0.6535\nduty_head = 0.439\nduty_tail = 0.439\n"
@@ -131,55 +126,11 @@ def test_the_clock_relation_keeps_its_bound(drift, offset_s, seed):
         assert abs(relation.estimate(uno_s) - host.time_s) <= host.bound_s + 0.01
 
 
-def test_completion_knows_the_grammar():
-    assert "hold" in words_after([], [])
-    assert words_after(["hold"], []) == ["body", "head", "tail"]
-    assert words_after(["hold", "body"], []) == ["off", "vacuum", "positive"]
-    assert words_after(["load"], ["baseline", "fast"]) == ["baseline", "fast"]
-    assert words_after(["set", "period_s"], []) == []
-
-
 def test_wrong_ports_are_named():
     with pytest.raises(RigError, match="virtuall"):
         open_rig("virtuall")
     with pytest.raises(PortGoneError, match="/dev/does-not-exist"):
         open_rig("/dev/does-not-exist")
-
-
-class PtyUno:
-    """The Uno's code behind a pty, in real time as far as it matters."""
-
-    def __init__(self) -> None:
-        self.master, slave = pty.openpty()
-        self.device = os.ttyname(slave)
-        self._slave = slave
-        self.board = Board()
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
-
-    def _serve(self) -> None:
-        os.set_blocking(self.master, False)
-        while not self._ended.is_set():
-            with contextlib.suppress(OSError):
-                self.board.write(os.read(self.master, 4096))
-            self.board.sleep(0.002)
-            data = self.board.receive()
-            if data:
-                os.write(self.master, data)
-            self._ended.wait(0.002)
-
-    def wait(self, duration_s: float) -> None:
-        """Until so much of the board's own time has passed."""
-        end_s = self.board.now() + duration_s
-        while self.board.now() < end_s:
-            time.sleep(0.01)
-
-    def unplug(self) -> None:
-        self._ended.set()
-        self._thread.join()
-        os.close(self._slave)
-        os.close(self.master)
 
 
 def test_a_serial_port_exclusive_and_unplugged():

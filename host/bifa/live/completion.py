@@ -1,0 +1,74 @@
+"""What may come next in a console line, each with a few words beside it: a parameter's meaning, range and value."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from prompt_toolkit.completion import Completer, Completion
+
+from bifa.link.table import CHAMBER_STATES, CHAMBERS, CONSOLE_COMMANDS, PARAMETERS
+from bifa.link.units import BY_NAME, range_text
+
+ON_OFF = {"on": "", "off": ""}
+SECOND = {
+    "stream": ON_OFF,
+    "plot": ON_OFF,
+    "echo": ON_OFF,
+    "hold": dict.fromkeys(CHAMBERS, ""),
+    "defaults": {"confirm": "erases everything saved"},
+    "zero": {"confirm": "take the present pressures as zero", "factory": "undo that"},
+}
+
+
+@dataclass
+class Known:
+    """What the Uno last said about itself; presets: True for saved ones, False for those from the factory."""
+
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    presets: Mapping[str, bool] = field(default_factory=dict)
+
+
+def words_after(words: list[str], known: Known) -> dict[str, str]:
+    """What may follow the complete words of a line, and what is worth knowing about each."""
+    parameters = {p.name: f"{p.help}; {_range_and_value(p.name, known)}" for p in PARAMETERS}
+    commands = {name: text for name, _, text in CONSOLE_COMMANDS}
+    presets = {name: "saved" if is_saved else "factory" for name, is_saved in known.presets.items()}
+    match words:
+        case []:
+            return commands
+        case ["help"]:
+            return commands | parameters
+        case ["show" | "set"]:
+            return parameters
+        case ["set", name] if name in known.parameters:
+            return {f"{known.parameters[name]:.10g}": f"now; {range_text(BY_NAME[name])}"}
+        case ["load"]:
+            return presets
+        case ["save" | "forget"]:
+            return {name: "saved" for name, is_saved in known.presets.items() if is_saved}
+        case ["hold", chamber] if chamber in CHAMBERS:
+            return dict.fromkeys(CHAMBER_STATES, "")
+        case [command]:
+            return SECOND.get(command, {})
+        case _:
+            return {}
+
+
+def _range_and_value(name: str, known: Known) -> str:
+    value = f", now {known.parameters[name]:.10g}" if name in known.parameters else ""
+    return range_text(BY_NAME[name]) + value
+
+
+class LineCompleter(Completer):
+    """words_after() for prompt_toolkit."""
+
+    def __init__(self, known: Known) -> None:
+        self._known = known
+
+    def get_completions(self, document, complete_event):
+        """See Completer."""
+        before = document.text_before_cursor
+        words = before.split()
+        begun = "" if not words or before.endswith(" ") else words.pop()
+        for word, meta in words_after(words, self._known).items():
+            if word.startswith(begun):
+                yield Completion(word, start_position=-len(begun), display_meta=meta)

@@ -1,0 +1,47 @@
+"""The Uno's own code (board_harness.cpp) behind a pseudo-terminal: a serial port for whole programs."""
+
+import contextlib
+import os
+import pty
+import threading
+import time
+
+from board import Board
+
+
+class PtyUno:
+    """The Uno's code behind a pty, in real time as far as it matters."""
+
+    def __init__(self) -> None:
+        self.master, slave = pty.openpty()
+        self.device = os.ttyname(slave)
+        self._slave = slave
+        self.board = Board()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        os.set_blocking(self.master, False)
+        while not self._ended.is_set():
+            with contextlib.suppress(OSError):
+                self.board.write(os.read(self.master, 4096))
+            self.board.sleep(0.002)
+            data = self.board.receive()
+            with contextlib.suppress(BlockingIOError):  # nobody reads: a real port would lose bytes as well
+                os.write(self.master, data)
+            self._ended.wait(0.002)
+
+    def wait(self, duration_s: float) -> None:
+        """Until so much of the board's own time has passed."""
+        end_s = self.board.now() + duration_s
+        while self.board.now() < end_s:
+            time.sleep(0.01)
+
+    def unplug(self) -> None:
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        self._thread.join()
+        os.close(self._slave)
+        os.close(self.master)

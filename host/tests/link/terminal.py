@@ -1,0 +1,63 @@
+"""A person at a terminal of 80 columns in front of a program of bifa: sees the screen, presses keys."""
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Callable
+
+import pexpect
+import pyte
+
+PATIENCE_S = 60  # other tests may keep the computer busy
+
+
+class Terminal:
+    """`bifa` with the arguments given, from the start to __exit__."""
+
+    def __init__(self, folder, *arguments: str) -> None:
+        """`folder` keeps the history."""
+        environment = {**os.environ, "TERM": "xterm", "XDG_STATE_HOME": str(folder)}
+        self.program = pexpect.spawn(
+            sys.executable, ["-m", "bifa", *arguments], env=environment, dimensions=(24, 80), encoding="utf-8"
+        )
+        self._screen = pyte.Screen(80, 24)
+        self._screen.write_process_input = self.program.send  # where the cursor is, when asked
+        self._stream = pyte.Stream(self._screen)
+
+    def __enter__(self) -> "Terminal":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.program.close(force=True)
+
+    def look(self) -> list[str]:
+        """The lines of the screen as they are now."""
+        with contextlib.suppress(pexpect.TIMEOUT, pexpect.EOF):
+            while True:
+                self._stream.feed(self.program.read_nonblocking(65536, timeout=0.02))
+        return [line.rstrip() for line in self._screen.display]
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Look on until something is so."""
+        deadline = time.monotonic() + PATIENCE_S
+        while not condition():
+            lines = self.look()
+            assert time.monotonic() < deadline, "\n".join(lines)
+
+    def sees(self, *texts: str) -> None:
+        """Wait until each of the texts stands somewhere on the screen."""
+        self.until(lambda: all(any(text in line for line in self.look()) for text in texts))
+
+    def sees_line(self, line: str) -> None:
+        """Wait until a whole line of the screen is `line`."""
+        self.until(lambda: line in self.look())
+
+    def presses(self, keys: str) -> None:
+        self.program.send(keys)
+
+    def exit_status(self) -> int:
+        """Wait for the end."""
+        self.until(lambda: not self.program.isalive())
+        self.look()
+        return self.program.exitstatus

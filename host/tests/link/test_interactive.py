@@ -1,0 +1,198 @@
+"""`bifa console` in a terminal, against the Uno's own code: what a person sees, and what becomes of the robot."""
+
+import math
+import signal
+import time
+from types import SimpleNamespace
+
+import pytest
+from bifa.link import Counters, Sample
+from bifa.live.completion import Known, words_after
+from bifa.live.interactive import status_lines
+
+from pty_uno import PtyUno
+from terminal import Terminal
+
+UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
+KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})
+
+
+@pytest.fixture
+def uno():
+    uno = PtyUno()
+    yield uno
+    uno.unplug()
+
+
+@pytest.fixture
+def console(uno, tmp_path):
+    with Terminal(tmp_path, "console", "--port", uno.device) as terminal:
+        terminal.sees("type help; Tab completes", "uno>", "idle", "link: samples")
+        yield terminal
+
+
+def enters(console: Terminal, line: str, *answers: str, keys: str = "") -> None:
+    """Type a line (or the keys that make it); wait until it stands on the screen, and under it what is expected."""
+
+    def is_answered() -> bool:
+        lines = console.look()
+        at = max((i for i, shown in enumerate(lines) if shown == f"uno> {line}"), default=None)
+        return at is not None and lines[at + 1 : at + 1 + len(answers)] == list(answers)
+
+    console.presses((keys or line) + ENTER)
+    console.until(is_answered)
+
+
+def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
+    console.presses("help" + ENTER)
+    console.sees("[save [NAME]  keep", "[load PRESET", "[parameters: period_s", "[try: set period_s 6, run")
+    enters(console, "help period_s", "[period_s  time of one cycle (1/f)", "[range 0.5 to 60 s, default 5.7, now 5.7")
+    enters(console, "set period_s 4", "ok")
+    enters(console, "run", "ok")
+    console.sees(" running  psi: body", "vacuum    tail", "positive")
+    enters(console, "set period_s 400", "error out of range; period_s is 0.5 to 60 s")
+    enters(console, "show period_s", "[period_s 4", "ok")
+    enters(console, "save fast", "ok")
+    enters(console, "stop", "ok")
+    console.sees(" idle ")
+    enters(console, "load baseline", "ok")
+    enters(console, "load fast", "ok")
+    enters(console, "show period_s", "[period_s 4", "ok")
+    console.presses(CTRL_D)
+    assert console.exit_status() == 0
+
+
+def test_completion_shows_what_a_parameter_means_and_what_it_is_now(console, uno):
+    console.presses("set per")
+    console.sees("period_s  time of one cycle (1/f); 0.5 to 60 s, now 5.7")
+    enters(console, "set period_s 3", "ok", keys=TAB + " 3")
+    console.presses("set period_s ")
+    console.sees("3      now; 0.5 to 60 s")
+    enters(console, "set period_s 7", "ok", keys="7")
+    enters(console, "save slow-one", "ok")
+    enters(console, "load baseline", "ok")
+    console.presses("load slo")
+    console.sees("slow-one  saved")
+    console.presses(TAB)
+    console.sees_line("uno> load slow-one")
+    enters(console, "load slow-one", "ok", keys=" ")
+    enters(console, "show period_s", "[period_s 7", "ok")
+
+
+def test_completion_knows_the_grammar():
+    assert words_after([], KNOWN)["hold"] == "inflate, evacuate or vent body, head or tail"
+    assert list(words_after(["hold"], KNOWN)) == ["body", "head", "tail"]
+    assert list(words_after(["hold", "body"], KNOWN)) == ["off", "vacuum", "positive"]
+    assert words_after(["load"], KNOWN) == {"baseline": "factory", "fast": "saved"}
+    assert words_after(["forget"], KNOWN) == {"fast": "saved"}
+    assert words_after(["set"], KNOWN)["period_s"] == "time of one cycle (1/f); 0.5 to 60 s, now 2.720001"
+    assert words_after(["set", "period_s"], KNOWN) == {"2.720001": "now; 0.5 to 60 s"}
+    assert words_after(["set", "speed"], KNOWN) == words_after(["run"], KNOWN) == {}
+
+
+def test_history_outlasts_the_program(console, uno, tmp_path):
+    enters(console, "set period_s 9", "ok")
+    console.presses(CTRL_D)
+    assert console.exit_status() == 0
+    with Terminal(tmp_path, "console", "--port", uno.device) as again:
+        again.sees("uno>", "link: samples")
+        again.presses(UP)
+        again.sees_line("uno> set period_s 9")
+
+
+def test_a_stop_acts_as_it_is_pressed_also_while_the_uno_erases(console, uno):
+    enters(console, "save one", "ok")
+    enters(console, "run", "ok")
+    console.until(lambda: uno.board.valves != 0)
+    console.presses("defaults confirm" + ENTER + "!")
+    console.until(lambda: uno.board.state == "stopped")
+    assert uno.board.valves == 0
+    assert "ok" not in console.look()[-8:]
+    console.sees("[stopped: all valves off until clear", " stopped ")
+    enters(console, "clear", "ok")
+
+
+def close_window(console: Terminal) -> None:
+    console.program.ptyproc.delayafterclose = 3  # before pexpect kills
+    console.program.close(force=False)
+
+
+@pytest.mark.parametrize(
+    "leave",
+    [
+        lambda console: console.presses(CTRL_C),
+        lambda console: console.presses(CTRL_D),
+        lambda console: console.presses("a line begun" + CTRL_C),
+        lambda console: console.program.kill(signal.SIGTERM),
+        lambda console: close_window(console),
+    ],
+    ids=["ctrl-c", "ctrl-d", "ctrl-c in a line", "kill", "window closed"],
+)
+def test_leaving_turns_the_valves_off(console, uno, leave):
+    enters(console, "run", "ok")
+    console.until(lambda: uno.board.valves != 0)
+    leave(console)
+    if not console.program.closed:
+        assert console.exit_status() == 0
+    uno.wait(0.05)
+    assert (uno.board.valves, uno.board.state) == (0, "stopped")
+
+
+def test_unplugged_is_said_at_once(console, uno):
+    enters(console, "run", "ok")
+    uno.unplug()
+    console.sees(f"error: {uno.device} is gone; plug the Uno in again")
+    assert console.exit_status() == 2
+
+
+def test_a_restarted_uno_is_said_and_the_conversation_goes_on(console, uno):
+    enters(console, "set period_s 4", "ok")
+    uno.board.reset()
+    console.sees("-- the Uno restarted, all valves off; connected again, with its start preset")
+    enters(console, "show period_s", "[period_s 5.7", "ok")
+    console.sees(" idle ")
+
+
+def test_an_open_console_keeps_host_timeout_s_from_venting_and_its_end_does_not(console, uno):
+    enters(console, "set host_timeout_s 0.4", "ok")
+    enters(console, "run", "ok")
+    uno.wait(1.5)
+    assert uno.board.state == "running"
+    console.program.kill(signal.SIGKILL)
+    uno.wait(0.5)
+    assert (uno.board.valves, uno.board.state) == (0, "fault")
+
+
+def test_several_lines_pasted_are_answered_in_order(console):
+    console.presses("\x1b[200~set period_s 3\nshow period_s\nset duty_body 2\x1b[201~" + ENTER)
+    console.sees("[period_s 3", "error out of range; duty_body is 0 to 1")
+
+
+def test_the_status_lines_fit_and_tell_old_telemetry():
+    sample = Sample(1, 1, "stopped", (-13.0, -13.0, -13.0), (math.nan,) * 3, (0.0, 0.0, 0.0), 0b011001)
+    counters = Counters(bad=2, resent=3, samples=1234567, lost=45)
+    conversation = SimpleNamespace(
+        latest=SimpleNamespace(sample=sample, warning=""), uno=SimpleNamespace(counters=counters)
+    )
+    robot, link = "".join(text for _, text in status_lines(conversation)).split("\n")
+    assert robot == " stopped  psi: body -13.00 positive  head -13.00 vacuum    tail -13.00 positive"
+    assert len(robot) <= 80
+    assert link.rstrip() == " link: samples 1234567  lost 45  bad frames 2  sent again 3"
+    conversation.latest.warning = "no telemetry for 3 s"
+    assert "no telemetry for 3 s" in status_lines(conversation)[-1][1]
+
+
+@pytest.mark.uno
+def test_the_virtual_robot_keeps_to_the_wall_clock(tmp_path):
+    with Terminal(tmp_path, "console", "--port", "virtual") as console:
+        console.sees("uno>", "link: samples")
+
+        def samples() -> int:
+            console.look()
+            return next(int(line.split()[2]) for line in console.look() if line.startswith(" link: samples"))
+
+        enters(console, "run", "ok")
+        before, began_s = samples(), time.monotonic()
+        time.sleep(3)
+        shown_a_second = (samples() - before) / (time.monotonic() - began_s)
+        assert 50 < shown_a_second < 120

@@ -1,0 +1,133 @@
+"""`bifa monitor` and `bifa record` against the Uno's own code: what is seen, and what is kept when the port goes."""
+
+import _thread
+import csv
+import io
+import math
+import signal
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+from bifa.link import Sample, Uno
+from bifa.live.monitor import Monitor, watch
+from bifa.live.record import record_telemetry
+from bifa.rig import RigError, SerialRig
+from rich.console import Console
+
+from board import Board
+from pty_uno import PtyUno
+from terminal import Terminal
+
+GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
+
+
+@pytest.fixture
+def uno():
+    uno = PtyUno()
+    yield uno
+    uno.unplug()
+
+
+def test_the_monitor_shows_the_robot_and_ctrl_c_turns_the_valves_off(uno, tmp_path):
+    path = tmp_path / "gait.toml"
+    path.write_text(GAIT)
+    with Terminal(tmp_path, "monitor", "--port", uno.device, "--gait", str(path), "--run") as terminal:
+        terminal.sees("running", "positive", "vacuum", "●", "samples", "lost 0  bad frames 0")
+        terminal.presses("\x03")
+        assert terminal.exit_status() == 0
+        terminal.sees_line("valves off")
+        terminal.sees("running", "lost 0")  # the last picture stays
+    assert (uno.board.valves, uno.board.state) == (0, "stopped")
+
+
+def test_the_monitor_says_that_the_port_is_gone(uno, tmp_path):
+    with Terminal(tmp_path, "monitor", "--port", uno.device) as terminal:
+        terminal.sees("idle")
+        uno.unplug()
+        assert terminal.exit_status() == 2
+        terminal.sees(f"error: {uno.device} is gone")
+
+
+def test_the_trace_is_as_long_as_it_says():
+    board, shown = Board(), io.StringIO()
+    uno = Uno(board, board)
+    uno.connect()
+    watch(uno, SimpleNamespace(clock=board), Console(file=shown, width=80), 1.0)
+    body = next(line for line in shown.getvalue().splitlines() if "body" in line)
+    assert "last 2.4 s" in shown.getvalue()
+    assert body.count("▄") == 10  # one block, at 0 psi, each tenth of a second
+
+
+def test_the_picture_is_that_of_the_sample():
+    counters = SimpleNamespace(text=lambda: "samples 5  lost 3")
+    monitor = Monitor(SimpleNamespace(counters=counters))
+    monitor.take([Sample(5, 12_300_000, "holding", (-15.0, 0.0, 14.5), (0.0,) * 3, (0.0, math.pi, 6.2), 0b011000)])
+    shown = io.StringIO()
+    Console(file=shown, width=80).print(monitor.draw())
+    lines = [" ".join(line.strip("│ ").split()) for line in shown.getvalue().splitlines()]
+    assert "holding 12.3 s" in lines
+    assert "body -15.000 off ●·········" in lines
+    assert "head +0.000 ▄ vacuum ·····●····" in lines
+    assert "tail +14.500 █ positive ·········●" in lines
+    assert "samples 5 lost 3" in lines
+
+
+def rows(path) -> list[dict]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def lost(recorded: list[dict]) -> int:
+    return int(recorded[-1]["sequence"]) - int(recorded[0]["sequence"]) + 1 - len(recorded)
+
+
+def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
+    unos, refusals, told = [PtyUno(), PtyUno()], [RigError("no Uno is plugged in")], io.StringIO()
+    files = [tmp_path / f"out/telemetry_{n}.csv" for n in (1, 2)]
+    opened = []
+
+    def open_rig() -> SerialRig:
+        if opened and refusals:
+            raise refusals.pop()
+        opened.append(unos[len(opened)])
+        return SerialRig(opened[-1].device)
+
+    def person() -> None:
+        """Pulls the cable of the first Uno, and presses Ctrl-C while the second records."""
+        for path, act in zip(files, (unos[0].unplug, _thread.interrupt_main), strict=True):
+            while not path.exists() or len(rows(path)) < 50:
+                time.sleep(0.1)
+            act()
+
+    threading.Thread(target=person, daemon=True).start()
+    record_telemetry(open_rig, tmp_path / "out", None, 120.0, Console(file=told, width=200))
+    text = told.getvalue()
+    assert f"{unos[0].device} is gone; plug the Uno in again" in text
+    assert f"what was recorded is in {tmp_path / 'out'}; when the Uno is back, it records on" in text
+    assert text.count("when the Uno is back") == 1
+    for path in files:
+        recorded = rows(path)
+        assert len(recorded) >= 50
+        assert f"{path}: samples {len(recorded)}  lost {lost(recorded)}  bad frames" in text
+    unos[1].wait(0.05)
+    assert unos[1].board.state == "stopped"
+    unos[1].unplug()
+
+
+def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, tmp_path):
+    path, out = tmp_path / "gait.toml", tmp_path / "out"
+    path.write_text(GAIT)
+    arguments = ["record", str(out), "--port", uno.device, "--gait", str(path)]
+    with Terminal(tmp_path, *arguments) as terminal:
+        terminal.sees("recording  samples 1")
+        terminal.until(lambda: uno.board.valves != 0)
+        terminal.program.kill(signal.SIGTERM)
+        terminal.exit_status()
+        terminal.sees("ended", "samples")
+    uno.wait(0.05)
+    assert (uno.board.valves, uno.board.state) == (0, "stopped")
+    recorded = rows(out / "telemetry_1.csv")
+    assert len(recorded) > 10
+    assert {row["state"] for row in recorded} == {"running"}
