@@ -6,11 +6,11 @@ import subprocess
 import sys
 
 import pytest
-from bifa.link import Uno
-
 from board import Board
 from link_native import HERE
 from pty_uno import PtyUno
+
+from bifa.link import Uno
 
 
 class Mortal:

@@ -7,13 +7,13 @@ never another.
 import random
 
 import pytest
-from bifa.link import LinkError, NoAnswerError, RestartedError, Uno
-from bifa.link.table import PARAMETERS
-from bifa.link.units import from_wire, to_wire
-
 from board import Board
 from chip import Chip
 from faulty_line import FaultyLine
+
+from bifa.link import LinkError, NoAnswerError, RestartedError, Uno
+from bifa.link.table import PARAMETERS
+from bifa.link.units import from_wire, to_wire
 
 RATES = (1e-4, 1e-3, 1e-2, 1e-1)
 BASELINE = {p.name: p.default for p in PARAMETERS}

@@ -6,12 +6,12 @@ import struct
 
 import cobs.cobs
 import pytest
-from bifa.link import frames
-from bifa.link.table import COMMANDS, REPORTS
 from hypothesis import given
 from hypothesis import strategies as st
-
 from link_native import load
+
+from bifa.link import frames
+from bifa.link.table import COMMANDS, REPORTS
 
 ffi, lib = load(
     "frame_harness.cpp",

@@ -11,10 +11,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from link_native import BUILD, HERE, ROOT
+
 from bifa.link import frames
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS
-
-from link_native import BUILD, HERE, ROOT
 
 TARGETS = ("frames", "console", "eeprom")
 FLAGS = ["-std=gnu++11", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=undefined"]

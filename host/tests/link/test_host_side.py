@@ -4,6 +4,12 @@ import random
 from decimal import Decimal
 
 import pytest
+from board import Board
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pty_uno import PtyUno
+from typer.testing import CliRunner
+
 from bifa.cli import app
 from bifa.link import MismatchError, NoAnswerError, ParameterError, PortGoneError, Uno
 from bifa.link.clock_relation import ClockRelation
@@ -12,12 +18,6 @@ from bifa.link.gait_file import read_gait_file
 from bifa.link.table import PARAMETERS, TABLE_HASH
 from bifa.link.units import from_wire, to_wire
 from bifa.rig import RigError, SerialRig, open_rig
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from typer.testing import CliRunner
-
-from board import Board
-from pty_uno import PtyUno
 
 GAIT = (
     "period_s = 2.72\npsi12_deg = 204.5\npsi13_deg = 331.7\nduty_body = 0.6535\nduty_head = 0.439\nduty_tail = 0.439\n"

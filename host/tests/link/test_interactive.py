@@ -6,12 +6,12 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from pty_uno import PtyUno
+from terminal import Terminal
+
 from bifa.link import Counters, Sample
 from bifa.live.completion import Known, words_after
 from bifa.live.interactive import status_lines
-
-from pty_uno import PtyUno
-from terminal import Terminal
 
 UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
 KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})

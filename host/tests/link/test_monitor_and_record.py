@@ -10,15 +10,15 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from board import Board
+from pty_uno import PtyUno
+from rich.console import Console
+from terminal import Terminal
+
 from bifa.link import Sample, Uno
 from bifa.live.monitor import Monitor, watch
 from bifa.live.record import record_telemetry
 from bifa.rig import RigError, SerialRig
-from rich.console import Console
-
-from board import Board
-from pty_uno import PtyUno
-from terminal import Terminal
 
 GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
 

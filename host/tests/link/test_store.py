@@ -5,12 +5,12 @@ import random
 import struct
 
 import pytest
-from bifa.link.table import PRESETS, RESULTS
-from bifa.link.units import pack_set
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from link_native import load
+
+from bifa.link.table import PRESETS, RESULTS
+from bifa.link.units import pack_set
 
 SIZE, SLOT, SLOTS = 1024, 48, 21
 BLANK = b"\xff" * SIZE

@@ -5,11 +5,11 @@ import subprocess
 import sys
 
 import pytest
+from link_native import ROOT
+
 from bifa.data.layout import GAIT_OPTIONAL_RANGES, GAIT_RANGES
 from bifa.link import table
 from bifa.link.units import from_wire, range_text
-
-from link_native import ROOT
 
 
 def test_generated_files_are_up_to_date():
