@@ -3,6 +3,7 @@
 Cycle counts are exact and repeat; the stack is measured by painting; flash and RAM come from the image.
 """
 
+import configparser
 import itertools
 import struct
 import subprocess
@@ -84,6 +85,13 @@ def stimulate(board: Board, seconds: float) -> None:
             return
 
 
+def build_flags() -> list[str]:
+    """The project's own flags of the image."""
+    settings = configparser.ConfigParser(interpolation=None)
+    settings.read(PROJECT / "platformio.ini")
+    return [flag for flag in settings["env:uno"]["build_flags"].split() if flag.startswith("-")]
+
+
 def cycles_of(source: str, seconds: float, *definitions: str) -> tuple[int, float, int]:
     """Least, mean and most cycles of a step, compiled as the firmware is."""
     with tempfile.TemporaryDirectory() as folder:
@@ -91,8 +99,8 @@ def cycles_of(source: str, seconds: float, *definitions: str) -> tuple[int, floa
         includes = [f"-I{path}" for path in sorted((PROJECT / "lib").iterdir())]
         sources = [*(PROJECT / "lib/cpg").glob("*.cpp"), *(PROJECT / "lib/parameters").glob("*.cpp")]
         sources += (PROJECT / "lib/flash").glob("*.cpp")
-        flags = "-mmcu=atmega328p -DF_CPU=16000000UL -Os -flto -std=gnu++11 -ffunction-sections -mcall-prologues"
-        command = ["avr-g++", *flags.split(), "-Wl,--gc-sections", "-Wl,--relax", *definitions, *includes]
+        flags = "-mmcu=atmega328p -DF_CPU=16000000UL -Os -flto -std=gnu++11 -ffunction-sections -Wl,--gc-sections"
+        command = ["avr-g++", *flags.split(), *build_flags(), *definitions, *includes]
         subprocess.run([*command, SOURCES / source, *sources, "-lm", "-o", image], check=True)
         board = Board(image)
         board.run_for(seconds)

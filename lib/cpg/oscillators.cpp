@@ -37,7 +37,7 @@ void Oscillators::place(uint32_t body, uint32_t head, uint32_t tail) {
   body_ = body + gait_.increment / 2;
   head_error_ = head - body - gait_.psi12;
   tail_error_ = tail - body - gait_.psi13;
-  last_.body = kNoLast;
+  motion_ = Motion::kBegins;
   fraction_ = 0;
 }
 
@@ -45,7 +45,7 @@ void Oscillators::settle() {
   body_ = gait_.increment / 2;
   head_error_ = kHalfStep;
   tail_error_ = kHalfStep;
-  last_.body = kNoLast;
+  motion_ = Motion::kBegins;
 }
 
 uint32_t Oscillators::phase(uint8_t chamber) const {
@@ -70,21 +70,27 @@ BIFA_INLINE uint32_t Oscillators::advance(int16_t pull, int16_t last) const {
 
 /// Lets the oscillators pull at each other for a step; returns by how much that moves the body.
 BIFA_INLINE uint32_t Oscillators::couple() {
+  if (motion_ == Motion::kSettled) return 0;
   const uint16_t head_error = upper(head_error_);
   const uint16_t tail_error = upper(tail_error_);
-  if ((head_error | tail_error | last_.body | last_.head) == 0) return 0;  // settled: nothing pulls
   const Pulls now = pulls(head_error, tail_error);
-  if (last_.body == kNoLast) last_ = now;
+  if (motion_ == Motion::kBegins) last_ = now;
+  motion_ = Motion::kGoesOn;
+  if ((head_error | tail_error) == 0 && (last_.body | last_.head) == 0) motion_ = Motion::kSettled;
   uint32_t body = advance(now.body, last_.body);
   uint32_t head = advance(now.head, last_.head);
   last_ = now;
-  for (int8_t n = gait_.doublings; n > 0; --n) {
-    body += body;
-    head += head;
-  }
-  for (int8_t n = gait_.doublings; n < 0; ++n) {
-    body = static_cast<uint32_t>(static_cast<int32_t>(body) >> 1);
-    head = static_cast<uint32_t>(static_cast<int32_t>(head) >> 1);
+  int8_t n = gait_.doublings;
+  if (n > 0) {
+    do {
+      body += body;
+      head += head;
+    } while (--n != 0);
+  } else {
+    for (; n < 0; ++n) {
+      body = static_cast<uint32_t>(static_cast<int32_t>(body) >> 1);
+      head = static_cast<uint32_t>(static_cast<int32_t>(head) >> 1);
+    }
   }
   // The pulls add up to nothing, so the tail's is -(body + head), and the mean of the phases runs at exactly f.
   head_error_ += head - body;
@@ -93,15 +99,16 @@ BIFA_INLINE uint32_t Oscillators::couple() {
 }
 
 void Oscillators::step() {
-  const uint8_t fraction = fraction_ + gait_.increment_fraction;
-  const bool carry = fraction < fraction_;
-  fraction_ = fraction;
-  body_ += gait_.increment + couple();
-  if (carry) ++body_;
+  uint32_t body = couple();
+  body += body_ + gait_.increment;
+  const uint8_t fraction = fraction_;
+  fraction_ = fraction + gait_.increment_fraction;
+  if (fraction_ < fraction) ++body;
+  body_ = body;
   uint8_t outputs = 0;
-  if (is_positive(body_, gait_.threshold[0])) outputs |= 1;
-  if (is_positive(body_ + gait_.psi12 + head_error_, gait_.threshold[1])) outputs |= 2;
-  if (is_positive(body_ + gait_.psi13 + tail_error_, gait_.threshold[2])) outputs |= 4;
+  if (is_positive(gait_.psi12 + head_error_ + body, gait_.threshold[1])) outputs |= 2;
+  if (is_positive(gait_.psi13 + tail_error_ + body, gait_.threshold[2])) outputs |= 4;
+  if (is_positive(body, gait_.threshold[0])) outputs |= 1;
   outputs_ = outputs;
 }
 

@@ -36,8 +36,11 @@ class Oscillators {
     int16_t head;
   };
 
-  /// Instead of last_.body: there is none, begin with a step of Euler. (No sum of sines comes near.)
-  static const int16_t kNoLast = INT16_MIN;
+  enum class Motion : uint8_t {
+    kBegins,  ///< no step has gone before: this one is Euler's
+    kGoesOn,
+    kSettled,  ///< nothing pulls, nor did in the step before
+  };
 
   static Pulls pulls(uint16_t head_error, uint16_t tail_error);
   uint32_t advance(int16_t pull, int16_t last) const;
@@ -46,6 +49,7 @@ class Oscillators {
   uint32_t body_ = 0;  ///< half a step ahead
   uint32_t head_error_ = 0;
   uint32_t tail_error_ = 0;
+  Motion motion_ = Motion::kBegins;
   Pulls last_ = {0, 0};   ///< of the step before
   uint8_t fraction_ = 0;  ///< of body_, 1/256 of its unit
   uint8_t outputs_ = 0;
