@@ -111,6 +111,23 @@ def test_a_set_takes_over_at_the_cycle_boundary():
     assert uno.counters.lost == 0
 
 
+def test_telemetry_as_text_and_as_frames_at_once():
+    chip, uno = connected()
+    uno.run()
+    uno.stream(True)
+    chip.write(b"stream on\n")
+    uno.samples(0.05)
+    uno.session.lines.clear()
+    end_s, samples = chip.now() + 1.0, 0
+    while chip.now() < end_s:
+        samples += len(uno.samples(0.05))
+    lines = [line for line in uno.session.lines if line.startswith(">")]
+    assert 98 <= samples <= 102
+    assert 98 <= len(lines) <= 102
+    assert all(len(line.split(",")) == 12 for line in lines)
+    assert (uno.counters.lost, uno.counters.bad) == (0, 0)
+
+
 def test_presets_survive_the_power():
     chip, uno = connected()
     uno.upload({"period_s": 2.72, "duty_body": 0.6535}, save="fast")
