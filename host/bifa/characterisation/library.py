@@ -12,7 +12,7 @@ def engine_effects() -> dict[str, Effect]:
 
 
 def _engine_effect(effect: effects.Effect) -> Effect:
-    ordered = sorted(effect.parameters, key=lambda p: not p.size)
+    ordered = sorted((p for p in effect.parameters if not p.own), key=lambda p: not p.size)
     return Effect(
         name=effect.name,
         parameters=tuple(_engine_parameter(p) for p in ordered),
@@ -22,6 +22,8 @@ def _engine_effect(effect: effects.Effect) -> Effect:
         equation=effect.equation,
         source=effect.source,
         sizes=len(effect.sizes),
+        own=tuple(_engine_parameter(p) for p in effect.parameters if p.own),
+        frequency=next((p.name for p in effect.parameters if p.frequency), None),
     )
 
 
@@ -32,6 +34,13 @@ def _engine_parameter(parameter: effects.EffectParameter) -> Parameter:
         value=parameter.typical,
         lower=parameter.lower,
         upper=parameter.upper,
-        scale=0.3 * abs(parameter.typical) or 0.05 * (parameter.upper - parameter.lower),
+        scale=_scale(parameter),
         source=parameter.meaning,
     )
+
+
+def _scale(parameter: effects.EffectParameter) -> float:
+    width = parameter.upper - parameter.lower
+    if parameter.own:
+        return 0.25 * width  # a trial's own value may lie anywhere
+    return 0.3 * abs(parameter.typical) or 0.05 * width

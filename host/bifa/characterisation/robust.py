@@ -19,7 +19,9 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     free = solution.free
     # Twice: the first derivatives tell how wide the second ones should step.
     steps = problem.first_steps()
-    steps = problem.tuned_steps(steps, free, problem.jacobians(solution.point, free, steps))
+    rough = problem.jacobians(solution.point, free, steps)
+    squares = [np.concatenate([(j**2).sum(axis=0), (k**2).sum(axis=0)]) for j, k in rough]
+    steps = problem.tuned_steps(steps, free, squares)
     jacobians = problem.jacobians(solution.point, free, steps)
     residuals = problem.residuals(solution.point)
     scores: dict[object, np.ndarray] = {}

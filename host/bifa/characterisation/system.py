@@ -207,7 +207,7 @@ class RobotSystem(System):
         named = tuple(theta[name] for name in self.fitted)
         weights = tuple((prefix, self._weights(prefix, theta)) for prefix in self.curves)
         extra = tuple(
-            (effect, tuple((p.name, theta[f"{effect}.{p.name}"]) for p in self.effects[effect].parameters))
+            (effect, tuple((p.name, theta.get(f"{effect}.{p.name}", p.value)) for p in _all_of(self.effects[effect])))
             for effect in effects
         )
         return named, weights, extra
@@ -251,6 +251,10 @@ def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, 
     for trial in dataset.trials:
         seen |= _SEEN_BY[trial.experiment, trial.actuator]
     return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known and n not in FIXED)
+
+
+def _all_of(effect: Effect) -> tuple[Parameter, ...]:
+    return effect.parameters + effect.own
 
 
 def _engine_trial(recorded: Recorded, inputs: Inputs, measured: bool = True) -> Trial:

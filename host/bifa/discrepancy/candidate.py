@@ -8,17 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
+from bifa.discrepancy.spectrum import peaks
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit, best_of, evaluate_on, starting_point
 from bifa.identify.noise import NoiseFloor
 from bifa.identify.problem import Point, Problem
 from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
-from bifa.identify.system import Parameter
+from bifa.identify.system import Effect, Parameter
 from bifa.identify.uncertainty import effective_samples
 
-_PROFILE_STEPS = 3
-_REFIT_ITERATIONS = 14
+_PROFILE_STEPS = 4
+_PEAKS = 3  # of the residual's spectrum that a frequency begins at
+_SKETCH_ITERATIONS, _SKETCH_RELATIVE = 10, 3e-3
+_REFIT_ITERATIONS = 60
 _IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
 
 
@@ -43,11 +46,14 @@ class Candidate:
         """Minus log-likelihood of all known trials, plus what implausible parameters and extra ones cost."""
         system = self.fitted.structure.system
         extra = sum(len(system.effects[name].parameters) for name in self.effects)
+        trials = [*self.fitted.problem.trials, *self.checked.problem.trials]
+        own = sum(len(self.fitted.structure.own(trial)) for trial in trials)
         return (
             self.fitted.cost
             + self.checked.cost
             + implausibility(self.fitted)
             + 0.5 * extra * np.log(max(self.pieces, 2.0))
+            + 0.5 * own * np.log(max(self.pieces / len(trials), 2.0))
         )
 
 
@@ -86,19 +92,34 @@ def profile(parent: Fit, effect: str, split: Split, floor: NoiseFloor) -> Profil
     structure = Structure(parent.structure.system, (*parent.structure.effects, effect))
     problem = Problem(structure, split.fit, floor)
     rest = tuple(range(len(parent.structure.names)))
+    # the parent's derivatives serve, unless trials have something of their own that it knew nothing of
+    known = None if structure.system.effects[effect].own else parent.solution.sensitivities
     found = []
     for values in _sizes(parent, structure, effect):
-        start = Point(values, parent.solution.point.nuisances)
-        solution = solve(problem, start, free=rest, max_iterations=_PROFILE_STEPS, jacobians=parent.solution.jacobians)
+        start = problem.start(values, parent.solution.point.nuisances)
+        solution = solve(problem, start, free=rest, max_iterations=_PROFILE_STEPS, sensitivities=known)
         found.append((solution.cost, solution.point))
     found.sort(key=lambda pair: pair[0])
     return Profile(effect, problem, found[0][0], tuple(point for _, point in found))
 
 
-def refit(profiled: Profile, *, starts: int = 2) -> Fit:
-    """Release everything from the best points of a profile."""
-    solutions = [solve(profiled.problem, point, max_iterations=_REFIT_ITERATIONS) for point in profiled.points[:starts]]
-    return best_of(profiled.problem, solutions)
+def sketch(profiled: Profile) -> Fit:
+    """Release everything from the best point of a profile, for as long as it pays quickly."""
+    best = profiled.points[0]
+    solution = solve(profiled.problem, best, max_iterations=_SKETCH_ITERATIONS, relative=_SKETCH_RELATIVE)
+    return best_of(profiled.problem, [solution])
+
+
+def finish(sketched: Fit) -> Fit:
+    """Refit to the end, from where the sketch stands."""
+    point = sketched.solution.point
+    return best_of(sketched.problem, [solve(sketched.problem, point, max_iterations=_REFIT_ITERATIONS)])
+
+
+def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:
+    """The better of a finished refit and one from the profile's second best point."""
+    others = [solve(profiled.problem, point, max_iterations=_REFIT_ITERATIONS) for point in profiled.points[1:2]]
+    return best_of(profiled.problem, [finished.solution, *others])
 
 
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
@@ -114,7 +135,22 @@ def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
                 size = described.absent + sign * factor * (parameter.value - described.absent)
                 vector[index] = np.clip(size, parameter.lower, parameter.upper)
             vectors.append(vector)
-    return vectors
+    if described.frequency is None:
+        return vectors
+    return [v for vector in vectors for v in _at_peaks(parent, structure, described, vector)]
+
+
+def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndarray) -> list[np.ndarray]:
+    """`vector` with the effect's frequency at each of the residual's most prominent ones."""
+    index = structure.names.index(f"{effect.name}.{effect.frequency}")
+    parameter = structure.parameters[index]
+    problem = parent.problem
+    found = []
+    for frequency in peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS):
+        moved = vector.copy()
+        moved[index] = frequency
+        found.append(moved)
+    return found
 
 
 def _signs(sizes: Sequence[Parameter]) -> list[tuple[float, ...]]:

@@ -22,6 +22,7 @@ from bifa.identify.noise import estimate_noise
 from bifa.identify.structure import Structure
 from bifa.identify.system import System
 
+_ROUGH = 1e-3  # of the cost: where the first fit of the base model may stop, before the floor is known
 _CHANCE = 0.005  # probability by chance below which a remainder counts as structure
 _NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
 _NEGLIGIBLE_SHARE = 0.03  # of what the base model left
@@ -66,18 +67,22 @@ def diagnose(
         raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
     progress("fitting the base model")
     base = _fit_base(system, split, seed, starts)
-    base_known = refit_on(base, split.known)
-    remainder = _remainder(base_known, seed)
+    remainder = _remainder(refit_on(base, split.known), seed)
+    refitted: dict[int, tuple[Candidate, Fit, Remainder]] = {}
+
+    def on_known(candidate: Candidate) -> tuple[Fit, Remainder]:
+        if id(candidate) not in refitted:
+            fitted = refit_on(candidate.fitted, split.known)
+            refitted[id(candidate)] = candidate, fitted, _remainder(fitted, seed)
+        return refitted[id(candidate)][1:]
 
     def enough(candidate: Candidate) -> bool:
-        return _explained(_remainder(refit_on(candidate.fitted, split.known), seed), remainder)
+        return _explained(on_known(candidate)[1], remainder)
 
     found = search(base, split, base.problem.floor, enough=enough, progress=progress)
     choice = choose(found)
-    base_known = refit_on(found.base.fitted, split.known)
-    remainder = _remainder(base_known, seed)
-    explained = refit_on(choice.candidate.fitted, split.known)
-    left = _remainder(explained, seed)
+    base_known, remainder = on_known(found.base)
+    explained, left = on_known(choice.candidate)
     drifts = find_drift(explained, seed=seed)
     verdict = _verdict(choice, left, remainder, drifts)
     correction, final = None, explained
@@ -116,7 +121,7 @@ def _fit_base(system: System, split: Split, seed: int, starts: int) -> Fit:
     structure = Structure(system)
     floor = estimate_noise(system, split.known)
     vectors = spread_starts(structure, structure.start(), starts, seed)
-    first = fit(structure, split.fit, floor, starts=vectors, max_iterations=25)
+    first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH)
     residuals = first.residuals() | evaluate_on(first, split.select).residuals()
     sharper = floor.lowered_by(estimate_noise(system, split.known, residuals))
     again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], max_iterations=15)

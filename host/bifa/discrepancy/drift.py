@@ -22,9 +22,9 @@ def find_drift(fitted: Fit, *, seed: int = 0) -> tuple[str, ...]:
     """
     trials = fitted.problem.trials
     ordered = [k for k, t in enumerate(trials) if t.session_order is not None]
-    if len(ordered) < _FEWEST or not fitted.solution.jacobians:
+    if len(ordered) < _FEWEST or not fitted.solution.sensitivities:
         return ()
-    residuals = fitted.problem.residuals(fitted.solution.point)
+    residuals, jacobians = fitted.problem.residuals(fitted.solution.point), fitted.solution.jacobians
     groups: dict[object, list[int]] = defaultdict(list)
     for k in ordered:
         groups[trials[k].experiment, trials[k].condition].append(k)
@@ -36,7 +36,7 @@ def find_drift(fitted: Fit, *, seed: int = 0) -> tuple[str, ...]:
             continue
         shift = np.zeros(len(ordered))
         for members in groups.values():
-            asked = [_asked(residuals[k], fitted.solution.jacobians[k][0][:, column]) for k in members]
+            asked = [_asked(residuals[k], jacobians[k][0][:, column]) for k in members]
             centred = np.array(asked) - np.mean(asked)
             spread = np.sqrt(np.mean(centred**2))
             for k, value in zip(members, centred, strict=True):

@@ -7,20 +7,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifa.discrepancy.candidate import Candidate, judge, profile, refit
+from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profile, sketch
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit
 from bifa.identify.noise import NoiseFloor, estimate_noise
-from bifa.identify.problem import Point, Problem
+from bifa.identify.problem import Problem
 from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
 _BEAM = 3
-_REFITTED = {1: 8, 2: 5, 3: 3}  # effects fully refitted for each parent, by the size of the set
+_SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
+_FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
 _PROFILED = 10  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
+_REACH = 3.0  # times the cost of an explanation that suffices: rivals beyond are not pursued
 _SEEN = 3.0  # log-likelihood of a linear regression, below which a small effect is not worth a fit
 _ABSORBED = 0.02  # a change in the residual of which less than this share is left after the base's is absorbed
 
@@ -79,7 +81,7 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
             | parent.theta
             | {effect.full_name(p): p.value for p in effect.parameters}
         )
-        moved = problem.residuals(Point(values, parent.solution.point.nuisances))
+        moved = problem.residuals(problem.start(values, parent.solution.point.nuisances))
         change = np.concatenate([m - r for m, r in zip(moved, reference, strict=True)])
         left = change - basis @ (basis.T @ change)
         size, visible = float(np.linalg.norm(change)), float(np.linalg.norm(left))
@@ -130,14 +132,15 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, progress: Prog
     for size in range(1, LARGEST_SET + 1):
         grown: list[Candidate] = []
         for parent in beam:
-            grown += _grow(parent, library, split, floor, tried, progress)
+            grown += _grow(parent, library, split, floor, tried, enough, progress)
         if not grown:
             break
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
         if lower.share_of(floor) < _LOWER:
             floor = lower
             progress("weighing again against a lower floor")
-            tried = {s: reweighed(c, split, floor) for s, c in tried.items()}
+            reach = _REACH * _ranked(tried, size)[0].cost
+            tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
         beam = _ranked(tried, size)[:_BEAM]
         if enough(beam[0]):
             break
@@ -155,15 +158,15 @@ def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> No
     return floor.lowered_by(estimate_noise(system, split.known, residuals))
 
 
-def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor) -> Candidate:
+def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
     """The same explanation fitted against another floor, from where it stands."""
     point = candidate.fitted.solution.point
     problem = Problem(candidate.fitted.structure, split.fit, floor)
-    solution = solve(problem, point, max_iterations=_REWEIGHED_ITERATIONS)
+    solution = solve(problem, point, max_iterations=_REWEIGHED_ITERATIONS if thoroughly else 1)
     return judge(replace(candidate.fitted, problem=problem, solution=solution), split)
 
 
-def _grow(parent: Candidate, library, split, floor, tried, progress) -> list[Candidate]:
+def _grow(parent: Candidate, library, split, floor, tried, enough, progress) -> list[Candidate]:
     size = len(parent.effects) + 1
     fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
     if parent.effects:
@@ -174,10 +177,28 @@ def _grow(parent: Candidate, library, split, floor, tried, progress) -> list[Can
         progress(f"trying {' + '.join((*parent.effects, effect))}")
         profiles.append(profile(parent.fitted, effect, split, floor))
     profiles.sort(key=lambda p: p.cost)
-    grown = []
-    for promising in profiles[: _REFITTED[size]]:
+    sketches = []
+    for promising in profiles[: _SKETCHED[size]]:
         progress(f"refitting {' + '.join((*parent.effects, promising.effect))}")
-        candidate = judge(refit(promising), split)
+        sketches.append((sketch(promising), promising))
+    sketches.sort(key=lambda pair: pair[0].cost)
+    return _finish(sketches, _FINISHED[size], split, tried, enough, progress)
+
+
+def _finish(sketches, count, split, tried, enough, progress) -> list[Candidate]:
+    """Refit the best `count` to the end; once one of them explains enough, only those that are not out of its
+    reach. What does not explain enough gets a second start, so that it is not the optimiser who failed."""
+    grown: list[Candidate] = []
+    explained = np.inf
+    for place, (sketched, profiled) in enumerate(sketches):
+        candidate = judge(sketched, split)
+        if place < count and sketched.cost < _REACH * explained:
+            progress(f"finishing {' + '.join(candidate.effects)}")
+            candidate = judge(finish(sketched), split)
+            if not enough(candidate):
+                candidate = judge(finish_elsewhere(candidate.fitted, profiled), split)
+            if enough(candidate):
+                explained = min(explained, candidate.fitted.cost)
         tried[frozenset(candidate.effects)] = candidate
         grown.append(candidate)
     return grown

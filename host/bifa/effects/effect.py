@@ -18,7 +18,8 @@ class EffectError(BifaError):
 class EffectParameter:
     """One number of an effect. `typical` is the size at which the effect is plainly visible on the paper's robot.
 
-    A `size` parameter is 0 when the effect is absent; the others only shape it.
+    A `size` parameter is 0 when the effect is absent; the others only shape it. Of an `own` one every trial has its
+    own value; a `frequency` is looked for in the residual's spectrum.
     """
 
     name: str
@@ -28,6 +29,8 @@ class EffectParameter:
     typical: float
     meaning: str
     size: bool = False
+    own: bool = False
+    frequency: bool = False
 
 
 @dataclass(frozen=True)

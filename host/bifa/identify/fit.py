@@ -9,7 +9,7 @@ import numpy as np
 
 from bifa.identify.noise import NoiseFloor, estimate_noise
 from bifa.identify.problem import Problem
-from bifa.identify.solve import Solution, cost_of, solve
+from bifa.identify.solve import RELATIVE, Solution, cost_of, solve
 from bifa.identify.structure import Structure
 from bifa.identify.system import Channels, System, Trial
 
@@ -60,11 +60,12 @@ def fit(
     *,
     starts: Sequence[np.ndarray] = (),
     max_iterations: int = 20,
+    relative: float = RELATIVE,
 ) -> Fit:
     """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best."""
     problem = Problem(structure, trials, floor)
     vectors = list(starts) or [structure.start()]
-    solutions = [solve(problem, problem.start(v), max_iterations=max_iterations) for v in vectors]
+    solutions = [solve(problem, problem.start(v), max_iterations=max_iterations, relative=relative) for v in vectors]
     return best_of(problem, solutions)
 
 
@@ -88,7 +89,7 @@ def evaluate_on(fitted: Fit, trials: Sequence[Trial]) -> Fit:
     start = problem.start(fitted.solution.point.values)
     if not any(problem.nuisances):
         empty = np.zeros((0, 0))
-        solution = Solution(start, cost_of(problem, start), True, 0, (), empty, [])
+        solution = Solution(start, cost_of(problem, start), True, 0, (), empty, ())
     else:
         solution = solve(problem, start, free=(), max_iterations=4)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)

@@ -16,6 +16,7 @@ from bifa.identify.system import Channels, Parameter, Trial
 
 LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivatives
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
+_OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
 _FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
 
 
@@ -58,13 +59,32 @@ class Problem:
         self.structure = structure
         self.trials = tuple(trials)
         self.floor = floor
-        self.nuisances = tuple(structure.system.nuisances(t) for t in trials)
+        self.nuisances = tuple(structure.nuisances(t) for t in trials)
         self._weighing = [_weighing(t, floor) for t in trials]
         self._prior = structure.prior_precision()
+        self._own = [structure.own(t) for t in trials]
 
-    def start(self, values: np.ndarray | None = None) -> Point:
+    def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
+        """The structure's vector `values` (default its start), nuisances at their means or, the first ones of each
+        trial, as `known`. An effect's own parameters of a trial begin at the best of a few values."""
         start = self.structure.start() if values is None else np.asarray(values, float)
-        return Point(start, tuple(np.array([p.value for p in ps]) for ps in self.nuisances))
+        nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
+        for mine, given in zip(nuisances, known or (), strict=False):
+            mine[: len(given)] = given
+        own = [(i, len(ps) - k - 1) for i, ps in enumerate(self.nuisances) for k in range(len(self._own[i]))]
+        in_parallel(lambda job: self._scan(start, nuisances, *job), own)
+        return Point(start, tuple(nuisances))
+
+    def _scan(self, values: np.ndarray, nuisances: list[np.ndarray], index: int, k: int) -> None:
+        """Set nuisance `k` of trial `index` to the best of `_OWN_STARTS` values over its range."""
+        parameter = self.nuisances[index][k]
+        best = np.inf
+        tried = nuisances[index].copy()
+        for value in np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False):
+            tried[k] = value
+            residuals = self._weigh(self._simulate(values, tried, index, coarse=True), index)
+            if (cost := float(residuals @ residuals)) < best:
+                best, nuisances[index] = cost, tried.copy()
 
     def predict(self, point: Point, index: int, *, coarse: bool = False) -> Channels:
         """Channels of trial `index`."""
@@ -100,15 +120,16 @@ class Problem:
             tuple(np.array([share * p.step_scale for p in ps]) for ps in self.nuisances),
         )
 
-    def tuned_steps(self, steps: Steps, free: Sequence[int], blocks) -> Steps:
+    def tuned_steps(self, steps: Steps, free: Sequence[int], squares: Sequence[np.ndarray]) -> Steps:
         """Steps that change the residuals by a few standard deviations in all: wide enough to drown the
-        integrator's own error, narrow enough for the derivative to be one."""
-        scales = self.structure.scales()
+        integrator's own error, narrow enough for the derivative to be one. `squares`: of each trial the square
+        norms of its derivatives, by the free parameters and by its nuisances."""
+        scales, p = self.structure.scales(), len(free)
         structure = steps.structure.copy()
-        structure[list(free)] = _tuned(sum((j**2).sum(axis=0) for j, _ in blocks), scales[list(free)])
+        structure[list(free)] = _tuned(sum(s[:p] for s in squares), scales[list(free)])
         nuisances = tuple(
-            _tuned((k**2).sum(axis=0), np.array([p.step_scale for p in ps]))
-            for (_, k), ps in zip(blocks, self.nuisances, strict=True)
+            _tuned(s[p:], np.array([parameter.step_scale for parameter in ps]))
+            for s, ps in zip(squares, self.nuisances, strict=True)
         )
         return Steps(structure, nuisances)
 

@@ -6,15 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
-from bifa.identify.problem import Point, Problem
+from bifa.identify.problem import Point, Problem, Steps, in_parallel
+from bifa.identify.sensitivity import Sensitivity
 
-Jacobians = list[tuple[np.ndarray, np.ndarray]]  # of each trial: by the free parameters, by its nuisances
+_blas = ThreadpoolController()  # linear algebra keeps to one thread: the cores are shared among trials
 _ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
-_RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
+RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
 _NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
 _REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
+_TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
+_OLDEST = 8  # steps that derivatives serve at most
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,12 @@ class Solution:
     iterations: int
     free: tuple[int, ...]
     normal: np.ndarray
-    jacobians: Jacobians
+    sensitivities: tuple[Sensitivity, ...]
+
+    @property
+    def jacobians(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each trial's residuals by the free parameters and by its nuisances, shapes (n, P) and (n, q)."""
+        return [s.dense() for s in self.sensitivities]
 
 
 @dataclass
@@ -43,18 +52,21 @@ def cost_of(problem: Problem, point: Point) -> float:
     return 0.5 * sum(float(r @ r) for r in problem.residuals(point)) + problem.prior_cost(point)
 
 
+@_blas.wrap(limits=1, user_api="blas")
 def solve(
     problem: Problem,
     start: Point,
     *,
     free: Sequence[int] | None = None,
     max_iterations: int = 20,
-    jacobians: Jacobians | None = None,
+    sensitivities: Sequence[Sensitivity] | None = None,
+    relative: float = RELATIVE,
 ) -> Solution:
     """Minimise the cost from `start` over the parameters `free` (indices; default all) and all nuisances.
 
-    With `jacobians` given (of `free`, from somewhere near) they are kept throughout: cheap steps, no
-    derivatives.
+    Derivatives are taken anew only where the last ones, corrected after every step by what it showed (Broyden
+    1965), no longer predict what a step does. With `sensitivities` given (of `free`, from somewhere near) they are
+    never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
     """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
     lower, upper, scale = _limits(problem, free)
@@ -64,18 +76,18 @@ def solve(
     cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
     damping, converged, iteration = _LAMBDA_START, False, 0
     steps = problem.first_steps()
-    keep = jacobians is not None
-    if jacobians is None:
-        jacobians = problem.jacobians(point, free, steps)
-    fresh = not keep
+    keep = sensitivities is not None
+    if sensitivities is None:
+        sensitivities = _sensitivities(problem, point, free, steps)
+    age = 0  # steps since the derivatives were taken
     while iteration < max_iterations:
         iteration += 1
-        system = _linearise(problem, point, free, residuals, jacobians)
+        system = _linearise(problem, point, free, residuals, sensitivities)
         accepted = False
         while damping < _LAMBDA_MOST:
             reach = _REACH * scale
             step, promise = _step(system, x, np.maximum(lower, x - reach), np.minimum(upper, x + reach), scale, damping)
-            if promise < max(_ENOUGH, _RELATIVE * cost):
+            if promise < max(_ENOUGH, relative * cost):
                 break
             trial_point = _unpack(point, free, x + step)
             trial_residuals = problem.residuals(trial_point)
@@ -86,27 +98,43 @@ def solve(
                 damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
                 break
             damping = max(damping, 1e-6) * 8
-            if not fresh and not keep:
+            if age and not keep:
                 break
         if accepted:
             gain = cost - trial_cost
+            corrected = _corrected(sensitivities, step, scale, residuals, trial_residuals, len(free))
             x, point, residuals, cost = x + step, trial_point, trial_residuals, trial_cost
-            if keep or (fresh and 0.9 < ratio < 1.1):
-                fresh = False
+            enough = gain < max(_ENOUGH, relative * cost)
+            if keep or (ratio > _TRUSTED and age < _OLDEST and not enough):
+                sensitivities, age = corrected, age + 1
                 continue
-            if gain < max(_ENOUGH, _RELATIVE * cost) and fresh:
+            if enough and age == 0:
                 converged = True
                 break
-        elif fresh:
-            converged = promise < max(_ENOUGH, _RELATIVE * cost)
+        elif age == 0:
+            converged = promise < max(_ENOUGH, relative * cost)
             break
         if keep:
             break
-        steps = problem.tuned_steps(steps, free, jacobians)
-        jacobians = problem.jacobians(point, free, steps)
-        fresh = True
-    system = _linearise(problem, point, free, residuals, jacobians)
-    return Solution(point, cost, converged, iteration, free, _eliminate(system.normal, len(free)), jacobians)
+        steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
+        sensitivities, age = _sensitivities(problem, point, free, steps), 0
+    system = _linearise(problem, point, free, residuals, sensitivities)
+    return Solution(point, cost, converged, iteration, free, _eliminate(system.normal, len(free)), tuple(sensitivities))
+
+
+def _sensitivities(problem: Problem, point: Point, free, steps: Steps) -> tuple[Sensitivity, ...]:
+    return tuple(in_parallel(lambda block: Sensitivity.of(*block), problem.jacobians(point, free, steps)))
+
+
+def _corrected(sensitivities, step, scale, before, after, p: int) -> tuple[Sensitivity, ...]:
+    found, at = [], p
+    for one, old, new in zip(sensitivities, before, after, strict=True):
+        q = one.gram.shape[0] - p
+        own = slice(at, at + q)
+        both = [np.concatenate([v[:p], v[own]]) for v in (step, scale)]
+        found.append(one.corrected(*both, new - old))
+        at += q
+    return tuple(found)
 
 
 def _limits(problem: Problem, free: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -134,26 +162,29 @@ def _unpack(point: Point, free: tuple[int, ...], x: np.ndarray) -> Point:
     return Point(values, tuple(nuisances))
 
 
-def _linearise(problem, point, free, residuals, jacobians) -> _Linearised:
+def _linearise(problem, point, free, residuals, sensitivities) -> _Linearised:
     p = len(free)
     size = p + sum(len(n) for n in point.nuisances)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     prior = problem.prior_precision
     normal[:p, :p] = prior[np.ix_(free, free)]
     gradient[:p] = (prior @ problem.prior_shift(point))[list(free)]
+    gradients = in_parallel(lambda pair: pair[1].gradient(pair[0]), zip(residuals, sensitivities, strict=True))
     at = p
-    for r, (j, k), nuisance, parameters in zip(residuals, jacobians, point.nuisances, problem.nuisances, strict=True):
+    for one, change, nuisance, parameters in zip(
+        sensitivities, gradients, point.nuisances, problem.nuisances, strict=True
+    ):
         q = len(nuisance)
         own = slice(at, at + q)
-        normal[:p, :p] += j.T @ j
-        gradient[:p] += j.T @ r
+        normal[:p, :p] += one.gram[:p, :p]
+        gradient[:p] += change[:p]
         if q:
             spread = np.array([n.step_scale for n in parameters])
             means = np.array([n.value for n in parameters])
-            normal[:p, own] = j.T @ k
-            normal[own, :p] = normal[:p, own].T
-            normal[own, own] = k.T @ k + np.diag(spread**-2.0)
-            gradient[own] = k.T @ r + (nuisance - means) / spread**2
+            normal[:p, own] = one.gram[:p, p:]
+            normal[own, :p] = one.gram[p:, :p]
+            normal[own, own] = one.gram[p:, p:] + np.diag(spread**-2.0)
+            gradient[own] = change[p:] + (nuisance - means) / spread**2
         at += q
     return _Linearised(normal, gradient)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from bifa.identify.system import Correction, CorrectionSite, Parameter, System, Theta
+from bifa.identify.system import Correction, CorrectionSite, Parameter, System, Theta, Trial
 
 _KNOTS = 9
 _TABLE_POINTS = 65
@@ -37,6 +37,19 @@ class Structure:
     @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        """What varies from run to run, with the effects' own parameters of this trial last."""
+        return (*self.system.nuisances(trial), *self.own(trial))
+
+    def own(self, trial: Trial) -> tuple[Parameter, ...]:
+        """The effects' parameters of which this trial has its own value."""
+        return tuple(
+            replace(p, name=effect.full_name(p))
+            for effect in (self.system.effects[name] for name in self.effects)
+            if not effect.experiments or trial.experiment in effect.experiments
+            for p in effect.own
+        )
 
     @property
     def base_size(self) -> int:

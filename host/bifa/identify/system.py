@@ -66,7 +66,10 @@ class Effect:
     appear as `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits begin at the typical
     sizes times each of `start_factors` (and with the other sign, where the bounds allow it). `enters` names
     the term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it
-    can show at all (empty: all).
+    can show at all (empty: all). `own` are parameters that every trial has its own value of (a phase): they
+    are fitted trial by trial, from the best of several values over their range. `frequency` names the
+    parameter that is one, in Hz: fits begin at the peaks of the residual's spectrum, since from anywhere else
+    they would not find it.
     """
 
     name: str
@@ -79,6 +82,8 @@ class Effect:
     sizes: int = 1
     absent: float = 0.0
     start_factors: tuple[float, ...] = (0.1, 0.4, 1.2)
+    own: tuple[Parameter, ...] = ()
+    frequency: str | None = None
 
     def full_name(self, parameter: Parameter) -> str:
         return f"{self.name}.{parameter.name}"

@@ -1,0 +1,56 @@
+"""Derivatives of one trial's residuals, which learn from every step that is taken (Broyden 1965)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of n residuals by p parameters of the structure and the trial's own q nuisances.
+
+    `taken`, shape (n, p + q), as finite differences gave them; to them are added the products `left` (m, n) by
+    `right` (m, p + q) of the steps since. `gram`, shape (p + q, p + q), is of the sum: kept up to date, since the
+    residuals are many.
+    """
+
+    taken: np.ndarray
+    gram: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    structure: int
+
+    @classmethod
+    def of(cls, by_structure: np.ndarray, by_nuisances: np.ndarray) -> Sensitivity:
+        taken = np.hstack([by_structure, by_nuisances])
+        n, size = taken.shape
+        return cls(taken, taken.T @ taken, np.zeros((0, n)), np.zeros((0, size)), by_structure.shape[1])
+
+    def gradient(self, residuals: np.ndarray) -> np.ndarray:
+        """Transposed derivatives times `residuals`, shape (p + q,)."""
+        return residuals @ self.taken + (self.left @ residuals) @ self.right
+
+    def times(self, step: np.ndarray) -> np.ndarray:
+        """What the residuals should change by, shape (n,)."""
+        return self.taken @ step + (self.right @ step) @ self.left
+
+    def corrected(self, step: np.ndarray, scale: np.ndarray, change: np.ndarray) -> Sensitivity:
+        """The least change, counted in scales, by which the derivatives say what the step did. A parameter that the
+        residuals do not feel stays without effect."""
+        felt = np.where(np.diag(self.gram) > 0.0, step / scale**2, 0.0)
+        length = float(felt @ step)
+        if length == 0.0:
+            return self
+        missed = (change - self.times(step)) / length
+        cross = np.outer(self.gradient(missed), felt)
+        gram = self.gram + cross + cross.T + float(missed @ missed) * np.outer(felt, felt)
+        return Sensitivity(
+            self.taken, gram, np.vstack([self.left, missed]), np.vstack([self.right, felt]), self.structure
+        )
+
+    def dense(self) -> tuple[np.ndarray, np.ndarray]:
+        """By the structure's parameters, shape (n, p), and by the nuisances, shape (n, q)."""
+        whole = self.taken + self.left.T @ self.right if len(self.left) else self.taken
+        return whole[:, : self.structure], whole[:, self.structure :]
