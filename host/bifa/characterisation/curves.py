@@ -19,7 +19,7 @@ from bifa.robot.stiffness import StiffnessCurve
 
 from .stiffness import StiffnessFit
 
-_WIDEST = 60.0  # standard deviations that a shape may move
+_WIDEST = 500.0  # standard deviations that a shape may move: an effect unaccounted for biases the static fit by many
 _PRIOR_SD = 5.0  # a shape further off belies the static data: an effect is at work, which no curve should absorb
 _SCALE = 150.0  # derivatives step by 0.3 to 3 standard deviations: well above the integrator's own error
 _FELT_N = 0.01  # a shape that changes K by less does not change a walk that one could measure
