@@ -1,6 +1,7 @@
 """The link of the real image, in the simulated chip."""
 
 import itertools
+import math
 import random
 
 import pytest
@@ -109,6 +110,45 @@ def test_a_set_takes_over_at_the_cycle_boundary():
     samples += uno.samples(0.5)
     assert samples[-1].phase_rad[0] < 0.2
     assert uno.counters.lost == 0
+
+
+def test_a_committed_set_shows_10_to_20_ms_after_the_boundary():
+    """It is taken over with the first sample past the boundary; the sample after that is made under it."""
+    _, uno = connected()
+    uno.upload({"period_s": 1.237})
+    uno.run()
+    uno.stream(True)
+    delays_ms = []
+    for _ in range(8):
+        uno.upload({"duty_body": 0.5}, wait=True)
+        samples = uno.samples(0.1)
+        while not 1 < samples[-1].phase_rad[0] < 5:
+            samples = uno.samples(0.1)
+        uno.upload({"duty_body": 0.0})  # positive throughout, where it was vacuum after the boundary
+        while uno.status().is_set_pending:
+            samples += uno.samples(0.1)
+        samples += uno.samples(0.1) + uno.samples(0.1)
+        before, after = next(
+            (a, b) for a, b in itertools.pairwise(samples) if b.phase_rad[0] < 1 and a.phase_rad[0] > 5
+        )
+        per_s = 2 * math.pi / 1.237
+        boundary_us = after.time_us - after.phase_rad[0] / per_s * 1e6
+        assert before.time_us < boundary_us <= after.time_us
+        new = next(s for s in samples if s.time_us >= boundary_us and s.command[0] == 1)
+        delays_ms.append((new.time_us - boundary_us) / 1000)
+    assert 10 <= min(delays_ms) < 13
+    assert 17 < max(delays_ms) <= 20
+
+
+def test_a_set_on_the_console_acts_at_once():
+    chip, uno = connected()
+    uno.run()
+    chip.sleep(1.0)
+    assert chip.valves() & 0b11 == 0b10  # the body at vacuum, until half of the 5.7 s
+    line = b"set duty_body 0\n"
+    chip.write(line)
+    chip.sleep(len(line) * 40e-6 + 0.02)
+    assert chip.valves() & 0b11 == 0b01
 
 
 def test_telemetry_as_text_and_as_frames_at_once():
