@@ -11,19 +11,27 @@ def register(app: typer.Typer) -> None:
 
     @app.command(
         epilog="Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --plot walk.png"
-        "   |   bifa simulate --inclination 90 --cycles 20   |   bifa simulate --paper"
+        "   |   bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml"
+        "   |   bifa simulate --paper"
     )
     def simulate(
         model: Annotated[Path | None, typer.Option(help="Model file; the nominal model if left out.")] = None,
         gait: Annotated[Path | None, typer.Option(help="Gait file; the paper's baseline if left out.")] = None,
         cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = 10,
         inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
+        payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
+        obstacle: Annotated[
+            str | None,
+            typer.Option(help="tunnel, subtunnels or arcs (the paper's), 10 cm ahead.", show_default=False),
+        ] = None,
+        buckling: Annotated[float, typer.Option(help="N that push a ring of supports in; an assumption.")] = 27.0,
         plot: Annotated[Path | None, typer.Option(help="Picture of commands, pressures, displacement.")] = None,
         csv: Annotated[Path | None, typer.Option(help="All channels at 100 Hz, as a data set's locomotion.")] = None,
         paper: Annotated[
             bool,
             typer.Option(
-                "--paper", help="Table: the paper's figures beside the model's, which walks --gait as its fastest."
+                "--paper",
+                help="Tables: the paper's figures and obstacles beside the model's; --gait is its fastest.",
             ),
         ] = False,
     ) -> None:
@@ -42,11 +50,16 @@ def register(app: typer.Typer) -> None:
             _print_paper(console, chosen if model else None, steps if gait else None)
             return
         with console.status("simulating"):
-            from bifa.simulate import gait_rows, speeds, walk
+            from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
 
-            record = walk(chosen, steps, cycles, inclination_deg=inclination)
-            progress = speeds(chosen, gait_rows([steps]), cycles, 1e-6, inclination_deg=inclination)
+            chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
+            ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
+            place = {"inclination_deg": inclination} | ({"terrain": terrain(ahead, supports)} if ahead else {})
+            record = walk(chosen, steps, cycles, **place)
+            progress = speeds(chosen, gait_rows([steps]), cycles, 1e-6, **place)
         _print_walk(console, chosen, steps, progress)
+        if ahead:
+            _print_passing(console, chosen, steps, ahead, supports, inclination)
         if csv:
             _write_csv(csv, record.columns)
             console.print(f"channels: {csv}", highlight=False)
@@ -75,6 +88,20 @@ def _print_walk(console, model, gait, progress) -> None:
         )
 
 
+def _print_passing(console, model, gait, ahead, supports, inclination: float) -> None:
+    from bifa.simulate.passing import LONGEST_S, passing
+
+    outcome = passing(model, gait, ahead, supports, inclination)
+    said = f"through after {outcome.seconds:.0f} s" if outcome.through else f"not through in {LONGEST_S:.0f} s"
+    console.print(said, highlight=False)
+    for name, end, stroke in (("extension", "head", outcome.extension), ("contraction", "tail", outcome.contraction)):
+        console.print(
+            f"{name}: the body's pressure builds up {stroke.built_up_N:.0f} N before the next command; the spring's "
+            f"peak and the {end}'s supports need {stroke.needed_N:.0f} N{'' if stroke.enough else ': not enough'}",
+            highlight=False,
+        )
+
+
 def _print_paper(console, model, gait) -> None:
     """Both shipped models, or the one given, with its fastest gait."""
     from rich.table import Table
@@ -92,6 +119,28 @@ def _print_paper(console, model, gait) -> None:
     for rows in zip(*tables, strict=True):
         shown = (row.ours if row.fits else f"[red]{row.ours}[/red]" for row in rows)
         table.add_row(rows[0].what, rows[0].paper, *shown, rows[0].remark)
+    console.print(table)
+    for chosen, fast in pairs:
+        _print_obstacles(console, chosen, fast)
+
+
+def _print_obstacles(console, model, fast) -> None:
+    """The paper's section VI.B: who gets through, and which stroke is too short for it."""
+    from rich.table import Table
+
+    from bifa.simulate.paper import obstacle_rows
+
+    table = Table(
+        title=f"Obstacles, {model.name}: N that a stroke builds up / needs; [red]red[/red]: not enough",
+        title_justify="left",
+    )
+    for heading in ("obstacle", "gait", "through", "extension", "contraction"):
+        table.add_column(heading)
+    for obstacle, gait, outcome in obstacle_rows(model, fast):
+        strokes = (outcome.extension, outcome.contraction)
+        shown = (f"{stroke.built_up_N:.0f} / {stroke.needed_N:.0f}" for stroke in strokes)
+        marked = (text if s.enough else f"[red]{text}[/red]" for text, s in zip(shown, strokes, strict=True))
+        table.add_row(obstacle, gait, f"{outcome.seconds:.0f} s" if outcome.through else "[red]no[/red]", *marked)
     console.print(table)
 
 

@@ -9,7 +9,7 @@ from bifa.simulate.gaits import Progress, cores, gait_rows, speed, speeds
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.records import Record, anchor_pull, static_loading, step_response, walk
 from bifa.simulate.rigs import SimulationError
-from bifa.simulate.terrain import Obstacle, Supports, arcs, passed_at_m, subtunnels, terrain, tunnel
+from bifa.simulate.terrain import Obstacle, Supports, arcs, obstacles, passed_at_m, subtunnels, terrain, tunnel
 from bifa.simulate.timeline import (
     Timeline,
     TimelineError,
@@ -34,6 +34,7 @@ __all__ = [
     "arcs",
     "cores",
     "gait_rows",
+    "obstacles",
     "of_gait",
     "of_phases",
     "of_samples",

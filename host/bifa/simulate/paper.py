@@ -8,8 +8,9 @@ import numpy as np
 
 from bifa.robot import BASELINE, Gait, Model
 from bifa.simulate.gaits import speed
-from bifa.simulate.records import anchor_pull, static_loading, step_response, walk
-from bifa.simulate.terrain import passed_at_m, terrain, tunnel
+from bifa.simulate.passing import Passing, passing
+from bifa.simulate.records import anchor_pull, static_loading, step_response
+from bifa.simulate.terrain import OBSTACLES, Supports, tunnel
 
 # Near the nominal model's fastest gait (`bifa optimize` finds it), as that of the paper's Fig. 7 (b).
 FAST = Gait(2.515966106, 208.934381, 331.874322, 0.649065611, 0.442500311, 0.442500311)
@@ -19,7 +20,6 @@ SLOW = Gait(6.0, 270.0, 90.0, 0.5, 0.5, 0.5)
 _PULL_S = np.arange(0.0, 2.0, 1e-3)
 _CYCLES = 14
 _FINE_M = 1e-7
-_TUNNEL_S = 120.0
 
 
 @dataclass(frozen=True)
@@ -103,18 +103,22 @@ def _steps(model: Model) -> list[Row]:
 
 
 def _tunnel(model: Model, fast: Gait) -> list[Row]:
-    obstacles = tunnel()
-    ground, end = terrain(obstacles), 1e3 * passed_at_m(obstacles)
     rows = []
     for name, gait, passes in (("fastest", fast, False), ("6 s", SLOW, True)):
-        tail = walk(model, gait, int(_TUNNEL_S / gait.period_s), terrain=ground)["displacement_tail_mm"][-1]
-        through = bool(tail > end)
-        rows.append(
-            Row(
-                f"{name} gait through the tunnel", *("yes" if t else "no" for t in (passes, through)), through == passes
-            )
-        )
+        through = passing(model, gait, tunnel(), Supports()).through
+        shown = ("yes" if t else "no" for t in (passes, through))
+        rows.append(Row(f"{name} gait through the tunnel", *shown, through == passes))
     return rows
+
+
+def obstacle_rows(model: Model, fast: Gait = FAST) -> list[tuple[str, str, Passing]]:
+    """(obstacle, gait, how it went) for the paper's obstacles and its gaits."""
+    gaits = {"fastest": fast, "baseline": BASELINE, "6 s": SLOW}
+    return [
+        (obstacle, name, passing(model, gait, ahead(), Supports()))
+        for obstacle, ahead in OBSTACLES.items()
+        for name, gait in gaits.items()
+    ]
 
 
 def _row(what: str, paper: float, ours: float, precision: float, shown: str) -> Row:

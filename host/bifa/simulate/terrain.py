@@ -31,6 +31,10 @@ class Supports:
     lip_m: float = 0.02
     buckled_m: float = 0.01
 
+    def __post_init__(self):
+        if not 0.0 <= self.buckling_N <= 1000.0:
+            raise SimulationError(f"the supports' buckling force {self.buckling_N:g} is outside its range 0 to 1000 N")
+
 
 @dataclass(frozen=True)
 class Obstacle:
@@ -63,6 +67,17 @@ def arcs(start_m: float = 0.1) -> tuple[Obstacle, ...]:
     return tuple(
         Obstacle(start_m + 0.12 * i, 0.02, PIPE_DIAMETER_M - 2.0 * h, 1.0 / 3.0) for i, h in enumerate(heights)
     )
+
+
+# By the names that commands take.
+OBSTACLES = {"tunnel": tunnel, "subtunnels": subtunnels, "arcs": arcs}
+
+
+def obstacles(name: str) -> tuple[Obstacle, ...]:
+    """Those of a name, 10 cm ahead; SimulationError for an unknown one."""
+    if name not in OBSTACLES:
+        raise SimulationError(f"obstacle {name!r} is not one of {', '.join(OBSTACLES)}")
+    return OBSTACLES[name]()
 
 
 def terrain(

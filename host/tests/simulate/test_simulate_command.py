@@ -7,7 +7,9 @@ from typer.testing import CliRunner
 
 from bifa import robot
 from bifa.cli import app
+from bifa.errors import BifaError
 from bifa.robot import ModelFileError
+from bifa.simulate.paper import FAST, obstacle_rows
 
 
 def _run(*arguments):
@@ -39,3 +41,63 @@ def test_a_bad_model_is_an_expected_error(tmp_path):
     result = _run("--model", tmp_path / "m.toml")
     assert isinstance(result.exception, ModelFileError)
     assert "format 7" in str(result.exception)
+
+
+def _words(result):
+    assert result.exit_code == 0, result.output
+    return " ".join(result.output.split())
+
+
+def test_the_tunnel_stops_a_hasty_gait_and_the_command_says_why(tmp_path):
+    robot.save_gait(tmp_path / "hasty.toml", FAST)
+    hasty = _words(_run("--obstacle", "tunnel", "--gait", tmp_path / "hasty.toml", "--cycles", 4))
+    assert "not through in 120 s" in hasty
+    assert "extension: the body's pressure builds up 55 N" in hasty
+    assert "need 60 N: not enough" in hasty
+    patient = _words(_run("--obstacle", "tunnel", "--cycles", 4))
+    assert "through after 53 s" in patient
+    assert "not enough" not in patient
+
+
+def test_soft_supports_let_the_hasty_gait_through(tmp_path):
+    robot.save_gait(tmp_path / "hasty.toml", FAST)
+    assert "through after" in _words(
+        _run("--obstacle", "tunnel", "--buckling", 10, "--gait", tmp_path / "hasty.toml", "--cycles", 4)
+    ).replace("not through", "")
+
+
+def test_a_payload_slows_the_climb_of_a_vertical_pipe(tmp_path):
+    speeds = []
+    for payload in (0.0, 0.6):
+        output = _words(_run("--inclination", 90, "--payload", payload, "--cycles", 8))
+        speeds.append(float(output.split("speed of the last cycle: ")[1].split()[0]))
+    assert speeds[0] == pytest.approx(10.8, abs=0.1)
+    assert speeds[1] < speeds[0] - 0.05
+
+
+def test_the_papers_observation_is_in_the_table(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    output = _run("--paper").output
+    assert "Obstacles, nominal" in output
+    row = next(line for line in output.splitlines() if "tunnel" in line and "55 / 60" in line)
+    assert "fastest" in row
+    assert " no " in row
+    for row in obstacle_rows(robot.nominal()):
+        obstacle, gait, outcome = row
+        assert outcome.through == (gait != "fastest" or obstacle == "arcs"), row
+        assert outcome.extension.enough == (gait != "fastest" or obstacle == "arcs"), row
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--obstacle", "moon"], "'moon' is not one of tunnel, subtunnels, arcs"),
+        (["--buckling", "-1"], "outside its range 0 to 1000 N"),
+        (["--payload", "4"], "tail_mass_kg = 4.175 is outside its range 0.02 to 1 kg"),
+        (["--inclination", "91"], "outside its range -90 to 90"),
+    ],
+)
+def test_bad_places_are_refused_with_the_range(arguments, words):
+    result = _run(*arguments)
+    assert isinstance(result.exception, BifaError)
+    assert words in str(result.exception)
