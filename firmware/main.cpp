@@ -59,6 +59,7 @@ void board::on_round(const bifa::RawRound& round) { controller.converted_in_inte
 int main() {
   board::pins_begin();
   board::uart_begin();
+  sleep_enable();  // for good: a hundred wakings a sample are too many to do it each time
   sei();
   const bifa::StartCause cause = board::start_cause();
   port.begin(board::boot_nonce(), cause);
@@ -67,7 +68,7 @@ int main() {
   board::tick_begin();
   board::watchdog_begin();
   while (true) {
-    while (!attend) sleep_mode();  // an interrupt between the two costs a tick at most
+    while (!attend) sleep_cpu();  // an interrupt between the two costs a tick at most
     attend = false;
     board::watchdog_feed();
     port.poll();

@@ -21,6 +21,7 @@ bifa::RawRound round;
 uint8_t conversion;
 uint8_t channel;
 int8_t direction;
+volatile bool round_ends = false;
 
 void convert(uint8_t input) {
   ADMUX = kReferenceAvcc | input;
@@ -42,6 +43,12 @@ void converter_begin_round() {
   convert(channel);
 }
 
+void converter_tick() {
+  if (!round_ends) return;
+  round_ends = false;
+  on_round(round);
+}
+
 }  // namespace board
 
 ISR(ADC_vect) {
@@ -50,7 +57,7 @@ ISR(ADC_vect) {
   if (conversion == kConversions) {
     round.monitor = result;
     strobe_end();
-    on_round(round);
+    round_ends = true;
     return;
   }
   const uint8_t converted = channel;

@@ -5,7 +5,10 @@ namespace board {
 
 void converter_begin();
 
-/// Starts a round; on_round() is called at its end, and the strobe falls.
+/// Starts a round. At its end the strobe falls.
 void converter_begin_round();
+
+/// Every millisecond: calls on_round() if a round has ended.
+void converter_tick();
 
 }  // namespace board

@@ -40,6 +40,7 @@ void strobe_end() {
 // Interrupts may nest: a stop byte does not wait for the oscillators.
 ISR(TIMER1_COMPA_vect, ISR_NOBLOCK) {
   using namespace board;
+  converter_tick();
   if (round_begins) converter_begin_round();
   round_begins = on_tick(emergency_stop_pressed());
   if (round_begins) TCCR1A = kSetAtTick;

@@ -13,6 +13,8 @@ namespace {
 
 const uint32_t kBaud = 250000;
 const uint8_t kRingBytes = 100;
+const uint8_t kRest = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
+const uint8_t kSending = kRest | 1 << UDRIE0;
 
 uint8_t ring[kRingBytes];
 volatile uint8_t head;  // where the next byte goes in
@@ -26,17 +28,19 @@ void uart_begin() {
   UBRR0 = F_CPU / 8 / kBaud - 1;
   UCSR0A = 1 << U2X0;
   UCSR0C = 1 << UCSZ01 | 1 << UCSZ00;  // 8N1
-  UCSR0B = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
+  UCSR0B = kRest;
 }
 
 }  // namespace board
 
 void bifa::output(uint8_t byte) {
   using namespace board;
-  while (output_room() == 0) sleep_mode();
-  ring[head] = byte;
-  head = after(head);
-  UCSR0B |= 1 << UDRIE0;
+  const uint8_t place = head;
+  const uint8_t next = after(place);
+  while (next == tail) sleep_cpu();
+  ring[place] = byte;
+  head = next;
+  UCSR0B = kSending;
 }
 
 uint8_t bifa::output_room() {
@@ -49,10 +53,11 @@ ISR(USART_RX_vect) { board::on_byte(UDR0); }
 
 ISR(USART_UDRE_vect) {
   using namespace board;
-  if (head == tail) {
-    UCSR0B &= ~(1 << UDRIE0);
+  const uint8_t place = tail;
+  if (head == place) {
+    UCSR0B = kRest;
     return;
   }
-  UDR0 = ring[tail];
-  tail = after(tail);
+  UDR0 = ring[place];
+  tail = after(place);
 }

@@ -13,7 +13,7 @@ bool on_tick(bool emergency_stop_pressed);
 void on_byte(uint8_t byte);
 /// The emergency stop was pressed; interrupts are off.
 void on_emergency_stop();
-/// A round of conversions is complete; interrupts are off.
+/// A round of conversions is complete; in the tick, before on_tick().
 void on_round(const bifa::RawRound& round);
 
 }  // namespace board

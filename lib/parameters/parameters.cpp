@@ -2,23 +2,13 @@
 
 namespace bifa {
 
-namespace {
-
-uint32_t flash_long(const uint32_t& in_flash) {
-  uint32_t value;
-  flash_copy(&value, &in_flash, sizeof value);
-  return value;
-}
-
-}  // namespace
-
 FlashText text_of(ParameterId id, ParameterText which) {
   const uint8_t kTexts = 3;
   return flash_text(kParameterTexts, static_cast<uint8_t>(id) * kTexts + static_cast<uint8_t>(which));
 }
 
-uint32_t minimum_of(ParameterId id) { return flash_long(descriptor(id).minimum); }
-uint32_t maximum_of(ParameterId id) { return flash_long(descriptor(id).maximum); }
+uint32_t minimum_of(ParameterId id) { return flash_long(&descriptor(id).minimum); }
+uint32_t maximum_of(ParameterId id) { return flash_long(&descriptor(id).maximum); }
 
 uint32_t value_of(const ParameterSet& set, ParameterId id) {
   uint32_t value = 0;
