@@ -11,6 +11,7 @@ from bifa.discrepancy.candidate import Candidate
 from bifa.discrepancy.search import Search
 
 _LEAST_GAIN = 8.0  # log-likelihood, in units of what the best explanation leaves, that one more effect must bring
+_LEAST_GAIN_PER_PIECE = 5e-4  # and per piece of information: less than that any small misfit pays for
 _LEAST_SHARE = 0.15  # of the gap to the floor that one more effect must close
 _CONFUSABLE = 0.02  # an exchange of effects at least so probable is not ruled out
 
@@ -63,7 +64,8 @@ def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float) -> bo
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
     gap = smaller.cost - 0.5 * smaller.pieces
     share = (smaller.cost - larger.cost) / max(gap, 1e-9) if gap > 0 else 1.0
-    return gain > extra * _LEAST_GAIN and unseen > 0.25 * extra * _LEAST_GAIN and share > extra * _LEAST_SHARE
+    least = extra * max(_LEAST_GAIN, _LEAST_GAIN_PER_PIECE * smaller.pieces)
+    return gain > least and unseen > 0.25 * least and share > extra * _LEAST_SHARE
 
 
 def dispersion_of(tried: Sequence[Candidate]) -> float:

@@ -16,10 +16,10 @@ from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
-_BEAM = 3
-_SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
+_BEAM = {1: 3, 2: 2, 3: 1}  # sets that are grown further, by their size
+_SKETCHED = {1: 8, 2: 4, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
 _FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
-_PROFILED = 10  # effects profiled on a parent that has one already, by the gain of a linear regression
+_PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
 _REACH = 3.0  # times the cost of an explanation that suffices: rivals beyond are not pursued
@@ -141,7 +141,7 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, progress: Prog
             progress("weighing again against a lower floor")
             reach = _REACH * _ranked(tried, size)[0].cost
             tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
-        beam = _ranked(tried, size)[:_BEAM]
+        beam = _ranked(tried, size)[: _BEAM[size]]
         if enough(beam[0]):
             break
     return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened))
