@@ -131,12 +131,16 @@ def strobe_jitter() -> int:
     return max(offsets) - min(offsets)
 
 
-def sleep_fraction(streaming: bool) -> float:
+def sleep_fraction(frames: bool, text: bool) -> float:
+    """How much of the time the chip sleeps while it walks and sends a frame or a line of text, or both, a sample."""
     board = board_at_rest()
     uno = connected(board)
     uno.run()
-    if streaming:
+    if frames:
         uno.stream(True)
+    if text:
+        board.send(b"stream on\n")
+    stimulate(board, 0.1)
     asleep_s, begin_s = board.asleep_s, board.time_s
     stimulate(board, 3.0)
     fraction = (board.asleep_s - asleep_s) / (board.time_s - begin_s)
@@ -190,7 +194,8 @@ def run() -> dict[str, float]:
     unsettled = cycles_of("integer_cpg.cpp", 3.0, "-DSETTLING=128")
     floating = cycles_of("float_cpg.cpp", 12.0)
     jitter = strobe_jitter()
-    streaming, quiet = sleep_fraction(True), sleep_fraction(False)
+    quiet, text, both = sleep_fraction(False, False), sleep_fraction(False, True), sleep_fraction(True, True)
+    streaming = sleep_fraction(True, False)
     flash, ram = image_sizes()
     flash += REAL_DAC_LIBRARY_BYTES
     free = stack_free()
@@ -205,7 +210,8 @@ def run() -> dict[str, float]:
     line("  never settled (each 0.13 s)", steps(unsettled), "")
     line("  the same in float", steps(floating), f"{floating[1] / walking[1]:.0f} times as long")
     line("strobe jitter (walk, stream, uploads)", f"{jitter} cycles peak to peak", "limit 64")
-    line("asleep, walking and streaming", f"{streaming:.1%}", f"limit 85 %; without streaming {quiet:.1%}")
+    line("asleep, walking and streaming frames", f"{streaming:.1%}", f"limit 85 %; without streaming {quiet:.1%}")
+    line("  streaming text", f"{text:.1%}", f"limit 85 %; both together {both:.1%}")
     line("flash, with the real DAC library", f"{flash} bytes", "limit 26000")
     line("static RAM", f"{ram} bytes", "limit 1200")
     line("stack never touched", f"{free} bytes", "limit 300")
@@ -215,6 +221,7 @@ def run() -> dict[str, float]:
         "cpg_float_step_cycles": floating[1],
         "strobe_jitter_cycles": jitter,
         "sleep_fraction": streaming,
+        "sleep_fraction_text": text,
         "flash_bytes": flash,
         "ram_bytes": ram,
         "stack_free_bytes": free,

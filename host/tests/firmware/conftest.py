@@ -22,13 +22,17 @@ class Bench:
 
     def wait(self, seconds: float) -> str:
         """Let time pass; return what was printed meanwhile."""
+        return self.listen(seconds).decode(errors="replace")
+
+    def listen(self, seconds: float) -> bytes:
+        """Let time pass; return what was sent meanwhile, frames included."""
         end = self.board.cycle + round(seconds * CLOCK_HZ)
         while self.board.cycle < end:
             alive_V = 0.005 * (next(self._turn) % 2)
             for channel, volts in enumerate(self.volts):
                 self.board.set_analog(channel, volts + alive_V)
             self.board.run_until(min(end, self.board.cycle + CLOCK_HZ // 100))
-        return self.board.receive().decode(errors="replace")
+        return self.board.receive()
 
     def say(self, line: str, seconds: float = 0.1) -> str:
         """Send a line; return what was printed within `seconds`."""

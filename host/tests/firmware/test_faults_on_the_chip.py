@@ -11,6 +11,7 @@ from virtual_robot.uno import CLOCK_HZ
 pytestmark = pytest.mark.uno
 
 COUNT_OF_14_PSI = 441
+MONITOR = 3  # A3
 
 
 def test_dac_follows_the_set_point_and_ends_at_14_psi(bench):
@@ -39,6 +40,33 @@ def test_no_eeprom_commands_more_than_14_psi(new_bench, bench):
         board = new_bench(bytes([fill]) * len(good)).board
         board.run_for(0.2)
         assert board.dac_code <= COUNT_OF_14_PSI
+
+
+def monitor_volts(pressure_psi: float) -> float:
+    """What the regulator's monitor says of a pressure: 1 to 5 V is 0 to 130 psi."""
+    return 1 + pressure_psi * 4 / 130
+
+
+def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(bench):
+    bench.board.set_analog(MONITOR, monitor_volts(8.5))
+    bench.say("run")
+    bench.wait(1.5)
+    assert bench.valves_on
+    bench.board.set_analog(MONITOR, monitor_volts(12.5))  # 4 psi off, 3 are borne
+    bench.wait(2.2)
+    assert bench.valves_on, "for 2.5 s it may be on its way"
+    bench.wait(0.4)
+    assert not bench.valves_on
+    fault = next(line for line in bench.say("status", 0.5).splitlines() if line.startswith("[fault"))
+    words = fault.split()
+    assert words[1] == "regulator"
+    assert int(words[words.index("value") + 1]) == pytest.approx(12_500, abs=160)  # a count is 0.16 psi
+    assert int(words[words.index("limit") + 1]) == 8500
+    assert bench.board.dac_code == 0
+    assert "error" in bench.say("clear")
+    bench.board.set_analog(MONITOR, monitor_volts(0))
+    bench.wait(0.1)
+    assert bench.say("clear").endswith("ok\n")
 
 
 @pytest.mark.parametrize("mode", ["absent", "stuck"])

@@ -4,6 +4,7 @@ import random
 import string
 
 import pytest
+from wild_host import WildHost
 
 from bifa.link import frames
 from bifa.link.table import COMMANDS
@@ -70,13 +71,14 @@ def random_input(chance: random.Random) -> bytes:
 
 def exercise(bench, seconds: float, seed: int) -> None:
     chance = random.Random(seed)
+    host = WildHost(bench.board, chance)
     state = {"on": set(), "off_since": {}}
     first = len(bench.board.events)
     found, edges = [], 0
     end_s = bench.board.time_s + seconds
     while bench.board.time_s < end_s:
-        bench.board.send(b"clear\n" + random_input(chance))
-        bench.wait(chance.choice((0.0005, 0.002, 0.01, 0.05, 0.3)))
+        bench.board.send(host.session() if chance.random() < 0.4 else b"clear\n" + random_input(chance))
+        host.hear(bench.listen(chance.choice((0.0005, 0.002, 0.01, 0.05, 0.3))))
         if chance.random() < 0.01:
             bench.board.press_emergency_stop()
             bench.wait(0.01)
@@ -85,8 +87,10 @@ def exercise(bench, seconds: float, seed: int) -> None:
         first += len(new)
         found += breaks(new, state)
         edges += sum(event.kind == "pin" and event.index in range(4, 10) for event in new)
+    print(f"{seconds:.0f} s, {edges} edges on the pins, commands carried out: {dict(sorted(host.done.items()))}")
     assert found == []
     assert edges > 5 * seconds, "the valves did move"
+    assert {"hold", "run", "stop", "clear", "commit", "schedule_start", "load"} <= set(host.done)
     assert bench.board.resets == 1
     assert not bench.board.crashed
 

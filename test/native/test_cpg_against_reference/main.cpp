@@ -31,25 +31,50 @@ void place(Oscillators& oscillators) {
   oscillators.place(body, head, chance.bits());
 }
 
-/// How much a small change of the initial phases grows: beside the saddles between the ways to settle no finite
-/// arithmetic can stay on the path of another.
-double growth(const ParameterSet& set, const Triple& initial, int steps) {
-  const double nudge = 1e-6;
-  const reference::Gait gait(set);
-  Update straight, nudged[2];
-  straight.begin(initial);
-  for (int k = 0; k < 2; ++k) {
-    Triple moved = initial;
-    moved.of[k + 1] += nudge;
-    nudged[k].begin(moved);
+/// The update in double precision, and two more of it whose head or tail began with a nudge.
+class Bundle {
+ public:
+  void begin(const Triple& phi) {
+    straight_.begin(phi);
+    for (int k = 0; k < 2; ++k) nudged_[k].begin(moved(phi, k));
   }
+  void begin(const reference::Gait& gait, const Triple& phi, const Triple& before) {
+    straight_.begin(gait, phi, before);
+    for (int k = 0; k < 2; ++k) nudged_[k].begin(gait, moved(phi, k), moved(before, k));
+  }
+  void step(const reference::Gait& gait) {
+    straight_.step(gait);
+    for (Update& one : nudged_) one.step(gait);
+  }
+  const Triple& phi() const { return straight_.phi(); }
+  /// How much the nudges have grown since the beginning.
+  double growth() const {
+    return fmax(reference::greatest_difference(phi(), nudged_[0].phi()),
+                reference::greatest_difference(phi(), nudged_[1].phi())) /
+           kNudge;
+  }
+
+ private:
+  static Triple moved(Triple phi, int which) {
+    phi.of[1 + which] += kNudge;
+    return phi;
+  }
+
+  static constexpr double kNudge = 1e-6;
+  Update straight_;
+  Update nudged_[2];
+};
+
+/// How much a small change of the initial phases grows on a path: beside the saddles between the ways to settle no
+/// finite arithmetic can stay on the path of another.
+double growth(const ParameterSet& set, const Triple& initial, int steps) {
+  const reference::Gait gait(set);
+  Bundle bundle;
+  bundle.begin(initial);
   double greatest = 1;
   for (int n = 0; n < steps; ++n) {
-    straight.step(gait);
-    for (int k = 0; k < 2; ++k) {
-      nudged[k].step(gait);
-      greatest = fmax(greatest, reference::greatest_difference(straight.phi(), nudged[k].phi()) / nudge);
-    }
+    bundle.step(gait);
+    greatest = fmax(greatest, bundle.growth());
   }
   return greatest;
 }
@@ -87,33 +112,43 @@ void test_each_step_is_the_update_of_double_precision_to_a_few_microradians() {
   TEST_ASSERT_TRUE(greatest < 1e-5);
 }
 
-void test_path_stays_within_2e_4_rad_of_the_update_in_double_precision() {
+/// Beside a saddle any difference grows without bound, that of two roundings too. So where a nudge of the path has
+/// doubled the reference begins anew from the integers' phases, and no step of any path is left out.
+void test_paths_stay_within_2e_4_rad_of_the_update_in_double_precision() {
   const int kSets = 400, kSteps = 4000;
-  double greatest = 0;
-  int beside_a_saddle = 0;
+  double greatest_whole = 0, greatest_parted = 0;
+  int whole = 0, beginnings = 0;
   for (int trial = 0; trial < kSets; ++trial) {
     const ParameterSet set = random_set(chance);
     const reference::Gait gait(set);
     Oscillators oscillators;
     oscillators.use(gait_of(set));
     place(oscillators);
-    const Triple initial = phases_of(oscillators);
-    if (growth(set, initial, kSteps) > 2) {
-      ++beside_a_saddle;
-      continue;
-    }
-    Update update;
-    update.begin(initial);
+    Triple now = phases_of(oscillators);
+    Bundle bundle;
+    bundle.begin(now);
+    double greatest = 0;
+    bool is_whole = true;
     for (int n = 0; n < kSteps; ++n) {
+      const Triple before = now;
       oscillators.step();
-      update.step(gait);
-      greatest = fmax(greatest, reference::greatest_difference(phases_of(oscillators), update.phi()));
+      bundle.step(gait);
+      now = phases_of(oscillators);
+      greatest = fmax(greatest, reference::greatest_difference(now, bundle.phi()));
+      if (bundle.growth() <= 2) continue;
+      bundle.begin(gait, now, before);
+      is_whole = false;
+      ++beginnings;
     }
+    whole += is_whole;
+    double& among = is_whole ? greatest_whole : greatest_parted;
+    among = fmax(among, greatest);
   }
-  printf("  %d paths: off by at most %.2g rad (%d beside a saddle left out)\n", kSets - beside_a_saddle, greatest,
-         beside_a_saddle);
-  TEST_ASSERT_TRUE(greatest <= 2e-4);
-  TEST_ASSERT_TRUE(beside_a_saddle < kSets / 3);
+  printf("  %d whole paths: off by at most %.2g rad; %d beside a saddle, begun anew %.1f times each: %.2g rad\n", whole,
+         greatest_whole, kSets - whole, beginnings / fmax(1, kSets - whole), greatest_parted);
+  TEST_ASSERT_TRUE(greatest_whole <= 2e-4);
+  TEST_ASSERT_TRUE(greatest_parted <= 2e-4);
+  TEST_ASSERT_TRUE(beginnings < kSets);  // a reference that always begins anew would show nothing
 }
 
 void test_parameters_may_change_at_any_step_without_a_jump() {
@@ -317,7 +352,7 @@ void test_after_a_day_the_phase_differences_are_those_asked_for() {
 
 void run() {
   RUN_TEST(test_each_step_is_the_update_of_double_precision_to_a_few_microradians);
-  RUN_TEST(test_path_stays_within_2e_4_rad_of_the_update_in_double_precision);
+  RUN_TEST(test_paths_stay_within_2e_4_rad_of_the_update_in_double_precision);
   RUN_TEST(test_parameters_may_change_at_any_step_without_a_jump);
   RUN_TEST(test_transient_is_ten_times_closer_to_the_exact_solution_than_forward_euler);
   RUN_TEST(test_settled_phases_are_within_1e_3_rad_of_the_exact_ones);

@@ -69,7 +69,12 @@ class Update {
     phi_ = phi;
     begun_ = false;
   }
-  void change() { begun_ = false; }
+  /// In the middle of a path, that came from `before` a step ago.
+  void begin(const Gait& gait, const Triple& phi, const Triple& before) {
+    phi_ = phi;
+    last_ = pull(gait, before);
+    begun_ = true;
+  }
 
   void step(const Gait& gait) {
     const double h = 1e-3;
