@@ -1,6 +1,24 @@
 """What holds for every test: properties are checked on the same examples every time, and never against the clock."""
 
+from collections.abc import Callable
+from functools import partial
+
+import pytest
 from hypothesis import settings
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture
+def figure(record_property) -> Callable[[str], None]:
+    """figure("text"): a line shown at the end of the run, whichever process the test ran in."""
+    return partial(record_property, "figure")
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """Show the figures that tests have measured."""
+    for report in terminalreporter.getreports("passed") + terminalreporter.getreports("failed"):
+        for name, value in report.user_properties:
+            if name == "figure" and report.when == "call":
+                terminalreporter.write_line(f"figure: {value}")

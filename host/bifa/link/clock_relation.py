@@ -9,7 +9,6 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
 
 LARGEST_DRIFT = 0.01
 EXCHANGES_KEPT = 64
@@ -80,6 +79,8 @@ class ClockRelation:
 
         A resonator that warms up bends the line; the exchanges are then widened by as little as makes them agree.
         """
+        from scipy.optimize import linprog  # takes half a second, and a console needs it never
+
         uno_0, host_0 = self._origin()
         sent, uno, received = np.array(self._exchanges).T
         uno, sent, received = uno - uno_0, sent - host_0, received - host_0

@@ -8,6 +8,8 @@ import time
 
 from board import Board
 
+STEP_S = 0.002
+
 
 class PtyUno:
     """The Uno's code behind a pty, in real time as far as it matters."""
@@ -17,6 +19,8 @@ class PtyUno:
         self.device = os.ttyname(slave)
         self._slave = slave
         self.board = Board()
+        self.heard_s = 0.0  # when the last byte came
+        self.driven_s = 0.0  # when a valve was last on
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
@@ -26,11 +30,14 @@ class PtyUno:
         while not self._ended.is_set():
             with contextlib.suppress(OSError):
                 self.board.write(os.read(self.master, 4096))
-            self.board.sleep(0.002)
+                self.heard_s = self.board.now()
+            self.board.sleep(STEP_S)
+            if self.board.valves:
+                self.driven_s = self.board.now()
             data = self.board.receive()
             with contextlib.suppress(BlockingIOError):  # nobody reads: a real port would lose bytes as well
                 os.write(self.master, data)
-            self._ended.wait(0.002)
+            self._ended.wait(STEP_S)
 
     def wait(self, duration_s: float) -> None:
         """Until so much of the board's own time has passed."""

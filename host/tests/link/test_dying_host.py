@@ -8,7 +8,7 @@ import sys
 import pytest
 from board import Board
 from link_native import HERE
-from pty_uno import PtyUno
+from pty_uno import STEP_S, PtyUno
 
 from bifa.link import Uno
 
@@ -55,8 +55,8 @@ def test_death_at_any_byte(timeout_s):
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(100, marks=pytest.mark.soak)])
-def test_sigkill(kills):
-    rng = random.Random(kills)
+def test_sigkill(kills, figure):
+    rng, longest_s = random.Random(kills), 0.0
     for _ in range(kills):
         uno = PtyUno()
         command = [sys.executable, HERE / "dying_host.py", uno.device, "0.3"]
@@ -66,4 +66,8 @@ def test_sigkill(kills):
             host.kill()
         uno.wait(0.5)
         assert (uno.board.valves, uno.board.state) == (0, "fault")
+        longest_s = max(longest_s, uno.driven_s - uno.heard_s)
+        assert longest_s < 0.3 + 0.003 + 2 * STEP_S
         uno.unplug()
+    if kills > 2:
+        figure(f"{kills} SIGKILLs: vented at most {longest_s * 1000:.0f} ms after the last byte; time-out 300 ms")

@@ -127,9 +127,8 @@ def test_uploads_to_the_image_over_a_faulty_line(rate):
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("board", "rate"), [("native", rate) for rate in RATES] + [("image", r) for r in RATES])
-def test_a_thousand_uploads(board, rate, capsys):
+def test_a_thousand_uploads(board, rate, figure):
     result = upload_many({"native": Board, "image": Chip}[board](), rate, uploads=1000, seed=11, restarts=1e-4)
-    with capsys.disabled():
-        print(f"\n{board} {rate:g}: " + ", ".join(f"{name} {value:.4g}" for name, value in result.items()))
+    figure(f"{board} {rate:g}: " + ", ".join(f"{name} {value:.4g}" for name, value in result.items()))
     if rate <= 1e-2:
         assert result["done"] == 1000

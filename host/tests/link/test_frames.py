@@ -133,10 +133,9 @@ def test_damaged_frames_are_never_taken_for_others():
 
 
 @pytest.mark.soak
-def test_ten_million_damaged_frames(capsys):
+def test_ten_million_damaged_frames(figure):
     totals = [sum(column) for column in zip(*(damage(1_000_000, seed) for seed in range(10)), strict=True)]
-    with capsys.disabled():
-        print(f"\ndamaged {totals[0]}, accepted as sent {totals[1]}, wrongly {totals[2]}, taken for a stop {totals[3]}")
+    figure(f"damaged {totals[0]}, accepted as sent {totals[1]}, wrongly {totals[2]}, taken for a stop {totals[3]}")
     assert totals[2] == 0
 
 

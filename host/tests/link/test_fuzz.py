@@ -79,7 +79,6 @@ def test_twenty_seconds(target, tmp_path):
 
 @pytest.mark.soak
 @pytest.mark.parametrize("target", TARGETS)
-def test_five_minutes(target, tmp_path, capsys):
+def test_five_minutes(target, tmp_path, figure):
     report = fuzz(target, 300, tmp_path)
-    with capsys.disabled():
-        print(f"\n{target}: {report.strip().splitlines()[-1]}")
+    figure(f"fuzzing {target}: {report.strip().splitlines()[-1]}")
