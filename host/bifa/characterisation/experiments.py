@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from bifa.data import Trial
 from bifa.errors import BifaError
 from bifa.link import Uno
+from bifa.link.units import set_point_psi
 
 from .alignment import ClockLine
 from .locomotion import record_walk
@@ -34,12 +35,15 @@ Progress = Callable[[float], None]
 def record_trial(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None) -> Trial:
     """Run one planned trial and return it as a data set holds it; the valves are off afterwards.
 
-    `extra` notes how well the clocks were lined up (`clock_error_s`) and, of a step, when the valves switched.
+    `extra` notes how well the clocks were lined up (`clock_error_s`), what the regulator was really asked for
+    (`set_point_psi`) and, of a step, when the valves switched.
     Raises BifaError where telemetry keeps getting lost or the clocks do not line up.
     """
     instruments_of(rig)
     for _ in range(_TRIALS_LOST):
         columns, extra, lost = _RUNS[planned.experiment](rig, uno, planned, on_progress)
+        if (commanded_psi := _commanded_psi(uno, planned)) >= 0.0:  # below: the vacuum, which nothing regulates
+            extra["set_point_psi"] = round(set_point_psi(commanded_psi), 4)
         if not lost:
             return planned.as_trial(columns, extra=extra)
     raise BifaError(f"{planned.file}: {lost} samples were lost on the link; check the cable, then resume the session")
@@ -116,6 +120,10 @@ _RUNS: dict[str, Callable[..., tuple[dict[str, np.ndarray], dict[str, Any], int]
     "anchor_pull": _pull,
     "locomotion": _walk,
 }
+
+
+def _commanded_psi(uno: Uno, planned: PlannedTrial) -> float:
+    return uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
 
 
 def _off(uno: Uno) -> None:

@@ -140,13 +140,18 @@ def inputs_of(trial: Trial) -> Inputs:
     return _MAKERS[trial.experiment](trial)
 
 
+def _pressure_psi(trial: Trial) -> float | None:
+    """What the regulator was asked for, where the recorder noted it: its converter has steps of 0.03 psi."""
+    return trial.extra.get("set_point_psi", trial.pressure_psi)
+
+
 def _static(trial: Trial) -> StaticInputs:
     x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
-    return StaticInputs(trial.actuator, elapsed_s(trial), x, direction, trial.pressure_psi)
+    return StaticInputs(trial.actuator, elapsed_s(trial), x, direction, _pressure_psi(trial))
 
 
 def _step(trial: Trial) -> StepInputs:
-    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), trial.pressure_psi, switch_sd_s(trial))
+    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), _pressure_psi(trial), switch_sd_s(trial))
 
 
 def _pull(trial: Trial) -> PullInputs:
@@ -156,7 +161,7 @@ def _pull(trial: Trial) -> PullInputs:
     return PullInputs(
         pulled_s=_pulled_time(elapsed_s(trial), pulled_mm, rate),
         rate_mm_s=-rate if backward else rate,
-        pressure_psi=trial.pressure_psi,
+        pressure_psi=_pressure_psi(trial),
         load_cell_N_m=float(trial.extra.get("load_cell_N_m", simulate.records.LOAD_CELL_N_M)),
     )
 
@@ -179,7 +184,7 @@ def _walk(trial: Trial) -> WalkInputs:
         time_s=elapsed_s(trial),
         commands=walk_timeline(trial),
         inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
-        positive_psi=trial.pressure_psi,
+        positive_psi=_pressure_psi(trial),
         channels=(*displacements, *pressures),
         switch_sd_s=switch_sd_s(trial),
     )

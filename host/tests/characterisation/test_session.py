@@ -49,6 +49,15 @@ def test_every_experiment_is_recorded_as_the_format_wants_it(recorded):
 
 
 @pytest.mark.uno
+def test_the_set_point_is_noted_as_the_converter_makes_it(recorded):
+    """8.5 psi is 267.8 counts, and the Uno rounds down: a fit that took 8.5 would find a sensor out of calibration."""
+    pull = recorded[0].of("anchor_pull")[0]
+    assert pull.pressure_psi == 8.5
+    assert pull.columns["pressure_psi"].mean() == pytest.approx(pull.extra["set_point_psi"], abs=0.01)
+    assert pull.extra["set_point_psi"] < 8.48
+
+
+@pytest.mark.uno
 def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(recorded):
     """The actuator snaps when its pressure does: an instrument that was off by a sample would show it."""
     dataset, _ = recorded
