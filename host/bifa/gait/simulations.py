@@ -41,7 +41,8 @@ class Simulations:
 
 
 def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Progress:
-    return speeds(plants, gaits, metric.cycles, metric.tolerance_m, inclination_deg=metric.inclination_deg, workers=1)
+    place = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
+    return speeds(plants, gaits, metric.cycles, metric.tolerance_m, **place, workers=1)
 
 
 @contextmanager

@@ -5,7 +5,9 @@ import pytest
 
 from bifa.gait import library
 from bifa.gait.library import LibraryError
-from bifa.simulate import gait_rows
+from bifa.robot import nominal
+from bifa.simulate import Supports, gait_rows, tunnel
+from bifa.simulate.passing import passing
 
 
 @pytest.mark.parametrize("name", library.SCENARIOS)
@@ -21,6 +23,12 @@ def test_a_gait_walks_as_fast_as_its_file_says(name, runs, nominal_plant):
 def test_what_is_required_of_the_fast_and_the_robust_gait():
     assert library.load("fast").provenance["predicted_speed_mm_s"] >= 23.4
     assert library.load("robust").provenance["predicted_10th_percentile_mm_s"] >= 21.8
+
+
+def test_the_obstacle_gait_brings_head_and_tail_through():
+    outcome = passing(nominal(), library.load("obstacle").gait, tunnel(), Supports())
+    assert outcome.through
+    assert outcome.extension.enough
 
 
 def test_an_unknown_scenario_names_the_known_ones():
