@@ -2,9 +2,9 @@
 
 Same model, same gaits, same four cycles, same run. The paper's eq. (5) needs a speed threshold, which it does not
 state. At 1e-2 m/s LSODA finishes, with a baseline half again too fast; at 1e-3 m/s it comes within a tenth of the right
-speed (1e-4: 1 %) and often does not finish at all: then it counts with the time after which it was stopped. Both are
-reported; the claim is made for 1e-3 m/s, since a wrong answer is no evaluation. Times are those of the processor, so
-that what else runs on the machine counts for neither side.
+speed (at 1e-4 within 1 %) and often does not finish at all. Both are reported; the claim is made for 1e-3 m/s, since a
+wrong answer is no evaluation, and for the gaits that LSODA finishes, since for the others the ratio only says when it
+was stopped. Times are those of the processor, so that what else runs on the machine counts for neither side.
 """
 
 from __future__ import annotations
@@ -37,16 +37,17 @@ def run() -> dict[str, float]:
     simulate.speeds(model, rows, CYCLES)  # compiled, or read from the cache
     ours = simulate.speeds(model, rows, CYCLES).speed_mm_s
     crude, theirs = (
-        float(np.mean([_papers_time(model, gait, e, speed) for gait, speed in zip(GAITS, ours, strict=True)]))
+        np.array([_papers_time(model, gait, e, speed) for gait, speed in zip(GAITS, ours, strict=True)])
         for e in THRESHOLDS_M_S
     )
+    each = np.array([_our_time(model, row) for row in rows])
+    ended = theirs < LONGEST_S
+    speedup = float(theirs[ended].sum() / each[ended].sum())
     batch = np.tile(rows, (200, 1))
     single, alone = _timed(lambda: simulate.speeds(model, batch, CYCLES, workers=1))
     together, both = _timed(lambda: simulate.speeds(model, batch, CYCLES))
     single, alone, together, both = (seconds / len(batch) for seconds in (single, alone, together, both))
     reference = _reference_error(model, rows)
-    print(f"one gait, {CYCLES} cycles, SciPy LSODA, threshold 1e-2 m/s (wrong by half): {crude:8.2f} s")
-    print(f"one gait, {CYCLES} cycles, SciPy LSODA, threshold 1e-3 m/s (stopped at {LONGEST_S:.0f} s): {theirs:8.2f} s")
     print(f"one gait, {CYCLES} cycles, bifa, one core: {alone * 1e3:8.3f} ms")
     cores = simulate.cores()
     print(f"evaluations per second, one core {1 / alone:.0f}; {cores} cores {1 / together:.0f} with what else ran")
@@ -54,14 +55,19 @@ def run() -> dict[str, float]:
         f"{cores} threads over one: {single / together:.2f} times as fast by the clock; "
         f"by the processor's time {cores * alone / both:.2f}, what threads cost each other"
     )
-    print(f"ratio on one core: {theirs / alone:.0f} (required: 5000); to the crude threshold {crude / alone:.0f}")
+    print(
+        f"ratio on one core, the {np.count_nonzero(ended)} gaits that LSODA finished: {speedup:.0f} (required: 5000); "
+        f"all, those stopped at {LONGEST_S:.0f} s: {theirs.sum() / each.sum():.0f}; "
+        f"to the threshold of 1e-2 m/s, wrong by half: {crude.sum() / each.sum():.0f}"
+    )
     print(f"advance in the last cycle against steps 100 times finer: within {reference:.2%}")
     return {
-        "gait_evaluation_speedup": theirs / alone,
-        "gait_evaluation_speedup_crude_threshold": crude / alone,
+        "gait_evaluation_speedup": speedup,
+        "gait_evaluation_speedup_with_stopped": float(theirs.sum() / each.sum()),
+        "gait_evaluation_speedup_crude_threshold": float(crude.sum() / each.sum()),
         "gait_evaluations_per_second": 1.0 / together,
         "gait_evaluations_per_second_one_core": 1.0 / alone,
-        "gait_evaluation_lsoda_s": theirs,
+        "gait_evaluation_lsoda_s": float(theirs[ended].mean()),
         "gait_evaluation_core_scaling": single / together,
         "gait_evaluation_core_scaling_processor": cores * alone / both,
     }
@@ -77,6 +83,10 @@ def _papers_time(model: Model, gait: Gait, threshold_m_s: float, ours_mm_s: floa
     print(f"LSODA, threshold {threshold_m_s:g} m/s, gait of {gait.period_s:g} s: {seconds:.1f} s, {said}", end="")
     print(f" (without a threshold: {ours_mm_s:.1f} mm/s)", flush=True)
     return seconds
+
+
+def _our_time(model: Model, row: np.ndarray, times: int = 200) -> float:
+    return _timed(lambda: simulate.speeds(model, np.tile(row, (times, 1)), CYCLES, workers=1))[1] / times
 
 
 def _timed(job) -> tuple[float, float]:
