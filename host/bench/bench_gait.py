@@ -34,15 +34,18 @@ def run() -> dict[str, float]:
             scatter = float(np.ptp(speeds) / np.mean(speeds))
             peer = f"paper {PAPER_MM_S}" if not robust else "10th percentile of a 2 % spread"
             print(f"  {name}: {min(speeds):.2f} to {max(speeds):.2f} mm/s (required {required}; {peer})")
+            shared = max(processor) / cores()
             print(
-                f"    {max(seconds):.1f} s at most (allowed {SECONDS_ALLOWED:g}), {max(processor):.1f} s of processor; "
-                f"seeds within {100 * scatter:.2f} % (allowed 1)"
+                f"    at most {max(processor):.1f} s of processor, {shared:.1f} s on each of {cores()} cores; "
+                f"{max(seconds):.1f} s by the clock with what else ran (allowed {SECONDS_ALLOWED:g})"
             )
+            print(f"    seeds within {100 * scatter:.2f} % (allowed 1)")
             figures |= {
                 f"gait_{name}_mm_s": min(speeds),
                 f"gait_{name}_required_mm_s": required,
                 f"gait_{name}_seconds": max(seconds),
                 f"gait_{name}_processor_seconds": max(processor),
+                f"gait_{name}_seconds_a_core": shared,
                 f"gait_{name}_seed_scatter": scatter,
             }
     return figures | {"gait_seconds_allowed": SECONDS_ALLOWED, "gait_paper_mm_s": PAPER_MM_S}

@@ -11,10 +11,6 @@ from bifa.gait.space import SearchSpace
 from bifa.simulate import Plant, gait_rows
 
 QUANTILE = 0.10
-# The search itself demands this share of its own few draws: a gait tuned until one in ten of them fails would fail
-# more often on robots that it has not met.
-SEARCH_QUANTILE = 0.05
-_ABANDON = 0.9  # a gait that cannot reach this share of the best one's value is not simulated further
 _FIRST_DRAWS = 3
 
 
@@ -35,7 +31,7 @@ class RobustSpeed:
     """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws.
 
     Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so
-    the r-th smallest met so far bounds it from above: a gait whose bound is below `_ABANDON` of the best value
+    the r-th smallest met so far bounds it from above: a gait whose bound is below `abandon` of the best value
     is given up, and the bound is its value. Draws that gave up most gaits come first.
     """
 
@@ -46,13 +42,14 @@ class RobustSpeed:
         draws: Sequence[Plant],
         space: SearchSpace,
         metric: Metric | Passage,
-        share: float = SEARCH_QUANTILE,
+        share: float = QUANTILE,
+        abandon: float = 0.9,
     ):
         self._runs, self._space, self._metric = runs, space, metric
         self._plants = [nominal, *draws]
         self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
-        self._best = 0.0
+        self._abandon, self._best = abandon, 0.0
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """(n,) of points (n, dimensions) of the unit cube, in mm/s."""
@@ -61,7 +58,7 @@ class RobustSpeed:
         order = np.argsort(-self._failures, kind="stable")
         met = np.full((len(rows), draws), np.inf)
         bound = self._speeds(rows, np.zeros(len(rows), dtype=np.int64))
-        alive = np.flatnonzero(bound >= max(_ABANDON * self._best, 1e-9))
+        alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
         while alive.size and done < draws:
             batch = order[done : done + size]
@@ -69,11 +66,11 @@ class RobustSpeed:
             met[gaits, which] = self._speeds(rows[gaits], which + 1)
             done, size = done + len(batch), 2 * size
             bound[alive] = np.minimum(bound[alive], np.partition(met[alive], self._rank - 1)[:, self._rank - 1])
-            low = met[np.ix_(alive, batch)] < _ABANDON * np.maximum(bound[alive], self._best)[:, None]
+            low = met[np.ix_(alive, batch)] < self._abandon * np.maximum(bound[alive], self._best)[:, None]
             self._failures[batch] += low.mean(axis=0)
             if done >= draws:
                 self._best = max(self._best, float(bound[alive].max()))
-            alive = alive[bound[alive] >= max(_ABANDON * self._best, 1e-9)]
+            alive = alive[bound[alive] >= max(self._abandon * self._best, 1e-9)]
         return bound
 
     def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:

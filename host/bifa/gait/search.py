@@ -21,14 +21,31 @@ from bifa.simulate import gait_rows, plant
 # (stage, share of the stage that is done, best value so far in mm/s) -> None
 OnProgress = Callable[[str, float, float], None]
 
-DRAWS = 40  # robots that each gait meets in a robust search
-VERIFYING_DRAWS = 512  # that the chosen one meets, all new
-_SHORTLIST_DRAWS = 192
-_SHORTLIST_QUANTILE = 0.075  # a margin for what 192 draws leave uncertain
-_NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 48
-_REFINE_STEP = 0.015  # of the unit cube
-_REFINE_SHARE = 0.33  # of the evaluations, in addition
-EVALUATIONS = {"nominal": {"de": 4000, "cma": 4000, "bo": 1000}, "robust": {"de": 1200, "cma": 1200, "bo": 1000}}
+VERIFYING_DRAWS = 512  # robots that the chosen gait meets, all new
+_NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 12
+EVALUATIONS = {"nominal": {"de": 4000, "cma": 4000, "bo": 1000}, "robust": {"de": 1500, "cma": 1500, "bo": 1000}}
+_POPULATION = 12
+
+
+@dataclass(frozen=True)
+class Round:
+    """Of a robust search: how many robots a gait meets, what quantile of the speed counts, the share of the best value
+    at which a gait is given up; and of the CMA-ES run on that: its evaluations over the method's, its first step."""
+
+    draws: int
+    quantile: float
+    abandon: float
+    evaluations: float = 0.0
+    step: float = 0.0
+
+
+# Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
+# in ten of its own robots fails would fail more often on others.
+_EXPLORE = Round(24, 0.08, 0.9)
+_REFINE = (Round(64, 0.0625, 0.93, 0.2, 0.03), Round(192, 0.0677, 0.97, 0.11, 0.01))
+_SHORTLIST = Round(384, 0.075, 0.97)
+_STARTS = 24  # of the explored gaits, compared on a round's robots
+_NOMINAL_STEP, _NOMINAL_SHARE = 0.015, 0.33  # the same for the model's own speed
 
 
 class SearchError(BifaError):
@@ -38,7 +55,7 @@ class SearchError(BifaError):
 @dataclass(frozen=True)
 class Settings:
     """How to search. `evaluations` None: a number that suits the method. `spread` None: the model's covariance,
-    or 2 % without one. `refine`: follow the method with a small CMA-ES run from its best points (the paper did not)."""
+    or 2 % without one. `refine`: follow the method with small CMA-ES runs from its best points (the paper did not)."""
 
     method: str = "de"
     robust: bool = True
@@ -55,7 +72,7 @@ class Optimum:
     """The gait and what is known of it.
 
     nominal_mm_s: verified on the model itself, 20 cycles with a finer step. speeds_mm_s: (n,) on `VERIFYING_DRAWS`
-    robots that the search never met; quantile_mm_s: their 10th percentile. explored: what the search evaluated.
+    robots that the search never met; quantile_mm_s: their 10th percentile. explored: what the method evaluated.
     """
 
     gait: Gait
@@ -83,8 +100,7 @@ def optimise(
     started = runs.count
     flat, spread = plant(model), spread_of(model, settings.spread)
     if settings.robust:
-        draws = spread.plants(model, DRAWS, settings.seed)
-        objective = RobustSpeed(runs, flat, draws, settings.space, settings.metric.quicker())
+        objective = _on_robots(model, runs, spread, settings, _EXPLORE, 0)
     else:
         objective = NominalSpeed(runs, flat, settings.space, settings.metric)
     explored = _explore(objective, settings, say)
@@ -92,8 +108,12 @@ def optimise(
         raise SearchError(
             f"none of {len(explored.values)} gaits walks without slipping; widen the space or search longer"
         )
-    verify = _robustly if settings.robust else _nominally
-    gait, nominal = verify(model, runs, spread, explored, settings, say)
+    if settings.robust:
+        refined = _refine_on_robots(model, runs, spread, explored, settings, say) if settings.refine else []
+        gait, nominal = _robustly(model, runs, spread, [explored, *refined][-1], settings, say)
+    else:
+        refined = [_refine(objective, explored, settings, say)] if settings.refine else []
+        gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, say)
     fresh = spread.plants(model, VERIFYING_DRAWS, settings.seed + 2_000_003)
     speeds = distribution(runs, fresh, gait_rows([gait]), settings.metric)[0]
     say("verify", 1.0, nominal)
@@ -104,30 +124,66 @@ def optimise(
         speeds,
         spread,
         settings,
-        len(explored.values),
+        sum(len(found.values) for found in (explored, *refined)),
         runs.count - started,
         explored,
     )
 
 
 def _explore(objective, settings: Settings, say: OnProgress) -> Found:
-    budget = settings.evaluations or EVALUATIONS["robust" if settings.robust else "nominal"][settings.method]
-    wraps = settings.space.wraps
-    found = METHODS[settings.method](
-        objective, wraps, budget, settings.seed, lambda count, best: say("search", min(count / budget, 1.0), best)
+    budget = _budget(settings)
+    return METHODS[settings.method](
+        objective,
+        settings.space.wraps,
+        budget,
+        settings.seed,
+        lambda count, best: say("search", min(count / budget, 1.0), best),
     )
-    if not settings.refine or found.best_value <= 0.0:
-        return found
-    share = round(_REFINE_SHARE * budget)
+
+
+def _budget(settings: Settings) -> int:
+    return settings.evaluations or EVALUATIONS["robust" if settings.robust else "nominal"][settings.method]
+
+
+def _refine(objective, explored: Found, settings: Settings, say: OnProgress) -> Found:
+    """CMA-ES from the best."""
+    share = round(_NOMINAL_SHARE * _budget(settings))
     recorder = Recorder(
-        objective, wraps, lambda count, best: say("refine", min(count / share, 1.0), max(best, found.best_value))
+        objective,
+        settings.space.wraps,
+        lambda count, best: say("refine", min(count / share, 1.0), max(best, explored.best_value)),
     )
-    climb(recorder, found.best_point, _REFINE_STEP, share, settings.seed, population=12)
-    refined = recorder.found()
-    return Found(np.concatenate([found.points, refined.points]), np.concatenate([found.values, refined.values]))
+    climb(recorder, explored.best_point, _NOMINAL_STEP, share, settings.seed, _POPULATION)
+    return recorder.found()
 
 
-def _nominally(model, runs, spread, explored, settings, say) -> tuple[Gait, float]:
+def _refine_on_robots(model, runs, spread, explored: Found, settings: Settings, say: OnProgress) -> list[Found]:
+    """CMA-ES in rounds of more robots each, every time from the gait of the round before that these robots like best:
+    what was best on few robots may owe it to them."""
+    found, starts = [explored], _STARTS
+    for number, stage in enumerate(_REFINE, start=1):
+        objective = _on_robots(model, runs, spread, settings, stage, number)
+        budget = max(2 * _POPULATION, round(stage.evaluations * _budget(settings)))
+        recorder = Recorder(
+            objective,
+            settings.space.wraps,
+            lambda count, best, number=number, budget=budget: say(f"refine {number}", min(count / budget, 1.0), best),
+        )
+        recorder(found[-1].finalists(starts, apart=0.02))
+        climb(recorder, recorder.found().best_point, stage.step, budget, settings.seed, _POPULATION)
+        found.append(recorder.found())
+        starts = _POPULATION
+    return found[1:]
+
+
+def _on_robots(model, runs, spread: Spread, settings: Settings, stage: Round, number: int) -> RobustSpeed:
+    """The objective of a round, on robots of its own."""
+    draws = spread.plants(model, stage.draws, settings.seed + 500_000 * number)
+    metric = settings.metric.quicker()
+    return RobustSpeed(runs, plant(model), draws, settings.space, metric, stage.quantile, stage.abandon)
+
+
+def _nominally(model, runs, explored: Found, settings, say) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fail: the fastest gaits live at a cliff."""
     rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=0.003)))
     speeds = _finely(model, runs, rows, settings)
@@ -135,23 +191,20 @@ def _nominally(model, runs, spread, explored, settings, say) -> tuple[Gait, floa
     return _best(rows, speeds)
 
 
-def _robustly(model, runs, spread, explored, settings, say) -> tuple[Gait, float]:
-    """The best of the finalists over robots that the search did not meet, if the finer metric passes it.
-
-    The finalists lie apart: what the search likes best may owe it to the few robots that the search met.
-    """
-    points = explored.finalists(_ROBUST_FINALISTS, apart=0.015)
-    fresh = spread.plants(model, _SHORTLIST_DRAWS, settings.seed + 1_000_003)
-    objective = RobustSpeed(runs, plant(model), fresh, settings.space, settings.metric, _SHORTLIST_QUANTILE)
-    values = np.concatenate([objective(part) for part in np.array_split(points, max(1, len(points) // 8))])
+def _robustly(model, runs, spread, refined: Found, settings, say) -> tuple[Gait, float]:
+    """The best of the finalists over robots that the search did not meet, if the finer metric passes it."""
+    points = refined.finalists(_ROBUST_FINALISTS, apart=0.003)
+    objective = _on_robots(model, runs, spread, settings, _SHORTLIST, 3)
+    values = np.concatenate([objective(part) for part in np.array_split(points, max(1, len(points) // 6))])
     say("verify", 0.6, float(values.max()))
     order = np.argsort(-values, kind="stable")[:8]
     rows = gait_rows(settings.space.gaits(points[order]))
-    stands = np.flatnonzero((_finely(model, runs, rows, settings) > 0.0) & (values[order] > 0.0))
+    finely = _finely(model, runs, rows, settings)
+    stands = np.flatnonzero((finely > 0.0) & (values[order] > 0.0))
     if not stands.size:
         raise SearchError("no finalist stands a finer step and 20 cycles; search longer")
-    row = rows[stands[:1]]
-    return Gait(*row[0].tolist()), float(_finely(model, runs, row, settings)[0])
+    first = stands[0]
+    return Gait(*rows[first].tolist()), float(finely[first])
 
 
 def _finely(model, runs, rows: np.ndarray, settings: Settings) -> np.ndarray:

@@ -34,7 +34,7 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
     draws = spread_of(nominal()).plants(nominal(), 32, seed=5)
     metric, space = Metric().quicker(), paper_space()
     points = np.array([space.point(space.gaits(space.point(gait_of(row))[None])[0]) for row in near(ROBUST[0])])
-    robust = RobustSpeed(runs, nominal_plant, draws, space, metric)(points)
+    robust = RobustSpeed(runs, nominal_plant, draws, space, metric, share=0.05)(points)
     rows = gait_rows(space.gaits(points))
     speeds = np.sort(distribution(runs, draws, rows, metric), axis=1)
     alone = NominalSpeed(runs, nominal_plant, space, metric)(points)

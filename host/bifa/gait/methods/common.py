@@ -28,6 +28,11 @@ class Found:
         """The highest value."""
         return float(self.values.max())
 
+    def joined(self, *others: "Found") -> "Found":
+        """Both, of one objective."""
+        parts = (self, *others)
+        return Found(np.concatenate([part.points for part in parts]), np.concatenate([part.values for part in parts]))
+
     def finalists(self, count: int, apart: float = 0.01) -> np.ndarray:
         """(m, dimensions) of the best points, m <= count, no two closer than `apart` on every axis."""
         chosen: list[np.ndarray] = []
