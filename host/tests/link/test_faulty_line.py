@@ -15,7 +15,9 @@ from bifa.link import LinkError, NoAnswerError, RestartedError, Uno
 from bifa.link.table import PARAMETERS
 from bifa.link.units import from_wire, to_wire
 
-RATES = (1e-4, 1e-3, 1e-2, 1e-1)
+# probability of a bad byte: probability that the Uno restarts in the middle of what is sent at once
+RESTARTS = {1e-4: 3e-3, 1e-3: 3e-3, 1e-2: 2e-3, 1e-1: 1e-4}
+RATES = tuple(RESTARTS)
 BASELINE = {p.name: p.default for p in PARAMETERS}
 
 
@@ -29,13 +31,14 @@ class Restarts:
     """Restarts the Uno in the middle of what is sent, now and then."""
 
     def __init__(self, board, rng: random.Random, probability: float) -> None:
-        self.board, self.rng, self.probability, self.count = board, rng, probability, 0
+        self.board, self.rng, self.probability, self.count, self.total = board, rng, probability, 0, 0
 
     def write(self, data: bytes) -> None:
         if self.rng.random() >= self.probability:
             self.board.write(data)
             return
         self.count += 1
+        self.total += 1
         self.board.write(data[: self.rng.randrange(len(data))])
         self.board.sleep(0.001)
         self.board.reset()
@@ -103,6 +106,7 @@ def upload_many(board, rate: float, uploads: int, seed: int, restarts: float = 0
         "longest_s": longest_s,
         "faults": line.faults,
         "resent": uno.counters.resent,
+        "restarts": restarting.total,
     }
 
 
@@ -128,7 +132,9 @@ def test_uploads_to_the_image_over_a_faulty_line(rate):
 @pytest.mark.soak
 @pytest.mark.parametrize(("board", "rate"), [("native", rate) for rate in RATES] + [("image", r) for r in RATES])
 def test_a_thousand_uploads(board, rate, figure):
-    result = upload_many({"native": Board, "image": Chip}[board](), rate, uploads=1000, seed=11, restarts=1e-4)
+    result = upload_many(
+        {"native": Board, "image": Chip}[board](), rate, uploads=1000, seed=11, restarts=RESTARTS[rate]
+    )
     figure(f"{board} {rate:g}: " + ", ".join(f"{name} {value:.4g}" for name, value in result.items()))
     if rate <= 1e-2:
         assert result["done"] == 1000
