@@ -42,7 +42,7 @@ class Round:
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
 # in ten of its own robots fails would fail more often on others.
 _EXPLORE = Round(24, 0.08, 0.9)
-_REFINE = (Round(64, 0.0625, 0.93, 0.2, 0.03), Round(192, 0.0677, 0.97, 0.11, 0.01))
+_REFINE = (Round(64, 0.0625, 0.93, 0.3, 0.05), Round(192, 0.0677, 0.97, 0.11, 0.01))
 _SHORTLIST = Round(384, 0.075, 0.97)
 _STARTS = 24  # of the explored gaits, compared on a round's robots
 _NOMINAL_STEP, _NOMINAL_SHARE = 0.015, 0.33  # the same for the model's own speed
