@@ -117,13 +117,13 @@ def strobe_jitter() -> int:
     uno = connected(board)
     uno.run()
     uno.stream(True)
-    first = len(board.events)
+    first = board.event_count
     for period_s in (2.72, 5.7, 3.0, 5.7):
         uno.upload({"period_s": period_s, "psi12_deg": 204.5, "duty_body": 0.65})
         stimulate(board, 0.5)
     edges = [
         event.cycle
-        for event in itertools.islice(board.iter_events(), first, None)
+        for event in board.iter_events(first)
         if event.kind == "pin" and event.index == STROBE_PIN and event.value == 1
     ]
     offsets = [cycle - edges[0] - n * (CLOCK_HZ // 100) for n, cycle in enumerate(edges)]

@@ -25,5 +25,14 @@ class FirmwareError(VirtualRobotError):
         super().__init__(f"firmware image {path}: {why}; build it with `pio run -e uno`")
 
 
+class EventsGoneError(VirtualRobotError):
+    """The log of events has dropped what was asked for."""
+
+    def __init__(self, first: int) -> None:
+        super().__init__(
+            f"event {first} is no longer in the log, which keeps the last half a million: read it more often"
+        )
+
+
 class PortClosedError(ConnectionError):
     """The simulated serial port is no longer there (closed, or the board has no power)."""

@@ -64,7 +64,7 @@ def test_stop_byte(bench, state, phase_us):
     state(bench)
     bench.board.run_for(phase_us * 1e-6)
     waiting = bench.board.bytes_on_the_wire
-    first = len(bench.board.events)
+    first = bench.board.event_count
     begin = bench.board.cycle
     bench.board.send(b"!")
     while bench.board.bytes_on_the_wire:
@@ -83,7 +83,7 @@ def test_stop_byte(bench, state, phase_us):
 def test_emergency_stop(bench, state, phase_us):
     state(bench)
     bench.board.run_for(phase_us * 1e-6)
-    first = len(bench.board.events)
+    first = bench.board.event_count
     begin = bench.board.cycle
     bench.board.press_emergency_stop()
     assert all_off_after(bench, first, begin) <= LIMIT_CYCLES
@@ -121,7 +121,7 @@ def test_a_stop_is_heard_20_ms_after_a_stray_delimiter(bench):
 def test_stop_message(bench):
     walking(bench)
     message = b"\x00\x00" + frames.STOP_FRAME + b"\x00"
-    first = len(bench.board.events)
+    first = bench.board.event_count
     bench.board.send(message)
     while bench.board.bytes_on_the_wire:
         bench.board.run_until(bench.board.cycle + 16)

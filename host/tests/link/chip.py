@@ -51,7 +51,7 @@ class Chip:
         The line must be idle and at least one valve on.
         """
         assert self.valves() != 0
-        known = sum(1 for _ in self.uno.iter_events())
+        known = self.uno.event_count
         arrived = self.uno.cycle + (len(before) + len(stop)) * CYCLES_A_BYTE
         self.uno.send(before + stop + after)
         self.uno.run_until(arrived + len(after) * CYCLES_A_BYTE + CLOCK_HZ // 100)

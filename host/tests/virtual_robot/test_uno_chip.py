@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from virtual_robot.errors import FirmwareError
+from virtual_robot.errors import EventsGoneError, FirmwareError
 from virtual_robot.uno import CLOCK_HZ, Uno
 
 pytestmark = pytest.mark.uno
@@ -153,16 +153,30 @@ def test_without_power_time_passes_and_nothing_runs(board):
     uno = board(TICK)
     uno.run_for(0.01)
     uno.power_off()
-    count = len(uno.events)
+    count = uno.event_count
     uno.run_for(0.01)
     assert not uno.powered
-    assert len(uno.events) == count
+    assert uno.event_count == count
     uno.reset("external")  # a button without power does nothing
     uno.run_for(0.01)
-    assert len(uno.events) == count
+    assert uno.event_count == count
     uno.reset("power-on")
     uno.run_for(0.01)
-    assert len(uno.events) > count
+    assert uno.event_count > count
+
+
+def test_an_event_keeps_its_number_when_the_log_drops_older_ones(board):
+    uno = board("int main(void) { DDRD = 0x10; for (;;) PIND = 0x10; }")
+    uno.run_for(0.2)
+    first = uno.event_count
+    (last_seen,) = uno.iter_events(first - 1)
+    uno.run_for(0.1)
+    assert uno.event_count > 1 << 20, "more than the log holds"
+    new = list(uno.iter_events(first))
+    assert len(new) == uno.event_count - first
+    assert {b.cycle - a.cycle for a, b in itertools.pairwise([last_seen, *new])} == {3}, "none is missing"
+    with pytest.raises(EventsGoneError):
+        _ = uno.events
 
 
 def test_a_runaway_program_counter_is_a_crash_with_pins_off(board):

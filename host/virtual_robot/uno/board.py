@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from virtual_robot.errors import FirmwareError, NotBuiltError
+from virtual_robot.errors import EventsGoneError, FirmwareError, NotBuiltError
 from virtual_robot.uno import elf
 
 try:
@@ -232,9 +232,16 @@ class Uno:
     def events(self) -> list[Event]:
         return list(self.iter_events())
 
+    @property
+    def event_count(self) -> int:
+        """The number of the next event: pass it to `iter_events` later to see what came since."""
+        return lib.uno_event_count(self._uno)
+
     def iter_events(self, first: int = 0) -> Iterator[Event]:
         block = ffi.new("UnoEvent[1024]")
         while count := lib.uno_events(self._uno, block, first, 1024):
+            if count < 0:
+                raise EventsGoneError(first)
             for i in range(count):
                 event = block[i]
                 yield Event(event.cycle, _EVENT_KINDS[event.kind], event.index, event.value)

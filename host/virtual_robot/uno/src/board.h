@@ -150,6 +150,7 @@ struct Uno {
   Eeprom eeprom;
   UnoEvent *events;
   int event_count, event_capacity;
+  int64_t events_dropped;
   bool keep_events;
   uint64_t event_hash;
 };

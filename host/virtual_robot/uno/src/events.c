@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Everything that leaves the board, with its cycle: a log for tests and a running hash for determinism.
+// An event keeps its number for good, also when older ones have been dropped.
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,6 +22,7 @@ void events_add(Uno *uno, int kind, int index, int value) {
   if (uno->event_count == EVENT_LIMIT) {
     memmove(uno->events, uno->events + EVENT_LIMIT / 2, EVENT_LIMIT / 2 * sizeof *uno->events);
     uno->event_count = EVENT_LIMIT / 2;
+    uno->events_dropped += EVENT_LIMIT / 2;
   }
   if (uno->event_count == uno->event_capacity) {
     uno->event_capacity = uno->event_capacity ? 2 * uno->event_capacity : 1024;
@@ -29,19 +31,21 @@ void events_add(Uno *uno, int kind, int index, int value) {
   uno->events[uno->event_count++] = event;
 }
 
-int uno_event_count(const Uno *uno) { return uno->event_count; }
+int64_t uno_event_count(const Uno *uno) { return uno->events_dropped + uno->event_count; }
 
-int uno_events(const Uno *uno, UnoEvent *events, int first, int capacity) {
-  int count = uno->event_count - first;
+int uno_events(const Uno *uno, UnoEvent *events, int64_t first, int capacity) {
+  if (first < uno->events_dropped) return -1;
+  int64_t count = uno_event_count(uno) - first;
   if (count > capacity) count = capacity;
   if (count <= 0) return 0;
-  memcpy(events, uno->events + first, count * sizeof *events);
+  memcpy(events, uno->events + (first - uno->events_dropped), count * sizeof *events);
   return count;
 }
 
 void uno_keep_events(Uno *uno, int keep) {
   uno->keep_events = keep;
   uno->event_count = 0;
+  uno->events_dropped = 0;
 }
 
 void queue_push(ByteQueue *queue, ByteAt item) {

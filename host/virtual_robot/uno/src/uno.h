@@ -76,8 +76,10 @@ uint32_t uno_program_counter(const Uno *uno);
 // Bytes above `from` that the firmware has never written since power-on (RAM starts painted).
 int uno_untouched_ram(const Uno *uno, uint16_t from);
 
-int uno_events(const Uno *uno, UnoEvent *events, int first, int capacity);  // returns how many were copied
-int uno_event_count(const Uno *uno);
+// Events are numbered from 0 since uno_keep_events(); the log keeps at least the last half a million.
+// Returns how many from number `first` on were copied, -1 if that one has been dropped.
+int uno_events(const Uno *uno, UnoEvent *events, int64_t first, int capacity);
+int64_t uno_event_count(const Uno *uno);  // also those that have been dropped
 void uno_keep_events(Uno *uno, int keep);
 
 #endif
