@@ -10,16 +10,25 @@ from bifa.campaign.page import campaign_page
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import predict, speeds
 from bifa.data import Trial, read_dataset
+from bifa.gait import simulations
 from bifa.gait.measured import measured_speed
+from bifa.gait.metric import Metric
+from bifa.gait.objectives import distribution
+from bifa.gait.uncertainty import spread_of
+from bifa.report.evidence import draw_errors
 from bifa.report.page import render
 from bifa.report.walks import Walk, draw_walks
 from bifa.robot import Model, load_model
+from bifa.robot.gait import Gait
+from bifa.simulate import gait_rows
 
 TITLES = {
     "baseline": "baseline gait",
     "base": "gait from the base model",
     "completed": "gait from the completed model",
 }
+SPREAD = 0.02  # of every parameter, for which a gait has to stand: robots change from day to day
+_ROBOTS = 256
 PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3}
 
 
@@ -36,11 +45,11 @@ class GaitResult:
 
 
 def compare(sealed: bool) -> Stage:
-    """The stage that makes `summary.json`, `report.html` and `walks.png`."""
-    needs = ("model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "diagnosis.json")
-    if sealed:
-        needs = (*needs, "truth.json")
-    return Stage("compare", "compare and report", needs, ("summary.json", "walks.png", "report.html"), _run)
+    """The stage that makes `summary.json`, `report.html` and its two main figures."""
+    needs = ["model-base.toml", "model-completed.toml", "walks-base", "walks-completed"]
+    needs += ["diagnosis.json", "residuals.json", *(["truth.json"] if sealed else [])]
+    makes = ("summary.json", "walks.png", "errors.png", "report.html")
+    return Stage("compare", "compare and report", tuple(needs), makes, _run)
 
 
 def _run(inputs: Path, outputs: Path) -> None:
@@ -63,12 +72,14 @@ def _run(inputs: Path, outputs: Path) -> None:
                 )
             )
     diagnosis = json.loads((inputs / "diagnosis.json").read_text())
+    traces = json.loads((inputs / "residuals.json").read_text())
     truth = json.loads((inputs / "truth.json").read_text()) if (inputs / "truth.json").exists() else None
     summary = {
         "gaits": [asdict(result) for result in results],
         "verdict": diagnosis["verdict"],
         "effects": diagnosis["effects"],
         "error": diagnosis["error"],
+        "robustness": _robustness(completed, trials),
         "truth": truth,
     }
     (outputs / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
@@ -78,7 +89,17 @@ def _run(inputs: Path, outputs: Path) -> None:
         if t.repeat == 1
     ]
     draw_walks(columns, outputs / "walks.png")
-    (outputs / "report.html").write_text(render(campaign_page(summary, diagnosis, columns)))
+    draw_errors(diagnosis["error"], outputs / "errors.png")
+    (outputs / "report.html").write_text(render(campaign_page(summary, diagnosis, traces, columns)))
+
+
+def _robustness(model: Model, trials: list[Trial]) -> dict[str, list[float]]:
+    """Speeds in mm/s of every gait on robots that differ from the model by `SPREAD` in each parameter, sorted."""
+    gaits = {trial.file.rsplit("_", 1)[0]: Gait(**trial.gait) for trial in trials}
+    robots = spread_of(model, SPREAD).plants(model, _ROBOTS, 0)
+    with simulations() as runs:
+        speeds = distribution(runs, robots, gait_rows(list(gaits.values())), Metric())
+    return {name: [round(float(v), 2) for v in np.sort(row)] for name, row in zip(gaits, speeds, strict=True)}
 
 
 def predicted_speed(model: Model, trial: Trial) -> float:

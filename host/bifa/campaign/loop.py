@@ -6,15 +6,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bifa.campaign.bench import Bench
-from bifa.campaign.compare import compare
+from bifa.campaign.compare import SPREAD, compare
+from bifa.campaign.residuals import residuals
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
 from bifa.characterisation import plan
 from bifa.characterisation.identification import identify
+from bifa.characterisation.resolve import resolve
 from bifa.characterisation.session import run_session
 from bifa.characterisation.system import prepare
-from bifa.data import read_dataset, write_dataset
-from bifa.discrepancy.diagnosis import diagnose
+from bifa.data import Dataset, read_dataset, write_dataset
+from bifa.discrepancy.diagnosis import Diagnosis, diagnose
 from bifa.discrepancy.record import as_record
 from bifa.gait import Settings, optimise, simulations
 from bifa.gait.library import provenance
@@ -23,6 +25,8 @@ from bifa.robot import load_model, save_model
 from bifa.robot.gait import BASELINE, load_gait, save_gait
 
 Part = Callable[[str, float], None]
+
+_SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects
 
 # What a lab measures directly; the vacuum is what the pump makes of it, and fitted.
 KNOWN = {"head_mass_kg": 0.175, "tail_mass_kg": 0.175, "supply_positive_psi": round(set_point_psi(8.5), 4)}
@@ -92,10 +96,11 @@ def _optimise(name: str, title: str, model: str, gait: str, bench: Bench, part: 
     def run(inputs: Path, outputs: Path) -> None:
         robot = load_model(inputs / model)
         with simulations() as runs:
-            best = optimise(robot, runs, Settings(seed=bench.seed), lambda what, share, _: part(what, share))
+            settings = Settings(seed=bench.seed, spread=SPREAD)
+            best = optimise(robot, runs, settings, lambda what, share, _: part(what, share))
         save_gait(outputs / gait, best.gait, provenance(best, robot.name, "bifa campaign"))
 
-    return Stage(name, title, (model,), (gait,), run, {"seed": bench.seed})
+    return Stage(name, title, (model,), (gait,), run, {"seed": bench.seed, "spread": SPREAD})
 
 
 def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, effort: Effort, part: Part) -> Stage:
@@ -112,17 +117,26 @@ def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, ef
 
 
 def _diagnose(bench: Bench, part: Part) -> Stage:
+    def diagnosed(dataset: Dataset) -> Diagnosis:
+        return diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
+
     def run(inputs: Path, outputs: Path) -> None:
-        system = prepare(read_dataset(inputs / "bench"))
-        found = diagnose(system, seed=bench.seed, progress=lambda what: part(what, 0.0))
-        record = as_record(found)
+        dataset = read_dataset(inputs / "bench")
+        found = diagnosed(dataset)
+        (outputs / "separating").mkdir()
+        _, found, ran = resolve(
+            dataset, found, diagnosed, lambda n: bench.open(_SEPARATING + n), outputs / "separating", part
+        )
+        record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
-        completed = system.model_at(found.final.theta, found.final.structure.effects)
-        save_model(outputs / "model-completed.toml", completed)
+        (outputs / "residuals.json").write_text(json.dumps(residuals(found)) + "\n")
+        structure = found.final.structure
+        save_model(outputs / "model-completed.toml", structure.system.model_at(found.final.theta, structure.effects))
 
-    makes = ("diagnosis.json", "model-completed.toml")
-    return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, {"seed": bench.seed})
+    makes = ("diagnosis.json", "residuals.json", "model-completed.toml", "separating")
+    settings = bench.settings(_SEPARATING)
+    return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings)
 
 
 def _unseal(bench: Bench) -> Stage:

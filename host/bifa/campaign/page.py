@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from bifa.report.animation import animate_walk
 from bifa.report.evidence import draw_errors, draw_probabilities
 from bifa.report.page import Page, Section, Table, both_palettes
+from bifa.report.residuals import draw_residuals
+from bifa.report.robustness import draw_robustness
 from bifa.report.walks import Walk, draw_walks
 
 GAIT_NAMES = {
@@ -14,8 +16,8 @@ GAIT_NAMES = {
 }
 
 
-def campaign_page(summary: Mapping, diagnosis: Mapping, walks: Sequence[Walk]) -> Page:
-    """The page of a campaign; `summary` and `diagnosis` as in summary.json and diagnosis.json."""
+def campaign_page(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping], walks: Sequence[Walk]) -> Page:
+    """The page of a campaign; summary, diagnosis and traces as in summary.json, diagnosis.json and residuals.json."""
     gaits = {gait["gait"]: gait for gait in summary["gaits"]}
     error = diagnosis["error"]
     facts = [
@@ -44,8 +46,14 @@ def campaign_page(summary: Mapping, diagnosis: Mapping, walks: Sequence[Walk]) -
                     "Error before and after per experiment, on a logarithmic axis",
                     "Residual of each experiment before and after the effect was added, against the noise floor.",
                 ),
+                both_palettes(
+                    lambda stream, dark: draw_residuals(traces, stream, dark),
+                    "Residual over time in each condition, before and after",
+                    "Where the residual lives: held-out trials, in standard deviations of the noise.",
+                ),
                 *_probabilities(diagnosis),
             ],
+            tables=[error_table(error)],
         ),
         Section(
             "The gaits",
@@ -56,7 +64,12 @@ def campaign_page(summary: Mapping, diagnosis: Mapping, walks: Sequence[Walk]) -
                     lambda stream, dark: draw_walks(walks, stream, dark=dark),
                     "CPG outputs, pressures and displacement of the gaits side by side",
                     "In the manner of the paper's Fig. 7; dashed: predicted by the completed model.",
-                )
+                ),
+                both_palettes(
+                    lambda stream, dark: draw_robustness(summary["robustness"], GAIT_NAMES, stream, dark),
+                    "Speed of each gait on robots that differ a little from this one",
+                    "How robust each gait is: its speed on 256 robots of which every parameter differs by 2 % (sd).",
+                ),
             ],
         ),
     ]
@@ -79,6 +92,18 @@ def speed_table(gaits: Sequence[Mapping]) -> Table:
     return Table(columns, rows, "Settled speed in mm/s; measured: mean and spread of the repeats.", len(rows) - 1)
 
 
+def error_table(error: Mapping) -> Table:
+    """Errors before and after, of fitted and held-out trials and by experiment, against the floor."""
+    sides = ("before", "after")
+    rows = [[what.replace("_", "-"), *(f"{error[s][what]:.2f}" for s in sides)] for what in ("fitted", "held_out")]
+    floor = error["noise_floor"]
+    rows[0].append(f"{floor['fitted']:.2f}")
+    rows[1].append(f"{floor['held_out']:.2f}")
+    for name in error["before"]["by_experiment"]:
+        rows.append([name.replace("_", " "), *(f"{error[s]['by_experiment'][name]:.2f}" for s in sides), ""])
+    return Table(["trials", "base model", "completed model", "noise floor"], rows, f"{error['unit']}.", 1)
+
+
 def _lead(summary: Mapping) -> str:
     names = " and ".join(effect["name"].replace("_", " ") for effect in summary["effects"])
     return {
@@ -89,7 +114,7 @@ def _lead(summary: Mapping) -> str:
 
 
 def _evidence(summary: Mapping, diagnosis: Mapping) -> list[str]:
-    return [diagnosis["signature"]["text"], *_named(summary["effects"])]
+    return [diagnosis["signature"]["text"], *_named(summary["effects"]), *_rejected(diagnosis)]
 
 
 def _named(effects: Sequence[Mapping]) -> list[str]:
@@ -98,6 +123,22 @@ def _named(effects: Sequence[Mapping]) -> list[str]:
         values = ", ".join(f"{name} = {value:.3g}" for name, value in effect["parameters"].items())
         named.append(f"{effect['name'].replace('_', ' ')}: {values}; probability {effect['probability']:.2f}.")
     return named
+
+
+def _rejected(diagnosis: Mapping) -> list[str]:
+    """What else was tried, and which experiment decided between what was confusable."""
+    said = []
+    tried = [t for t in diagnosis["tried"] if t["effects"] != [e["name"] for e in diagnosis["effects"]]]
+    if tried:
+        listed = "; ".join(f"{' + '.join(t['effects']) or 'nothing'} {t['error']:.2f}" for t in tried[:4])
+        said.append(f"Also fitted, with what each leaves on the known trials: {listed}.".replace("_", " "))
+    for experiment in diagnosis.get("separated_by", []):
+        settings = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in experiment["settings"].items())
+        said.append(
+            f"To tell {' and '.join(experiment['separates'])} apart the rig ran {experiment['experiment']} "
+            f"({settings}).".replace("_", " ")
+        )
+    return said
 
 
 def _probabilities(diagnosis: Mapping) -> list:

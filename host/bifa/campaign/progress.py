@@ -22,7 +22,7 @@ class StageProgress:
 
     def part(self, what: str, share: float) -> None:
         """`what` inside the running stage is done to `share`, 0 to 1."""
-        self._bars.update(self._task, total=1.0, completed=share, what=what)
+        self._bars.update(self._task, total=1.0, completed=min(share, 0.999), what=what)
 
     def end(self, stage: Stage, ran: bool) -> None:
         """A stage is done; ran: it was not up to date already."""

@@ -28,10 +28,9 @@ def of(dataset: Dataset) -> Iterator[tuple[Mapping[str, Any], Trial]]:
                 yield _static(dataset, actuator, rate, pressure)
         for pressure in (5.0, 6.5, 8.5, 10.0):
             yield _step(actuator, pressure)
-    for direction in ("forward", "backward"):
-        for rate in (2.0, 20.0, 60.0):
-            for pressure in (0.0, 8.5):
-                yield _pull(direction, rate, pressure)
+    for rate in (2.0, 20.0, 60.0):
+        for pressure in (0.0, 8.5):
+            yield _pull(rate, pressure)
     for gait in (BASELINE, BRISK, SLOW):
         yield _walk(gait, 0.0)
     for inclination in (-10.0, 10.0):
@@ -57,11 +56,11 @@ def _step(actuator: str, pressure: float) -> tuple[Mapping[str, Any], Trial]:
     return {"actuator": actuator, "pressure_psi": pressure}, planned.as_trial(columns)
 
 
-def _pull(direction: str, rate: float, pressure: float) -> tuple[Mapping[str, Any], Trial]:
+def _pull(rate: float, pressure: float) -> tuple[Mapping[str, Any], Trial]:
     time_s = np.arange(0.0, PULL_MM / rate, 0.02)
-    planned = PlannedTrial("anchor_pull", None, pressure, rate, settings={"direction": direction})
+    planned = PlannedTrial("anchor_pull", None, pressure, rate)
     columns = {"time_s": time_s, "displacement_mm": rate * time_s, **_unknown(time_s, "force_N")}
-    return {"direction": direction, "pressure_psi": pressure, "rate_mm_s": rate}, planned.as_trial(columns)
+    return {"pressure_psi": pressure, "rate_mm_s": rate}, planned.as_trial(columns)
 
 
 def _walk(gait: Gait, inclination_deg: float) -> tuple[Mapping[str, Any], Trial]:

@@ -17,8 +17,9 @@ STATIC_RATE_MM_S = 2.0
 PULL_RATE_MM_S = 20.0  # paper, IV.B
 PULL_MM = 40.0
 
-# A second gait, faster and with unequal duties, so that a walk is not one point in the space of gaits.
+# Two more gaits, with other phases and unequal duties, so that a walk is not one point in the space of gaits.
 BRISK = Gait(3.4, 208.9, 331.9, 0.65, 0.44, 0.44)
+AMBLE = Gait(4.4, 240.0, 60.0, 0.56, 0.5, 0.5)
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def session(
     repeats: int = REPEATS,
     pressures_psi: Sequence[float] | None = None,
     rate_mm_s: float | None = None,
-    gaits: Sequence[Gait] = (BASELINE, BRISK),
+    gaits: Sequence[Gait] = (BASELINE, BRISK, AMBLE),
     cycles: int = 5,
     settings: Mapping[str, Any] | None = None,
     quick: bool = False,
@@ -90,11 +91,14 @@ def session(
     if "static_loading" in experiments:
         speed = rate_mm_s or (5 * STATIC_RATE_MM_S if quick else STATIC_RATE_MM_S)
         for actuator in actuators:
-            for pressure in pressures_psi or ((0.0, 8.0) if quick else (0.0, 4.0, 8.0)):
+            several = (0.0, 4.0, 8.0) if actuator == "large" and not quick else (0.0, 8.0)
+            for pressure in pressures_psi or several:
                 conditions.append(PlannedTrial("static_loading", actuator, pressure, speed))
+        if not (quick or rate_mm_s or pressures_psi) and "large" in actuators:
+            conditions.append(PlannedTrial("static_loading", "large", 0.0, 4 * speed))  # hysteresis or creep?
     if "step_response" in experiments:
         for actuator in actuators:
-            for pressure in pressures_psi or ((8.5,) if quick else (6.5, 8.5)):
+            for pressure in pressures_psi or ((6.5, 8.5) if actuator == "large" and not quick else (8.5,)):
                 conditions.append(PlannedTrial("step_response", actuator, pressure))
     if "anchor_pull" in experiments:
         for pressure in pressures_psi or ((0.0, 8.5) if quick else (0.0, 5.0, 8.5)):

@@ -160,6 +160,9 @@ class RobotSystem(System):
             return False
         return trial.experiment in (STATIC, STEP) or parameter in self.curves[prefix].felt
 
+    def isolates(self, trial: Trial) -> bool:
+        return trial.experiment != WALK
+
     def sensor_noise(self, experiment: str, channel: str) -> float:
         """A converter's count is the least that a pressure can be uncertain by."""
         return _ADC_COUNT_PSI / np.sqrt(12.0) if channel.startswith("pressure") else 0.0

@@ -1,5 +1,6 @@
 """`bifa campaign`: measure, fit, find what is missing, optimise, walk, compare."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -25,14 +26,18 @@ def campaign(
 
     Every stage can be interrupted and resumed, and is run again only when something that it depends on has changed.
     """
+    run_campaign(out, port, seed, quick, rerun)
+
+
+def run_campaign(out: Path, port: str, seed: int, quick: bool, rerun: Sequence[str]) -> None:
+    """Bring all stages up to date with progress on the terminal, then print what came of it."""
     import json
 
     from rich.console import Console
-    from rich.table import Table
 
     from bifa.campaign.bench import Bench
     from bifa.campaign.loop import Effort, campaign
-    from bifa.campaign.page import speed_table
+    from bifa.campaign.page import error_table, speed_table
     from bifa.campaign.progress import stage_progress
     from bifa.campaign.stages import run_stages
 
@@ -43,15 +48,26 @@ def campaign(
         run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
 
     summary = json.loads((out / "summary.json").read_text())
-    effects = ", ".join(effect["name"] for effect in summary["effects"]) or "no effect"
-    console.print(f"verdict: [bold]{summary['verdict']}[/bold] ({effects})", highlight=False)
+    effects = "; ".join(_sized(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
+    console.print(f"verdict: [bold]{summary['verdict']}[/bold], {effects}", highlight=False)
     if summary["truth"] is not None:
-        console.print(f"the seal: {', '.join(summary['truth']) or 'nothing'}", highlight=False)
-    speeds = speed_table(summary["gaits"])
-    table = Table(title=speeds.caption, title_justify="left")
-    for i, heading in enumerate(speeds.columns):
+        inside = "; ".join(_sized(name, values) for name, values in summary["truth"].items())
+        console.print(f"the seal, opened: {inside or 'nothing'}", highlight=False)
+    for table in (error_table(summary["error"]), speed_table(summary["gaits"])):
+        _print_table(console, table)
+    console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
+
+
+def _sized(name: str, values) -> str:
+    return f"{name} ({', '.join(f'{key} = {value:.3g}' for key, value in values.items())})"
+
+
+def _print_table(console, content) -> None:
+    from rich.table import Table
+
+    table = Table(title=content.caption, title_justify="left")
+    for i, heading in enumerate(content.columns):
         table.add_column(heading, justify="right" if i else "left")
-    for row in speeds.rows:
+    for row in content.rows:
         table.add_row(*row)
     console.print(table)
-    console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)

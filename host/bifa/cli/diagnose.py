@@ -12,7 +12,8 @@ def register(app: typer.Typer) -> None:
     """Offer the command `diagnose`."""
     app.command(
         epilog="Examples:  bifa diagnose out/bench --json verdict.json   |   "
-        "bifa diagnose out/bench --out model.toml --report report.html"
+        "bifa diagnose out/bench --out model.toml --report report.html   |   "
+        "bifa diagnose out/bench --port virtual --resolve"
     )(diagnose)
 
 
@@ -23,6 +24,12 @@ def diagnose(
     report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with the evidence.")] = None,
     model: Annotated[Path | None, typer.Option(help="Model to start from; otherwise the paper's nominal one.")] = None,
     seed: Annotated[int, typer.Option(help="Of the search; the same seed gives the same verdict.")] = 0,
+    resolve: Annotated[
+        bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and go on.")
+    ] = False,
+    port: Annotated[
+        str | None, typer.Option(help="For --resolve: `virtual` (the robot that made the data), or a serial port.")
+    ] = None,
 ) -> None:
     """Fit the base model, find what repeats agree on but the model does not, name its cause, add it, and
     report the error before and after on trials that were not fitted. Exit status 0 for any verdict."""
@@ -31,22 +38,35 @@ def diagnose(
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    from bifa.characterisation.resolve import resolve as separate
     from bifa.characterisation.system import prepare
     from bifa.data import read_dataset
+    from bifa.discrepancy.diagnosis import Diagnosis
     from bifa.discrepancy.diagnosis import diagnose as run
     from bifa.discrepancy.record import as_record
     from bifa.robot import load_model, save_model
 
     console = Console()
     measured = read_dataset(dataset)
+    robot = load_model(model) if model else None
     with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("stiffness curves, steps and pulls, one after the other")
-        system = prepare(measured, load_model(model) if model else None)
-        found = run(system, seed=seed, progress=lambda what: progress.update(task, description=what))
+
+        def said(what: str, share: float = 0.0) -> None:
+            progress.update(task, description=what)
+
+        def diagnosed(trials) -> Diagnosis:
+            return run(prepare(trials, robot), seed=seed, progress=said)
+
+        found = diagnosed(measured)
+        if resolve:
+            folder = dataset.with_name(dataset.name + "-resolved")
+            measured, found, _ = separate(measured, found, diagnosed, _rig_of(measured, port), folder, said)
     record = as_record(found)
     _print(console, record)
     if out is not None:
-        save_model(out, system.model_at(found.final.theta, found.final.structure.effects))
+        completed = found.final.structure
+        save_model(out, completed.system.model_at(found.final.theta, completed.effects))
         console.print(f"model: {out}. Next: bifa optimize --model {out} --out gait.toml", highlight=False)
     if json is not None:
         json.write_text(dumps(record, indent=2) + "\n")
@@ -56,6 +76,16 @@ def diagnose(
 
         report.write_text(render(diagnosis_page(measured.name, record)))
         console.print(f"report: {report}", highlight=False)
+
+
+def _rig_of(measured, port: str | None):
+    """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance."""
+    from bifa.characterisation.resolve import SPECIMEN
+    from bifa.rig import open_rig
+
+    made = {**measured.provenance, **measured.provenance.get("options", {})}
+    options = {key: made[key] for key in SPECIMEN if key in made} if port == "virtual" else {}
+    return lambda number: open_rig(port, **options, **({"seed": 1000 + number} if port == "virtual" else {}))
 
 
 def _print(console, record: dict) -> None:

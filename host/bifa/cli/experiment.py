@@ -62,7 +62,7 @@ def experiment(
     from bifa.characterisation import plan
 
     console = Console()
-    gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK]
+    gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
         actuators=(actuator.value,) if actuator else plan.ACTUATORS,

@@ -10,7 +10,7 @@ import numpy as np
 
 from bifa.discrepancy.spectrum import peaks
 from bifa.discrepancy.split import Split
-from bifa.identify.fit import Fit, best_of, evaluate_on, starting_point
+from bifa.identify.fit import Fit, best_of, evaluate_on, solve_from_afar, starting_point
 from bifa.identify.noise import NoiseFloor
 from bifa.identify.problem import Point, Problem
 from bifa.identify.solve import solve
@@ -20,7 +20,7 @@ from bifa.identify.uncertainty import effective_samples
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
-_SKETCH_ITERATIONS, _SKETCH_RELATIVE = 10, 3e-3
+_SKETCH_ITERATIONS, _SKETCH_RELATIVE = 12, 3e-3
 _REFIT_ITERATIONS = 60
 _IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
 
@@ -40,6 +40,11 @@ class Candidate:
     def pieces(self) -> float:
         """Independent pieces of information in the trials that it is judged on."""
         return effective_samples(self.fitted) + effective_samples(self.checked)
+
+    @property
+    def rms(self) -> float:
+        """Weighted RMS residual of the known trials, in units of the noise; large ones compressed, as in the fit."""
+        return float(np.sqrt(2.0 * (self.fitted.cost + self.checked.cost) / self.pieces))
 
     @cached_property
     def cost(self) -> float:
@@ -104,10 +109,17 @@ def profile(parent: Fit, effect: str, split: Split, floor: NoiseFloor) -> Profil
 
 
 def sketch(profiled: Profile) -> Fit:
-    """Release everything from the best point of a profile, for as long as it pays quickly."""
-    best = profiled.points[0]
-    solution = solve(profiled.problem, best, max_iterations=_SKETCH_ITERATIONS, relative=_SKETCH_RELATIVE)
-    return best_of(profiled.problem, [solution])
+    """Release everything for as long as it pays quickly: from the best point of the profile, and, with the effect as
+    it is there, from the base model's own start, since what has been fitted without the effect may have gone astray."""
+    problem, best = profiled.problem, profiled.points[0]
+    structure = problem.structure
+    effect = structure.system.effects[profiled.effect]
+    own = {effect.full_name(p) for p in effect.parameters}
+    fresh = structure.theta(structure.start()) | {k: v for k, v in structure.theta(best.values).items() if k in own}
+    options = {"max_iterations": _SKETCH_ITERATIONS, "relative": _SKETCH_RELATIVE}
+    near = solve(problem, best, **options)
+    afar = solve_from_afar(problem, structure.values(fresh), **options)
+    return best_of(problem, [near, afar])
 
 
 def finish(sketched: Fit) -> Fit:

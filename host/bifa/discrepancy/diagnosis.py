@@ -121,7 +121,7 @@ def _fit_base(system: System, split: Split, seed: int, starts: int) -> Fit:
     structure = Structure(system)
     floor = estimate_noise(system, split.known)
     vectors = spread_starts(structure, structure.start(), starts, seed)
-    first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH)
+    first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, from_afar=True)
     residuals = first.residuals() | evaluate_on(first, split.select).residuals()
     sharper = floor.lowered_by(estimate_noise(system, split.known, residuals))
     again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], max_iterations=15)

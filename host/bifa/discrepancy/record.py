@@ -9,6 +9,7 @@ from bifa.discrepancy.diagnosis import Diagnosis
 from bifa.discrepancy.errors import Error
 
 FORMAT = 1
+_TRIED = 8  # explanations listed, the best first
 
 
 def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -39,6 +40,10 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             "text": d.signature.text,
         },
         "correction": d.correction and {"site": d.correction.site, "term": d.correction.term},
+        "tried": [
+            {"effects": list(c.effects), "error": _number(c.rms)}
+            for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]
+        ],
         "not_detectable_here": [s.effect for s in d.search.screened if not s.detectable],
         "next_experiment": {
             "separates": list(d.next.separates),

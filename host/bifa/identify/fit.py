@@ -61,12 +61,30 @@ def fit(
     starts: Sequence[np.ndarray] = (),
     max_iterations: int = 20,
     relative: float = RELATIVE,
+    from_afar: bool = False,
 ) -> Fit:
-    """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best."""
+    """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best. `from_afar`:
+    in two stages, see `solve_from_afar`."""
     problem = Problem(structure, trials, floor)
     vectors = list(starts) or [structure.start()]
-    solutions = [solve(problem, problem.start(v), max_iterations=max_iterations, relative=relative) for v in vectors]
+    options = {"max_iterations": max_iterations, "relative": relative}
+    if from_afar:
+        solutions = [solve_from_afar(problem, v, **options) for v in vectors]
+    else:
+        solutions = [solve(problem, problem.start(v), **options) for v in vectors]
     return best_of(problem, solutions)
+
+
+def solve_from_afar(
+    problem: Problem, values: np.ndarray, *, max_iterations: int, relative: float = RELATIVE
+) -> Solution:
+    """Fit first the trials that isolate parameters (`System.isolates`), then, from there, all of them."""
+    isolate = problem.structure.system.isolates
+    first = [trial for trial in problem.trials if isolate(trial)]
+    if 0 < len(first) < len(problem.trials):
+        near = Problem(problem.structure, first, problem.floor)
+        values = solve(near, near.start(values), max_iterations=max_iterations, relative=relative).point.values
+    return solve(problem, problem.start(values), max_iterations=max_iterations, relative=relative)
 
 
 def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
@@ -118,6 +136,7 @@ def fit_base(
         floor,
         starts=spread_starts(structure, structure.start(), starts, seed),
         max_iterations=max_iterations,
+        from_afar=True,
     )
     sharper = estimate_noise(system, trials, first.residuals())
     again = fit(structure, trials, sharper, starts=[first.solution.point.values], max_iterations=10)

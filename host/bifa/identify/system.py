@@ -200,6 +200,11 @@ class System(Protocol):
         """False if this base parameter cannot change this trial: saves a simulation per derivative."""
         return True
 
+    def isolates(self, trial: Trial) -> bool:
+        """Whether a trial shows a few parameters by themselves. Fits from afar begin with such trials: in one where
+        everything acts together, and small errors add up, they would lose their way."""
+        return True
+
     def sensor_noise(self, experiment: str, channel: str) -> float:
         """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound, and
         all there is where no condition was repeated. 0: not known."""

@@ -1,4 +1,4 @@
-"""The demonstration: the real image walks the virtual robot; killed at any moment it leaves nothing half-written."""
+"""The short demonstration: the real image walks; killed at any moment it leaves nothing half-written."""
 
 import json
 import os
@@ -28,7 +28,7 @@ def test_the_baseline_walks_as_fast_as_in_the_paper():
 
 
 def run_demo(folder):
-    command = [sys.executable, "-m", "bifa", "demo", "--cycles", "4", "--out", str(folder)]
+    command = [sys.executable, "-m", "bifa", "demo", "--quick", "--out", str(folder)]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
     )

@@ -1,0 +1,40 @@
+"""The whole loop on a robot with an undeclared effect: real firmware, real link, verdict before the label."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from bifa.campaign.stages import PROVENANCE
+
+pytestmark = pytest.mark.uno
+
+
+def campaign(folder, *options):
+    command = [sys.executable, "-m", "bifa", "demo", "--seed", "8", "--out", str(folder), *options]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def test_the_demo_names_the_sealed_effect_and_predicts_what_is_then_measured(tmp_path):
+    folder = tmp_path / "demo"
+    ended = campaign(folder)
+    assert ended.returncode == 0, ended.stderr
+    summary = json.loads((folder / "summary.json").read_text())
+    assert [effect["name"] for effect in summary["effects"]] == list(summary["truth"])
+    error = summary["error"]
+    assert error["before"]["held_out"] > 1.5 * error["noise_floor"]["held_out"]
+    assert error["after"]["held_out"] < 1.2 * error["noise_floor"]["held_out"]
+    speeds = {gait["gait"]: gait for gait in summary["gaits"]}
+    for gait in speeds.values():
+        assert gait["completed_model"] == pytest.approx(gait["measured"], rel=0.03)
+    assert speeds["completed"]["measured"] > 1.5 * speeds["baseline"]["measured"]
+    page = (folder / "report.html").read_text()
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    assert "<script" not in page
+
+    before = json.loads((folder / PROVENANCE).read_text())
+    again = campaign(folder, "--rerun", "compare")
+    assert again.returncode == 0
+    assert again.stdout.count("up to date") == len(before["stages"]) - 1
+    assert json.loads((folder / PROVENANCE).read_text()) == before, "the same seed gives the same bytes"
