@@ -14,7 +14,7 @@ ARGS ?=
 
 .PHONY: help
 help:
-	@echo "make demo     the virtual robot walks two gaits: speeds, data set, figure"
+	@echo "make demo     the whole story on a virtual robot with an undeclared effect, and its report"
 	echo "make test     every test: native, in the simulated ATmega328P, Python"
 	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
 	echo "make soak     the long proofs and fuzzers"
