@@ -13,8 +13,14 @@ from virtual_robot.uno import CLOCK_HZ
 pytestmark = pytest.mark.uno
 
 DEAD_CYCLES = 3 * CLOCK_HZ // 1000
+STROBE_PIN, STROBES_PER_S = 10, 100
+STACK_KEPT_FREE = 300
 CHAMBERS = ((4, 5), (6, 7), (8, 9))
 WORDS = ("body", "head", "tail", "positive", "vacuum", "off", "on", "confirm", "baseline", "obstacle")
+TEXTS = (
+    *(b"run\n", b"run\n", b"stop\n", b"clear\n", b"!", b"load obstacle\n", b"stream on\n"),
+    *(b"help\n", b"show\n", b"status\n", b"presets\n", b"plot on\n", b"save text\n"),  # deepest in the stack
+)
 
 
 def breaks(events, state=None):
@@ -41,10 +47,10 @@ def breaks(events, state=None):
 def random_input(chance: random.Random) -> bytes:
     """A line that makes sense, half sense or none, or a frame, whole or damaged."""
     kind = chance.random()
-    if kind < 0.35:
+    if kind < 0.3:
         return f"hold {chance.choice(WORDS[:3])} {chance.choice(WORDS[3:6])}\n".encode()
     if kind < 0.5:
-        return chance.choice((b"run\n", b"run\n", b"stop\n", b"clear\n", b"!", b"load obstacle\n", b"stream on\n"))
+        return chance.choice(TEXTS)
     if kind < 0.7:
         name, value = chance.choice(
             (
@@ -73,9 +79,10 @@ def exercise(bench, seconds: float, seed: int) -> None:
     chance = random.Random(seed)
     host = WildHost(bench.board, chance)
     state = {"on": set(), "off_since": {}}
-    first = len(bench.board.events)
-    found, edges = [], 0
-    end_s = bench.board.time_s + seconds
+    first = bench.board.event_count
+    found, edges, strobes = [], 0, 0
+    begin_s = bench.board.time_s
+    end_s = begin_s + seconds
     while bench.board.time_s < end_s:
         bench.board.send(host.session() if chance.random() < 0.4 else b"clear\n" + random_input(chance))
         host.hear(bench.listen(chance.choice((0.0005, 0.002, 0.01, 0.05, 0.3))))
@@ -87,12 +94,19 @@ def exercise(bench, seconds: float, seed: int) -> None:
         first += len(new)
         found += breaks(new, state)
         edges += sum(event.kind == "pin" and event.index in range(4, 10) for event in new)
-    print(f"{seconds:.0f} s, {edges} edges on the pins, commands carried out: {dict(sorted(host.done.items()))}")
+        strobes += sum(event.kind == "pin" and event.index == STROBE_PIN and event.value == 1 for event in new)
+    print(
+        f"{seconds:.0f} s, {edges} edges on the pins, {len(found)} violations, {bench.board.resets - 1} resets,"
+        f" {bench.board.untouched_ram} bytes of stack never touched;"
+        f" commands carried out: {dict(sorted(host.done.items()))}"
+    )
+    assert strobes == pytest.approx(STROBES_PER_S * (bench.board.time_s - begin_s), abs=2), "every event was looked at"
     assert found == []
     assert edges > 5 * seconds, "the valves did move"
     assert {"hold", "run", "stop", "clear", "commit", "schedule_start", "load"} <= set(host.done)
     assert bench.board.resets == 1
     assert not bench.board.crashed
+    assert bench.board.untouched_ram > STACK_KEPT_FREE
 
 
 def test_a_minute_of_random_input(bench):
