@@ -16,8 +16,8 @@ from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
-_BEAM = {1: 3, 2: 2, 3: 1}  # sets that are grown further, by their size
-_SKETCHED = {1: 7, 2: 4, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
+_BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
+_SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
 _FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
