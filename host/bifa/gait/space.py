@@ -40,11 +40,6 @@ class SearchSpace:
     axes: tuple[Axis, ...]
 
     @property
-    def dimensions(self) -> int:
-        """Number of axes."""
-        return len(self.axes)
-
-    @property
     def wraps(self) -> np.ndarray:
         """(dimensions,) true where an axis is a full turn."""
         return np.array([axis.wraps for axis in self.axes])

@@ -218,11 +218,6 @@ class Uno:
     def poke(self, where: int | str, data: bytes) -> None:
         lib.uno_poke_ram(self._uno, where if isinstance(where, int) else self.address(where), data, len(data))
 
-    def peek_flash(self, where: int | str, size: int) -> bytes:
-        data = ffi.new("uint8_t[]", size)
-        lib.uno_peek_flash(self._uno, where if isinstance(where, int) else self.address(where), data, size)
-        return bytes(data)
-
     @property
     def untouched_ram(self) -> int:
         """Bytes between the static data and the deepest stack that nothing has written since power-on."""

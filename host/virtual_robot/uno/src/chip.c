@@ -260,10 +260,6 @@ void uno_poke_ram(Uno *uno, uint16_t address, const uint8_t *bytes, int size) {
   memcpy(uno->avr->data + address, bytes, clip(size, RAM_END + 1 - address));
 }
 
-void uno_peek_flash(const Uno *uno, uint32_t address, uint8_t *bytes, int size) {
-  memcpy(bytes, uno->avr->flash + address, clip(size, (int)(uno->avr->flashend + 1 - address)));
-}
-
 uint32_t uno_program_counter(const Uno *uno) { return uno->avr->pc; }
 
 int uno_untouched_ram(const Uno *uno, uint16_t from) {

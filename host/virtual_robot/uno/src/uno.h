@@ -71,7 +71,6 @@ void uno_eeprom_cut_power(Uno *uno, int n, double fraction);
 
 void uno_peek_ram(const Uno *uno, uint16_t address, uint8_t *bytes, int size);
 void uno_poke_ram(Uno *uno, uint16_t address, const uint8_t *bytes, int size);
-void uno_peek_flash(const Uno *uno, uint32_t address, uint8_t *bytes, int size);
 uint32_t uno_program_counter(const Uno *uno);
 // Bytes above `from` that the firmware has never written since power-on (RAM starts painted).
 int uno_untouched_ram(const Uno *uno, uint16_t from);
