@@ -13,14 +13,15 @@ from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit, best_of, evaluate_on, solve_from_afar, starting_point
 from bifa.identify.noise import NoiseFloor
 from bifa.identify.problem import Point, Problem
-from bifa.identify.solve import solve
+from bifa.identify.solve import Solution, solve
 from bifa.identify.structure import Structure
 from bifa.identify.system import Effect, Parameter
 from bifa.identify.uncertainty import effective_samples
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
-_SKETCH_ITERATIONS, _SKETCH_RELATIVE = 12, 3e-3
+_PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
+_SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT_ITERATIONS = 60
 _IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
 
@@ -97,29 +98,35 @@ def profile(parent: Fit, effect: str, split: Split, floor: NoiseFloor) -> Profil
     structure = Structure(parent.structure.system, (*parent.structure.effects, effect))
     problem = Problem(structure, split.fit, floor)
     rest = tuple(range(len(parent.structure.names)))
-    # the parent's derivatives serve, unless trials have something of their own that it knew nothing of
-    known = None if structure.system.effects[effect].own else parent.solution.sensitivities
-    found = []
-    for values in _sizes(parent, structure, effect):
-        start = problem.start(values, parent.solution.point.nuisances)
-        solution = solve(problem, start, free=rest, max_iterations=_PROFILE_STEPS, sensitivities=known)
-        found.append((solution.cost, solution.point))
-    found.sort(key=lambda pair: pair[0])
-    return Profile(effect, problem, found[0][0], tuple(point for _, point in found))
+    # the parent's derivatives serve; what the effect has for each trial stays where the start found it
+    wider = (len(q) - s.nuisances for q, s in zip(problem.nuisances, parent.solution.sensitivities, strict=True))
+    known = [s.widened(n) if n else s for n, s in zip(wider, parent.solution.sensitivities, strict=True)]
+
+    def released(start: Point, steps: int) -> Solution:
+        return solve(problem, start, free=rest, max_iterations=steps, sensitivities=known)
+
+    starts = [problem.start(v, parent.solution.point.nuisances) for v in _sizes(parent, structure, effect)]
+    found = sorted((released(start, 1) for start in starts), key=lambda s: s.cost)
+    best = [released(s.point, _PROFILE_STEPS - 1) for s in found[:_PROFILED_FURTHER]]
+    found = sorted([*best, *found[_PROFILED_FURTHER:]], key=lambda s: s.cost)
+    return Profile(effect, problem, found[0].cost, tuple(s.point for s in found))
 
 
 def sketch(profiled: Profile) -> Fit:
-    """Release everything for as long as it pays quickly: from the best point of the profile, and, with the effect as
-    it is there, from the base model's own start, since what has been fitted without the effect may have gone astray."""
+    """Release everything for as long as it pays quickly, from the best point of the profile."""
+    return best_of(profiled.problem, [solve(profiled.problem, profiled.points[0], **_SKETCH)])
+
+
+def sketch_from_afar(sketched: Fit, profiled: Profile) -> Fit:
+    """The better of a sketch and another: from the base model's own start, with the effect as the profile has it, since
+    what has been fitted without the effect may have gone astray."""
     problem, best = profiled.problem, profiled.points[0]
     structure = problem.structure
     effect = structure.system.effects[profiled.effect]
     own = {effect.full_name(p) for p in effect.parameters}
     fresh = structure.theta(structure.start()) | {k: v for k, v in structure.theta(best.values).items() if k in own}
-    options = {"max_iterations": _SKETCH_ITERATIONS, "relative": _SKETCH_RELATIVE}
-    near = solve(problem, best, **options)
-    afar = solve_from_afar(problem, structure.values(fresh), **options)
-    return best_of(problem, [near, afar])
+    afar = solve_from_afar(problem, structure.values(fresh), **_SKETCH)
+    return best_of(problem, [sketched.solution, afar])
 
 
 def finish(sketched: Fit) -> Fit:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bifa.discrepancy.candidate import Candidate
+from bifa.discrepancy.candidate import Candidate, judge
 from bifa.discrepancy.correct import Corrected, holds, learn_correction
 from bifa.discrepancy.decide import Choice, Named, choose, dispersion_of
 from bifa.discrepancy.drift import find_drift
@@ -24,6 +24,8 @@ from bifa.identify.system import System
 
 _ROUGH = 1e-3  # of the cost: where the first fit of the base model may stop, before the floor is known
 _CHANCE = 0.005  # probability by chance below which a remainder counts as structure
+_FINE = 1e-4  # of the cost: where a refit to all known trials may stop
+_HOPELESS = 5.0  # times what is negligible, that no refit would take away
 _NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
 _NEGLIGIBLE_SHARE = 0.03  # of what the base model left
 
@@ -67,17 +69,20 @@ def diagnose(
         raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
     progress("fitting the base model")
     base = _fit_base(system, split, seed, starts)
-    remainder = _remainder(refit_on(base, split.known), seed)
+    remainder = _unfitted_remainder(judge(base, split), seed)
     refitted: dict[int, tuple[Candidate, Fit, Remainder]] = {}
 
     def on_known(candidate: Candidate) -> tuple[Fit, Remainder]:
         if id(candidate) not in refitted:
-            fitted = refit_on(candidate.fitted, split.known)
+            fitted = refit_on(candidate.fitted, split.known, relative=_FINE)
             refitted[id(candidate)] = candidate, fitted, _remainder(fitted, seed)
         return refitted[id(candidate)][1:]
 
     def enough(candidate: Candidate) -> bool:
-        return _explained(on_known(candidate)[1], remainder)
+        at_least = _unfitted_remainder(candidate, seed)
+        if at_least.largest > _HOPELESS * _negligible(remainder):
+            return False
+        return _explained(at_least, remainder) or _explained(on_known(candidate)[1], remainder)
 
     found = search(base, split, base.problem.floor, enough=enough, progress=progress)
     choice = choose(found)
@@ -132,9 +137,21 @@ def _remainder(fitted: Fit, seed: int) -> Remainder:
     return find_remainder(fitted.problem.trials, fitted.scaled_residuals(), fitted.problem.floor, seed=seed)
 
 
+def _unfitted_remainder(candidate: Candidate, seed: int) -> Remainder:
+    """Of all known trials, those to select among them as they are predicted, not fitted."""
+    fits = (candidate.fitted, candidate.checked)
+    trials = [trial for one in fits for trial in one.problem.trials]
+    scaled = [channels for one in fits for channels in one.scaled_residuals()]
+    return find_remainder(trials, scaled, candidate.fitted.problem.floor, seed=seed)
+
+
+def _negligible(before: Remainder) -> float:
+    return max(_NEGLIGIBLE, _NEGLIGIBLE_SHARE * before.largest)
+
+
 def _explained(left: Remainder, before: Remainder) -> bool:
     """Nothing is left that repeats share, or too little to matter."""
-    return left.probability > _CHANCE or left.largest < max(_NEGLIGIBLE, _NEGLIGIBLE_SHARE * before.largest)
+    return left.probability > _CHANCE or left.largest < _negligible(before)
 
 
 def _verdict(choice: Choice, left: Remainder, before: Remainder, drifts: tuple[str, ...]) -> str:

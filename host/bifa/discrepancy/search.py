@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profile, sketch
+from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profile, sketch, sketch_from_afar
 from bifa.discrepancy.split import Split
-from bifa.identify.fit import Fit
+from bifa.identify.fit import Fit, reweigh
 from bifa.identify.noise import NoiseFloor, estimate_noise
 from bifa.identify.problem import Problem
-from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
+_SKETCHED_TWICE = 4  # the best of them, from afar as well
 _FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
@@ -159,11 +159,9 @@ def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> No
 
 
 def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
-    """The same explanation fitted against another floor, from where it stands."""
-    point = candidate.fitted.solution.point
-    problem = Problem(candidate.fitted.structure, split.fit, floor)
-    solution = solve(problem, point, max_iterations=_REWEIGHED_ITERATIONS if thoroughly else 1)
-    return judge(replace(candidate.fitted, problem=problem, solution=solution), split)
+    """The same explanation against another floor, fitted from where it stands if it is to be done thoroughly."""
+    steps = _REWEIGHED_ITERATIONS if thoroughly else 0
+    return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split)
 
 
 def _grow(parent: Candidate, library, split, floor, tried, enough, progress) -> list[Candidate]:
@@ -181,6 +179,9 @@ def _grow(parent: Candidate, library, split, floor, tried, enough, progress) -> 
     for promising in profiles[: _SKETCHED[size]]:
         progress(f"refitting {' + '.join((*parent.effects, promising.effect))}")
         sketches.append((sketch(promising), promising))
+    sketches.sort(key=lambda pair: pair[0].cost)
+    for place, (near, profiled) in enumerate(sketches[:_SKETCHED_TWICE]):
+        sketches[place] = sketch_from_afar(near, profiled), profiled
     sketches.sort(key=lambda pair: pair[0].cost)
     return _finish(sketches, _FINISHED[size], split, tried, enough, progress)
 

@@ -94,10 +94,21 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
     return Fit(problem, best, len(solutions), agreeing)
 
 
-def refit_on(fitted: Fit, trials: Sequence[Trial], *, max_iterations: int = 8) -> Fit:
+def refit_on(fitted: Fit, trials: Sequence[Trial], *, max_iterations: int = 8, relative: float = RELATIVE) -> Fit:
     """The same structure fitted to other trials, from where it stands."""
     problem = Problem(fitted.structure, trials, fitted.problem.floor)
-    solution = solve(problem, problem.start(fitted.solution.point.values), max_iterations=max_iterations)
+    start = problem.start(fitted.solution.point.values)
+    solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
+    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
+    """The same structure and trials against another floor, by a few steps with the derivatives that there are."""
+    point = fitted.solution.point
+    problem = Problem(fitted.structure, fitted.problem.trials, floor)
+    pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
+    known = [s.reweighed(new / old) for s, (new, old) in zip(fitted.solution.sensitivities, pairs, strict=True)]
+    solution = solve(problem, point, max_iterations=max_iterations, sensitivities=known)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 

@@ -171,6 +171,10 @@ class Problem:
             for t, p in zip(self.trials, predictions, strict=True)
         ]
 
+    def slopes(self, point: Point) -> list[np.ndarray]:
+        """What a unit of each prediction changes its residual by, one vector a trial, shapes as `residuals`."""
+        return in_parallel(lambda i: self._slope(self.predict(point, i), i), range(len(self.trials)))
+
     def _simulate(self, values: np.ndarray, nuisances: np.ndarray, index: int, coarse: bool) -> Channels:
         theta = self.structure.theta(values)
         corrections = self.structure.corrections(theta)
@@ -180,11 +184,19 @@ class Problem:
         return system.predict(theta, self.structure.effects, trial, coarse=coarse, corrections=corrections)
 
     def _weigh(self, prediction: Channels, index: int) -> np.ndarray:
-        measured, weight, thinning, keep = self._weighing[index]
+        _, _, thinning, keep = self._weighing[index]
+        return SOFT_LIMIT * np.arcsinh(self._deviations(prediction, index) / SOFT_LIMIT) * thinning[keep]
+
+    def _slope(self, prediction: Channels, index: int) -> np.ndarray:
+        _, weight, thinning, keep = self._weighing[index]
+        return (weight * thinning)[keep] / np.hypot(1.0, self._deviations(prediction, index) / SOFT_LIMIT)
+
+    def _deviations(self, prediction: Channels, index: int) -> np.ndarray:
+        """Residuals in standard deviations, uncompressed."""
+        measured, weight, _, keep = self._weighing[index]
         predicted = np.concatenate([prediction[c] for c in self.trials[index].channels])
         z = ((predicted - measured) * weight)[keep]
-        z = np.where(np.isfinite(z), z, _FAILED)
-        return SOFT_LIMIT * np.arcsinh(z / SOFT_LIMIT) * thinning[keep]
+        return np.where(np.isfinite(z), z, _FAILED)
 
 
 def _weighing(trial: Trial, floor: NoiseFloor) -> tuple[np.ndarray, ...]:

@@ -22,6 +22,10 @@ class Sensitivity:
     right: np.ndarray
     structure: int
 
+    @property
+    def nuisances(self) -> int:
+        return self.gram.shape[0] - self.structure
+
     @classmethod
     def of(cls, by_structure: np.ndarray, by_nuisances: np.ndarray) -> Sensitivity:
         taken = np.hstack([by_structure, by_nuisances])
@@ -49,6 +53,15 @@ class Sensitivity:
         return Sensitivity(
             self.taken, gram, np.vstack([self.left, missed]), np.vstack([self.right, felt]), self.structure
         )
+
+    def reweighed(self, factors: np.ndarray) -> Sensitivity:
+        """With every residual's derivatives times its own factor, shape (n,)."""
+        return Sensitivity.of(*(factors[:, None] * block for block in self.dense()))
+
+    def widened(self, nuisances: int) -> Sensitivity:
+        """With so many more nuisances, which nothing is known of: they stay where they are."""
+        by_structure, by_nuisances = self.dense()
+        return Sensitivity.of(by_structure, np.pad(by_nuisances, ((0, 0), (0, nuisances))))
 
     def dense(self) -> tuple[np.ndarray, np.ndarray]:
         """By the structure's parameters, shape (n, p), and by the nuisances, shape (n, q)."""

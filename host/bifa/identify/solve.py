@@ -18,6 +18,7 @@ _NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in fo
 _REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 _TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
+_FORETOLD = 0.5  # of what it promised: a small step that kept so much of it ends the search with old derivatives too
 _OLDEST = 8  # steps that derivatives serve at most
 
 
@@ -108,7 +109,7 @@ def solve(
             if keep or (ratio > _TRUSTED and age < _OLDEST and not enough):
                 sensitivities, age = corrected, age + 1
                 continue
-            if enough and age == 0:
+            if enough and (age == 0 or ratio > _FORETOLD):
                 converged = True
                 break
         elif age == 0:
