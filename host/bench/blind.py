@@ -2,10 +2,11 @@
 
     python -m bench.blind --singles 60 --none 20 --outside 20 --pairs 20 [--jobs 2] [--out FOLDER]
 
-Each data set is drawn by `python -m virtual_robot.sealed` from its seed; verdicts are kept in FOLDER, so
-that an interrupted trial continues. Prints the figures with 95 % Wilson intervals beside four baselines
-that see the same fits: the best single refit by error, BIC, greedy forward selection, and sparse regression
-on the base model's residual.
+Each data set is drawn by `python -m virtual_robot.sealed` from its seed: single effects in turn, sizes and pairs at
+random, outside the library those that were never in it and each library effect in turn, withheld from the diagnosis.
+Verdicts are kept in FOLDER, so that an interrupted trial continues. Prints the figures with 95 % Wilson intervals
+beside four baselines that see the same fits: the best single refit by error, BIC, greedy forward selection, and
+sparse regression on the base model's residual.
 """
 
 from __future__ import annotations
@@ -20,40 +21,75 @@ import tempfile
 import tomllib
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
+from virtual_robot.effects import LIBRARY, OUTSIDE
+
+_STRIDE = 7  # through the effects: coprime to their numbers, so that relatives in the list are far apart
 BASELINES = ("best single", "BIC", "greedy", "sparse regression")
 
 
-def diagnose_sealed(seed: int, kind: str, out: Path) -> dict:
+@dataclass(frozen=True)
+class Job:
+    """One data set to draw. `kind` is "single", "none", "outside" or "pair"; `effect` None: drawn by the seed;
+    `withheld`: the diagnosis is not told of that effect."""
+
+    kind: str
+    seed: int
+    effect: str | None = None
+    withheld: bool = False
+
+
+def jobs(counts: dict[str, int], first_seed: int) -> list[Job]:
+    """Kinds mixed in proportion, so that a trial that was interrupted has some of each."""
+    outside = [*((name, False) for name in OUTSIDE), *((name, True) for name in LIBRARY)]
+    placed = []
+    for place, (kind, count) in enumerate(counts.items()):
+        for k in range(count):
+            seed = first_seed + 1000 * place + k
+            job = Job(kind, seed)
+            if kind == "single":
+                job = Job(kind, seed, LIBRARY[_STRIDE * k % len(LIBRARY)])
+            elif kind == "outside":
+                job = Job(kind, seed, *outside[_STRIDE * k % len(outside)])
+            placed.append(((k + 0.5) / count, job))
+    return [job for _, job in sorted(placed, key=lambda pair: pair[0])]
+
+
+def diagnose_sealed(job: Job, out: Path) -> dict:
     """Draw, diagnose, and only then open the label. Returns the record kept for one data set."""
-    kept = out / f"{kind}-{seed}.json"
+    kept = out / f"{job.kind}-{job.seed}.json"
     if kept.exists():
         return json.loads(kept.read_text())
     with tempfile.TemporaryDirectory() as scratch:
         folder, verdict = Path(scratch) / "sealed", Path(scratch) / "verdict.json"
-        options = [] if kind == "single" else [f"--{kind}"]
+        options = ["--effect", job.effect] if job.effect else [] if job.kind == "single" else [f"--{job.kind}"]
+        withheld = ["--without", job.effect] if job.withheld else []
         label = Path(scratch) / "label" / "sealed.toml"
         label.parent.mkdir()
-        sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(seed), "--out", str(folder), *options]
+        sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(job.seed), "--out", str(folder), *options]
         subprocess.run([*sealed, "--label", str(label)], check=True)
-        subprocess.run([sys.executable, "-m", "bench.blind", "--one", str(folder), "--json", str(verdict)], check=True)
+        one = [sys.executable, "-m", "bench.blind", "--one", str(folder), "--json", str(verdict), *withheld]
+        subprocess.run(one, check=True)
         record = json.loads(verdict.read_text())
         truth = tomllib.loads(label.read_text())
-    record |= {"seed": seed, "kind": kind, "truth": sorted(truth["effects"]), "sizes": truth["sizes"]}
+    record |= {"seed": job.seed, "kind": job.kind, "truth": sorted(truth["effects"]), "sizes": truth["sizes"]}
     out.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps(record, indent=1))
     return record
 
 
-def diagnose_one(folder: Path, verdict: Path) -> None:
-    """The diagnosis of one folder, with what the baselines would have said of the same fits."""
+def diagnose_one(folder: Path, verdict: Path, without: str | None) -> None:
+    """The diagnosis of one folder with a library that lacks `without`, and what the baselines say of the same fits."""
     from bifa.characterisation.system import prepare
     from bifa.data import read_dataset
     from bifa.discrepancy.diagnosis import diagnose
     from bifa.discrepancy.record import as_record
 
-    found = diagnose(prepare(read_dataset(folder)))
+    system = prepare(read_dataset(folder))
+    system.effects = {name: effect for name, effect in system.effects.items() if name != without}
+    found = diagnose(system)
     verdict.write_text(json.dumps(as_record(found) | {"baselines": baselines(found.search)}))
 
 
@@ -152,7 +188,7 @@ def _closed(record: dict) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    counts = {"singles": ("single", 60), "none": ("none", 20), "outside": ("outside", 20), "pairs": ("pair", 20)}
+    counts = {"singles": ("single", 60), "none": ("none", 20), "outside": ("outside", 22), "pairs": ("pair", 20)}
     for name, (_, count) in counts.items():
         parser.add_argument(f"--{name}", type=int, default=count)
     parser.add_argument("--first-seed", type=int, default=1000)
@@ -160,20 +196,26 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("../out/blind"))
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--json", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--without", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        diagnose_one(options.one, options.json)
+        diagnose_one(options.one, options.json, options.without)
         return
-    jobs = [
-        (options.first_seed + 1000 * place + k, kind)
-        for place, (name, (kind, _)) in enumerate(counts.items())
-        for k in range(getattr(options, name))
-    ]
+    todo = jobs({kind: getattr(options, name) for name, (kind, _) in counts.items()}, options.first_seed)
     records = []
     with ThreadPoolExecutor(options.jobs) as pool:
-        for record in pool.map(lambda job: diagnose_sealed(*job, options.out), jobs):
-            records.append(record)
-            print(f"{record['kind']:8} {record['seed']}  {_name(record['truth'])} -> {_said(record)}", flush=True)
+        try:
+            for record in pool.map(lambda job: diagnose_sealed(job, options.out), todo):
+                records.append(record)
+                sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
+                print(
+                    f"{record['kind']:8}{record['seed']}  {_name(record['truth'])} ({sizes}) -> {_said(record)}"
+                    f"  {record['seconds']:.0f} s",
+                    flush=True,
+                )
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            print(f"interrupted: what {len(records)} of {len(todo)} data sets say\n")
     report(records)
 
 
