@@ -92,8 +92,19 @@ class RobotSystem(System):
         self.effects: Mapping[str, Effect] = engine_effects()
         shapes = [p for curve in self.curves.values() for p in curve.parameters]
         self.parameters = (*(self._named(name) for name in self.fitted), *shapes)
+        self._remember()
+
+    def _remember(self) -> None:
         self._curve = lru_cache(maxsize=128)(self._curve_of)
         self._plant = lru_cache(maxsize=512)(self._plant_of)
+
+    def __getstate__(self) -> dict:
+        """What travels to another process: all but what is remembered."""
+        return {name: value for name, value in vars(self).items() if name not in ("_curve", "_plant")}
+
+    def __setstate__(self, state: dict) -> None:
+        vars(self).update(state)
+        self._remember()
 
     # -- the System protocol ----------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ def register(app: typer.Typer) -> None:
     app.command(
         epilog="Examples:  bifa diagnose out/bench --json verdict.json   |   "
         "bifa diagnose out/bench --out model.toml --report report.html   |   "
-        "bifa diagnose out/bench --port virtual --resolve"
+        "bifa diagnose out/bench --port virtual --resolve   |   bifa diagnose out/bench --dask tcp://scheduler:8786"
     )(diagnose)
 
 
@@ -30,9 +30,11 @@ def diagnose(
     port: Annotated[
         str | None, typer.Option(help="For --resolve: `virtual` (the robot that made the data), or a serial port.")
     ] = None,
+    dask: Annotated[str | None, typer.Option(help="Address of a dask scheduler, to use its workers.")] = None,
 ) -> None:
     """Fit the base model, find what repeats agree on but the model does not, name its cause, add it, and
     report the error before and after on trials that were not fitted. Exit status 0 for any verdict."""
+    from contextlib import nullcontext
     from json import dumps
 
     from rich.console import Console
@@ -40,6 +42,7 @@ def diagnose(
 
     from bifa.characterisation.resolve import resolve as separate
     from bifa.characterisation.system import prepare
+    from bifa.cluster import cluster
     from bifa.data import read_dataset
     from bifa.discrepancy.diagnosis import Diagnosis
     from bifa.discrepancy.diagnosis import diagnose as run
@@ -56,12 +59,13 @@ def diagnose(
             progress.update(task, description=what)
 
         def diagnosed(trials) -> Diagnosis:
-            return run(prepare(trials, robot), seed=seed, progress=said)
+            return run(prepare(trials, robot), seed=seed, progress=said, executor=workers)
 
-        found = diagnosed(measured)
-        if resolve:
-            folder = dataset.with_name(dataset.name + "-resolved")
-            measured, found, _ = separate(measured, found, diagnosed, _rig_of(measured, port), folder, said)
+        with cluster(dask) if dask else nullcontext((None, 0)) as (workers, _):
+            found = diagnosed(measured)
+            if resolve:
+                folder = dataset.with_name(dataset.name + "-resolved")
+                measured, found, _ = separate(measured, found, diagnosed, _rig_of(measured, port), folder, said)
     record = as_record(found)
     _print(console, record)
     if out is not None:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bifa.discrepancy.crew import Crew
 from bifa.discrepancy.spectrum import peaks
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit, best_of, evaluate_on, solve_from_afar, starting_point
@@ -20,6 +21,7 @@ from bifa.identify.uncertainty import effective_samples
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
+_SKETCHED_TWICE = 4  # sketches, the best of them, that start from afar as well
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT_ITERATIONS = 60
@@ -92,41 +94,67 @@ class Profile:
     cost: float
     points: tuple[Point, ...]
 
+    def from_afar(self) -> np.ndarray:
+        """The base model's own start, with the effect as it is at the best point: what has been fitted without the
+        effect may have gone astray."""
+        structure = self.problem.structure
+        effect = structure.system.effects[self.effect]
+        own = {effect.full_name(p) for p in effect.parameters}
+        best = structure.theta(self.points[0].values)
+        return structure.values(structure.theta(structure.start()) | {k: v for k, v in best.items() if k in own})
 
-def profile(parent: Fit, effect: str, split: Split, floor: NoiseFloor) -> Profile:
-    """The amplitude profile of `effect` on top of `parent`."""
-    structure = Structure(parent.structure.system, (*parent.structure.effects, effect))
-    problem = Problem(structure, split.fit, floor)
-    rest = tuple(range(len(parent.structure.names)))
+
+def profiles(parent: Fit, effects: Sequence[str], split: Split, floor: NoiseFloor, crew: Crew) -> list[Profile]:
+    """The amplitude profiles of `effects` on top of `parent`, the best first."""
+    problems = [Problem(_grown(parent, effect), split.fit, floor) for effect in effects]
+    jobs = [
+        (problem, _sizes(parent, problem.structure, effect), parent.solution)
+        for effect, problem in zip(effects, problems, strict=True)
+    ]
+    found = crew.map("trying", [p.structure.effects for p in problems], _profiled, jobs)
+    each = zip(effects, problems, found, strict=True)
+    return sorted((Profile(e, p, cost, points) for e, p, (cost, points) in each), key=lambda p: p.cost)
+
+
+def _grown(parent: Fit, effect: str) -> Structure:
+    return Structure(parent.structure.system, (*parent.structure.effects, effect))
+
+
+def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -> tuple[float, tuple[Point, ...]]:
+    rest = tuple(range(len(parent.free)))
     # the parent's derivatives serve; what the effect has for each trial stays where the start found it
-    wider = (len(q) - s.nuisances for q, s in zip(problem.nuisances, parent.solution.sensitivities, strict=True))
-    known = [s.widened(n) if n else s for n, s in zip(wider, parent.solution.sensitivities, strict=True)]
+    wider = (len(q) - s.nuisances for q, s in zip(problem.nuisances, parent.sensitivities, strict=True))
+    known = [s.widened(n) if n else s for n, s in zip(wider, parent.sensitivities, strict=True)]
 
     def released(start: Point, steps: int) -> Solution:
         return solve(problem, start, free=rest, max_iterations=steps, sensitivities=known)
 
-    starts = [problem.start(v, parent.solution.point.nuisances) for v in _sizes(parent, structure, effect)]
+    starts = [problem.start(values, parent.point.nuisances) for values in sizes]
     found = sorted((released(start, 1) for start in starts), key=lambda s: s.cost)
     best = [released(s.point, _PROFILE_STEPS - 1) for s in found[:_PROFILED_FURTHER]]
     found = sorted([*best, *found[_PROFILED_FURTHER:]], key=lambda s: s.cost)
-    return Profile(effect, problem, found[0].cost, tuple(s.point for s in found))
+    return found[0].cost, tuple(s.point for s in found)
 
 
-def sketch(profiled: Profile) -> Fit:
-    """Release everything for as long as it pays quickly, from the best point of the profile."""
-    return best_of(profiled.problem, [solve(profiled.problem, profiled.points[0], **_SKETCH)])
+def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Release everything for as long as it pays quickly, from the best point of each profile; the best few from afar
+    as well. The best first."""
+    names = [p.problem.structure.effects for p in profiled]
+    near = crew.map("refitting", names, _sketched, [(p.problem, p.points[0]) for p in profiled])
+    pairs = sorted(zip(near, profiled, strict=True), key=lambda pair: pair[0].cost)
+    again = [p for _, p in pairs[:_SKETCHED_TWICE]]
+    names = [p.problem.structure.effects for p in again]
+    afar = crew.map("refitting from afar", names, _sketched_from_afar, [(p.problem, p.from_afar()) for p in again])
+    fits = [(best_of(p.problem, [solution, *afar[place : place + 1]]), p) for place, (solution, p) in enumerate(pairs)]
+    return sorted(fits, key=lambda pair: pair[0].cost)
 
 
-def sketch_from_afar(sketched: Fit, profiled: Profile) -> Fit:
-    """The better of a sketch and another: from the base model's own start, with the effect as the profile has it, since
-    what has been fitted without the effect may have gone astray."""
-    problem, best = profiled.problem, profiled.points[0]
-    structure = problem.structure
-    effect = structure.system.effects[profiled.effect]
-    own = {effect.full_name(p) for p in effect.parameters}
-    fresh = structure.theta(structure.start()) | {k: v for k, v in structure.theta(best.values).items() if k in own}
-    afar = solve_from_afar(problem, structure.values(fresh), **_SKETCH)
-    return best_of(problem, [sketched.solution, afar])
+def _sketched(problem: Problem, start: Point) -> Solution:
+    return solve(problem, start, **_SKETCH)
+
+
+def _sketched_from_afar(problem: Problem, values: np.ndarray) -> Solution:
+    return solve_from_afar(problem, values, **_SKETCH)
 
 
 def finish(sketched: Fit) -> Fit:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from bifa.discrepancy.candidate import Candidate, judge
 from bifa.discrepancy.correct import Corrected, holds, learn_correction
+from bifa.discrepancy.crew import Crew, Progress
 from bifa.discrepancy.decide import Choice, Named, choose, dispersion_of
 from bifa.discrepancy.drift import find_drift
 from bifa.discrepancy.errors import Error, Floor, error_of, floor_of
@@ -60,9 +61,15 @@ class Diagnosis:
 
 
 def diagnose(
-    system: System, *, seed: int = 0, starts: int = 1, progress: Callable[[str], None] = lambda _: None
+    system: System,
+    *,
+    seed: int = 0,
+    starts: int = 1,
+    progress: Progress = lambda _: None,
+    executor: Executor | None = None,
 ) -> Diagnosis:
-    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed."""
+    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Explanations are tried
+    on `executor`, if there is one that can ship the system."""
     began = time.monotonic()
     split = split_trials(system.trials)
     if not split.fit or not split.select:
@@ -84,7 +91,7 @@ def diagnose(
             return False
         return _explained(at_least, remainder) or _explained(on_known(candidate)[1], remainder)
 
-    found = search(base, split, base.problem.floor, enough=enough, progress=progress)
+    found = search(base, split, base.problem.floor, enough=enough, crew=Crew(progress, executor))
     choice = choose(found)
     base_known, remainder = on_known(found.base)
     explained, left = on_known(choice.candidate)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profile, sketch, sketch_from_afar
+from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profiles, sketches
+from bifa.discrepancy.crew import Crew
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit, reweigh
 from bifa.identify.noise import NoiseFloor, estimate_noise
@@ -17,7 +18,6 @@ from bifa.identify.structure import Structure
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
-_SKETCHED_TWICE = 4  # the best of them, from afar as well
 _FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
@@ -25,8 +25,6 @@ _REWEIGHED_ITERATIONS = 5
 _REACH = 3.0  # times the cost of an explanation that suffices: rivals beyond are not pursued
 _SEEN = 3.0  # log-likelihood of a linear regression, below which a small effect is not worth a fit
 _ABSORBED = 0.02  # a change in the residual of which less than this share is left after the base's is absorbed
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,7 @@ def _orthonormal(matrix: np.ndarray) -> np.ndarray:
     return kept @ (vectors[:, good] / np.sqrt(values[good]))
 
 
-def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, progress: Progress) -> Search:
+def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, crew: Crew) -> Search:
     """Grow sets from the base model until `enough(candidate)` says that nothing is left to explain, or
     three effects.
 
@@ -132,13 +130,13 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, progress: Prog
     for size in range(1, LARGEST_SET + 1):
         grown: list[Candidate] = []
         for parent in beam:
-            grown += _grow(parent, library, split, floor, tried, enough, progress)
+            grown += _grow(parent, library, split, floor, tried, enough, crew)
         if not grown:
             break
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
         if lower.share_of(floor) < _LOWER:
             floor = lower
-            progress("weighing again against a lower floor")
+            crew.say("weighing again against a lower floor")
             reach = _REACH * _ranked(tried, size)[0].cost
             tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
         beam = _ranked(tried, size)[: _BEAM[size]]
@@ -164,38 +162,26 @@ def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thorough
     return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split)
 
 
-def _grow(parent: Candidate, library, split, floor, tried, enough, progress) -> list[Candidate]:
+def _grow(parent: Candidate, library, split, floor, tried, enough, crew: Crew) -> list[Candidate]:
     size = len(parent.effects) + 1
     fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
     if parent.effects:
         gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
         fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
-    profiles = []
-    for effect in fresh:
-        progress(f"trying {' + '.join((*parent.effects, effect))}")
-        profiles.append(profile(parent.fitted, effect, split, floor))
-    profiles.sort(key=lambda p: p.cost)
-    sketches = []
-    for promising in profiles[: _SKETCHED[size]]:
-        progress(f"refitting {' + '.join((*parent.effects, promising.effect))}")
-        sketches.append((sketch(promising), promising))
-    sketches.sort(key=lambda pair: pair[0].cost)
-    for place, (near, profiled) in enumerate(sketches[:_SKETCHED_TWICE]):
-        sketches[place] = sketch_from_afar(near, profiled), profiled
-    sketches.sort(key=lambda pair: pair[0].cost)
-    return _finish(sketches, _FINISHED[size], split, tried, enough, progress)
+    promising = profiles(parent.fitted, fresh, split, floor, crew)[: _SKETCHED[size]]
+    return _finish(sketches(promising, crew), _FINISHED[size], split, tried, enough, crew)
 
 
-def _finish(sketches, count, split, tried, enough, progress) -> list[Candidate]:
+def _finish(sketched, count, split, tried, enough, crew: Crew) -> list[Candidate]:
     """Refit the best `count` to the end; once one of them explains enough, only those that are not out of its
     reach. What does not explain enough gets a second start, so that it is not the optimiser who failed."""
     grown: list[Candidate] = []
     explained = np.inf
-    for place, (sketched, profiled) in enumerate(sketches):
-        candidate = judge(sketched, split)
-        if place < count and sketched.cost < _REACH * explained:
-            progress(f"finishing {' + '.join(candidate.effects)}")
-            candidate = judge(finish(sketched), split)
+    for place, (fitted, profiled) in enumerate(sketched):
+        candidate = judge(fitted, split)
+        if place < count and fitted.cost < _REACH * explained:
+            crew.say(f"finishing {' + '.join(candidate.effects)}")
+            candidate = judge(finish(fitted), split)
             if not enough(candidate):
                 candidate = judge(finish_elsewhere(candidate.fitted, profiled), split)
             if enough(candidate):

@@ -7,12 +7,11 @@ with simulations() as runs:
 
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.search import Optimum, SearchError, Settings, optimise
-from bifa.gait.simulations import ClusterError, simulations
+from bifa.gait.simulations import simulations
 from bifa.gait.space import SearchSpace, SpaceError, paper_space
 from bifa.gait.uncertainty import UncertaintyError, spread_of
 
 __all__ = [
-    "ClusterError",
     "Metric",
     "Optimum",
     "Passage",

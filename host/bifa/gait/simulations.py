@@ -6,15 +6,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from bifa.errors import BifaError
+from bifa.cluster import cluster
 from bifa.gait.metric import Judged, Metric, Passage
 from bifa.simulate import Plant, Progress, cores, speeds
 
 _PIECES_PER_WORKER = 4  # gaits differ in cost
-
-
-class ClusterError(BifaError):
-    """The cluster cannot be used; the text says what to do."""
 
 
 class Simulations:
@@ -53,18 +49,5 @@ def simulations(dask: str | None = None, workers: int | None = None) -> Iterator
         with ThreadPoolExecutor(count, thread_name_prefix="bifa-gait") as executor:
             yield Simulations(executor, count)
         return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ClusterError("--dask needs the package distributed: pip install 'bifa[dask]'") from None
-    try:
-        client = Client(dask, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise ClusterError(f"no dask scheduler answers at {dask}: {error}; start one with `dask scheduler`") from None
-    with client:
-        count = sum(client.nthreads().values())
-        if not count:
-            raise ClusterError(f"the dask scheduler at {dask} has no workers; start some with `dask worker {dask}`")
-        # The simulator is compiled once a process; its calls with equal arguments are equal, but not worth keeping.
-        with client.get_executor(pure=False) as executor:
-            yield Simulations(executor, count)
+    with cluster(dask) as (executor, count):
+        yield Simulations(executor, count)

@@ -1,5 +1,6 @@
 """The robot as a system of the engine: predictions, what matters where, nuisances, candidates, corrections."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +69,14 @@ def test_predictions_have_the_shape_of_the_measurements(system, theta):
         for channel, measured in trial.channels.items():
             assert prediction[channel].shape == measured.shape
             assert np.isfinite(prediction[channel]).all()
+
+
+def test_what_travelled_to_another_process_predicts_the_same(system, theta):
+    travelled = pickle.loads(pickle.dumps(system))
+    for trial, arrived in zip(system.trials, travelled.trials, strict=True):
+        there = travelled.predict(theta, ("hysteresis",), arrived)
+        for channel, values in system.predict(theta, ("hysteresis",), trial).items():
+            assert np.array_equal(values, there[channel])
 
 
 def test_a_prediction_never_looks_at_what_was_measured(dataset, system, theta):

@@ -95,3 +95,18 @@ def test_too_little_data_is_refused():
     system = hide({}, seed=19, repeats=1, sizes=(1.0,))
     with pytest.raises(TooLittleDataError):
         diagnose(system)
+
+
+def test_a_dask_cluster_comes_to_the_same_verdict():
+    distributed = pytest.importorskip("distributed")
+    from bifa.cluster import cluster
+
+    system = hide(SIZES["coulomb"], seed=11)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as workers,
+        cluster(workers.scheduler_address) as (executor, count),
+    ):
+        there = as_record(diagnose(system, executor=executor))
+    assert count == 2
+    here = as_record(diagnose(system))
+    assert {**there, "seconds": 0} == {**here, "seconds": 0}

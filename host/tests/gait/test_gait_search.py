@@ -99,7 +99,7 @@ def distributed_sample(pool, settings):
 
 
 def test_no_scheduler_and_no_workers_are_named():
-    from bifa.gait import ClusterError
+    from bifa.cluster import ClusterError
 
     with pytest.raises(ClusterError, match="no dask scheduler answers at"), simulations(dask="nonsense://x"):
         pass
