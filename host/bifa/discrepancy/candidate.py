@@ -24,7 +24,7 @@ _PEAKS = 3  # of the residual's spectrum that a frequency begins at
 _SKETCHED_TWICE = 4  # sketches, the best of them, that start from afar as well
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
-_REFIT_ITERATIONS = 60
+_REFIT = {"max_iterations": 40, "relative": 1e-4}
 _IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
 
 
@@ -158,14 +158,15 @@ def _sketched_from_afar(problem: Problem, values: np.ndarray) -> Solution:
 
 
 def finish(sketched: Fit) -> Fit:
-    """Refit to the end, from where the sketch stands."""
-    point = sketched.solution.point
-    return best_of(sketched.problem, [solve(sketched.problem, point, max_iterations=_REFIT_ITERATIONS)])
+    """Refit to the end: from afar once more, since with the effect at its size the trials that isolate parameters lead
+    those back that went astray without it."""
+    again = solve_from_afar(sketched.problem, sketched.solution.point.values, **_REFIT)
+    return best_of(sketched.problem, [sketched.solution, again])
 
 
 def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:
     """The better of a finished refit and one from the profile's second best point."""
-    others = [solve(profiled.problem, point, max_iterations=_REFIT_ITERATIONS) for point in profiled.points[1:2]]
+    others = [solve(profiled.problem, point, **_REFIT) for point in profiled.points[1:2]]
     return best_of(profiled.problem, [finished.solution, *others])
 
 

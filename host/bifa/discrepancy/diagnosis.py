@@ -24,7 +24,6 @@ from bifa.identify.structure import Structure
 from bifa.identify.system import System
 
 _ROUGH = 1e-3  # of the cost: where the first fit of the base model may stop, before the floor is known
-_CHANCE = 0.005  # probability by chance below which a remainder counts as structure
 _FINE = 1e-4  # of the cost: where a refit to all known trials may stop
 _HOPELESS = 5.0  # times what is negligible, that no refit would take away
 _NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
@@ -158,7 +157,7 @@ def _negligible(before: Remainder) -> float:
 
 def _explained(left: Remainder, before: Remainder) -> bool:
     """Nothing is left that repeats share, or too little to matter."""
-    return left.probability > _CHANCE or left.largest < _negligible(before)
+    return left.largest < _negligible(before)
 
 
 def _verdict(choice: Choice, left: Remainder, before: Remainder, drifts: tuple[str, ...]) -> str:

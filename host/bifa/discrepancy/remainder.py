@@ -19,25 +19,28 @@ from bifa.identify.noise import NoiseFloor
 from bifa.identify.problem import SOFT_LIMIT
 from bifa.identify.system import Channels, Trial
 
+CHANCE = 0.005  # probability by chance below which a remainder counts as structure
 _DRAWS = 200
+_TAIL = 0.1
 
 
 @dataclass(frozen=True)
 class Remainder:
     """What is left in the residual of a fit.
 
-    `shared` by (experiment, channel): mean square of what repeats share, in units of the floor's variance;
-    `z`: the same in standard deviations of what chance makes of it. `probability`: of so large a greatest z
-    by chance.
+    By (experiment, channel): `shared`, mean square of what repeats share, in units of the floor's variance; `z`, the
+    same in standard deviations of what chance makes of it; `chance`, the probability of so much by chance in any of
+    the channels.
     """
 
     shared: Mapping[tuple[str, str], float]
     z: Mapping[tuple[str, str], float]
-    probability: float
+    chance: Mapping[tuple[str, str], float]
 
     @property
     def largest(self) -> float:
-        return max(self.shared.values(), default=0.0)
+        """The largest `shared` that is not chance."""
+        return max((self.shared[key] for key, p in self.chance.items() if p < CHANCE), default=0.0)
 
 
 def find_remainder(
@@ -45,19 +48,20 @@ def find_remainder(
 ) -> Remainder:
     """Test the residuals `scaled` (in standard deviations, one mapping a trial) for structure."""
     draw = np.random.default_rng(seed)
-    shared, z = {}, {}
+    shared, z, alone = {}, {}, {}
     for key, conditions in _by_condition(trials, scaled).items():
         repeated = [rows for rows in conditions if len(rows) > 1]
         if repeated:
             shared[key] = _shared(repeated)
             by_chance = _by_chance(repeated, draw)
             z[key] = (shared[key] - by_chance.mean()) / max(by_chance.std(), 1e-12)
+            alone[key] = _exceeded(by_chance, shared[key])
         else:
             samples = np.concatenate([rows.ravel() for rows in conditions])
             shared[key] = float(np.mean(samples**2) - 1)
             z[key] = shared[key] / np.sqrt(2 * floor.channels[key].samples_per_piece / len(samples))
-    largest = max(z.values(), default=0.0)
-    return Remainder(shared, z, float(1 - norm.cdf(largest) ** max(len(z), 1)))
+            alone[key] = float(norm.sf(z[key]))
+    return Remainder(shared, z, {key: float(-np.expm1(len(z) * np.log1p(-min(p, 0.999)))) for key, p in alone.items()})
 
 
 def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
@@ -103,6 +107,16 @@ def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> n
         ]
         found[k] = _shared(drawn)
     return found
+
+
+def _exceeded(draws: np.ndarray, value: float) -> float:
+    """Probability that chance exceeds `value`. Beyond the largest tenth of the draws an exponential tail goes on: what
+    walks share by chance is far from normal, since each has few independent errors."""
+    threshold = float(np.quantile(draws, 1 - _TAIL))
+    if value <= threshold:
+        return float(np.mean(draws >= value))
+    excess = draws[draws > threshold] - threshold
+    return _TAIL * float(np.exp(-(value - threshold) / max(float(excess.mean()), 1e-12)))
 
 
 def _stretch(trace: np.ndarray, length: int, draw: np.random.Generator) -> np.ndarray:

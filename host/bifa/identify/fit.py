@@ -94,11 +94,11 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
     return Fit(problem, best, len(solutions), agreeing)
 
 
-def refit_on(fitted: Fit, trials: Sequence[Trial], *, max_iterations: int = 8, relative: float = RELATIVE) -> Fit:
-    """The same structure fitted to other trials, from where it stands."""
+def refit_on(fitted: Fit, trials: Sequence[Trial], *, max_iterations: int = 20, relative: float = RELATIVE) -> Fit:
+    """The same structure fitted to other trials, from where it stands, see `solve_from_afar`."""
     problem = Problem(fitted.structure, trials, fitted.problem.floor)
-    start = problem.start(fitted.solution.point.values)
-    solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
+    values = fitted.solution.point.values
+    solution = solve_from_afar(problem, values, max_iterations=max_iterations, relative=relative)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
