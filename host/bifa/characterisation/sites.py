@@ -1,4 +1,4 @@
-"""Where a learnt curve may be added to the robot's equations: beside K in eq. (1), and in the pressure sensor."""
+"""Where a learnt curve may be added to the robot: in the equations, in what instruments say, over the day."""
 
 from __future__ import annotations
 
@@ -8,21 +8,90 @@ import numpy as np
 
 from bifa.identify.system import Correction, CorrectionSite
 from bifa.robot import Model
-from bifa.simulate import Plant
+from bifa.simulate import Plant, layout, learnt
 
 from .curves import FittedCurve
+from .inputs import ANCHOR, STATIC, STEP, WALK
 
-_SENSOR = "pressure_sensor"
-_SENSOR_RANGE_PSI = (-14.5, 14.5)
-_SPRINGS_SHOW = {
-    "body": ("static_loading", "step_response", "locomotion"),
-    "small": ("static_loading", "step_response", "anchor_pull", "locomotion"),
-}
+_SPEED_M_S = 0.3  # of a snap-through
+_PRESSURE_PSI = (-14.5, 14.5)
+_PIPE_M = (-0.1, 0.6)
 _TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
+_TERMS = {
+    "filling": (learnt.FILLING, learnt.EMPTYING),
+    "friction_speed": (learnt.FORWARD, learnt.BACKWARD),
+    "friction_place": (learnt.PLACE,),
+    "body_damper": (learnt.DAMPING,),
+}
+_FIXED_SITES = (
+    CorrectionSite(
+        "filling", "rate of a chamber's pressure, eq. (2)", "pressure", "psi/s", *_PRESSURE_PSI, 0.3, True, (STEP, WALK)
+    ),
+    CorrectionSite(
+        "friction_speed",
+        "friction of an end by its speed, eq. (5)",
+        "velocity",
+        "N",
+        0.0,
+        _SPEED_M_S,
+        1.0,
+        True,
+        (WALK,),
+    ),
+    CorrectionSite(
+        "friction_place",
+        "friction of an end by its place in the pipe, eq. (5)",
+        "position",
+        "N",
+        *_PIPE_M,
+        1.0,
+        False,
+        (WALK,),
+    ),
+    CorrectionSite(
+        "body_damper",
+        "the body's damper, b v in eq. (1)",
+        "velocity",
+        "N",
+        -_SPEED_M_S,
+        _SPEED_M_S,
+        1.0,
+        False,
+        (STEP, WALK),
+    ),
+    CorrectionSite("pressure_sensor", "what the pressure sensors say", "pressure", "psi", *_PRESSURE_PSI, 0.1),
+    CorrectionSite("camera", "what the motion capture says", "position", "m", *_PIPE_M, 0.002, False, (WALK,)),
+    CorrectionSite(
+        "area_of_the_day", "the area a of eq. (2), as the day goes on", "place in the session", "", 0.0, 1.0, 0.01
+    ),
+    CorrectionSite(
+        "vacuum_of_the_day",
+        "the vacuum, as the day goes on",
+        "place in the session",
+        "psi",
+        0.0,
+        1.0,
+        0.1,
+        False,
+        (STEP, WALK),
+    ),
+    CorrectionSite(
+        "friction_of_the_day",
+        "the friction's coefficients, as the day goes on",
+        "place in the session",
+        "",
+        0.0,
+        1.0,
+        0.01,
+        False,
+        (ANCHOR, WALK),
+    ),
+)
+_FIXED = {site.name: site for site in _FIXED_SITES}
 
 
 def sites(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, CorrectionSite]:
-    """The sites of a model: both springs and the sensors."""
+    """The sites of a model: both springs, and those that are every model's."""
     found = {}
     for prefix in ("body", "small"):
         curve = model.body_stiffness if prefix == "body" else model.small_stiffness
@@ -35,40 +104,65 @@ def sites(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, Correcti
             lower=ends.lower_m,
             upper=ends.upper_m,
             scale=1.0,
-            experiments=_SPRINGS_SHOW[prefix],
+            experiments=(STATIC, STEP, WALK) if prefix == "body" else (STATIC, STEP, ANCHOR, WALK),
         )
-    found[_SENSOR] = CorrectionSite(
-        name=_SENSOR,
-        term="what the pressure sensors say",
-        variable="pressure",
-        unit="psi",
-        lower=_SENSOR_RANGE_PSI[0],
-        upper=_SENSOR_RANGE_PSI[1],
-        scale=0.1,
-    )
-    return found
+    return found | _FIXED
 
 
-def corrected(plant: Plant, corrections: Sequence[Correction]) -> Plant:
-    """The plant with the learnt curves of its springs added to their tables."""
+def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session: float = 0.0) -> Plant:
+    """The plant with the learnt curves in it. place_in_session: 0 for the day's first trial, 1 for its last."""
     for correction in corrections:
-        name = _TABLES.get(correction.site)
-        if name is not None:
-            plant = plant._replace(**{name: _added(getattr(plant, name), correction.table[0])})
+        name = correction.site
+        if name in _TABLES:
+            plant = plant._replace(**{_TABLES[name]: _added(getattr(plant, _TABLES[name]), correction.table[0])})
+        elif name in _TERMS:
+            plant = plant._replace(learnt=_learnt(plant.learnt, _FIXED[name], _TERMS[name], correction.table))
+        elif name.endswith("_of_the_day"):
+            plant = plant._replace(q=_of_the_day(plant.q, name, _at(_FIXED[name], correction, place_in_session)))
     return plant
 
 
 def corrected_readings(channels: dict[str, np.ndarray], corrections: Sequence[Correction]) -> dict[str, np.ndarray]:
-    """The channels with the sensors' learnt curve added to the pressures."""
+    """The channels with what the instruments add to them."""
     for correction in corrections:
-        if correction.site == _SENSOR:
-            grid = np.linspace(*_SENSOR_RANGE_PSI, correction.table.shape[1])
-            channels = channels | {
-                name: values + np.interp(values, grid, correction.table[0])
-                for name, values in channels.items()
-                if name.startswith("pressure")
-            }
+        if correction.site == "pressure_sensor":
+            changed = {c: v + _at(_FIXED[correction.site], correction, v) for c, v in _like(channels, "pressure")}
+        elif correction.site == "camera":
+            walked = _like(channels, "displacement_head", "displacement_tail")
+            changed = {c: v + 1e3 * _at(_FIXED[correction.site], correction, 1e-3 * v) for c, v in walked}
+        else:
+            continue
+        channels = channels | changed
     return channels
+
+
+def _like(channels: dict[str, np.ndarray], *starts: str) -> list[tuple[str, np.ndarray]]:
+    return [(name, values) for name, values in channels.items() if name.startswith(starts)]
+
+
+def _at(site: CorrectionSite, correction: Correction, where):
+    grid = np.linspace(site.lower, site.upper, correction.table.shape[1])
+    return np.interp(where, grid, correction.table[0])
+
+
+def _of_the_day(q: np.ndarray, name: str, value: float) -> np.ndarray:
+    q = q.copy()
+    if name == "area_of_the_day":
+        q[[layout.BODY + layout.AREA, layout.SMALL + layout.AREA]] *= 1.0 + value
+    elif name == "friction_of_the_day":
+        q[[layout.MU_S, layout.MU_K]] *= 1.0 + value
+    else:
+        q[layout.SUPPLY_NEGATIVE] += value
+    return q
+
+
+def _learnt(rows: np.ndarray, site: CorrectionSite, terms: Sequence[int], table: np.ndarray) -> np.ndarray:
+    """The integrator's rows with those of a site's terms filled in."""
+    filled = rows.copy() if len(rows) else np.zeros((learnt.TERMS, 2 + table.shape[1]))
+    for term, values in zip(terms, table, strict=True):
+        filled[term, :2] = site.lower, (len(values) - 1) / (site.upper - site.lower)
+        filled[term, 2:] = values
+    return filled
 
 
 def _added(rows: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -89,6 +89,7 @@ class RobotSystem(System):
         self.fitted = tuple(fitted)
         self._inputs = {trial.file: inputs_of(trial) for trial in dataset.trials}
         self.trials = tuple(_engine_trial(trial, self._inputs[trial.file]) for trial in dataset.trials)
+        self._last_in_session = max((t.session_order or 0 for t in self.trials), default=0)
         self.effects: Mapping[str, Effect] = engine_effects()
         shapes = [p for curve in self.curves.values() for p in curve.parameters]
         self.parameters = (*(self._named(name) for name in self.fitted), *shapes)
@@ -120,7 +121,7 @@ class RobotSystem(System):
         inputs: Inputs = trial.payload
         try:
             plant, zeros = self._plant(self._key(theta, effects))
-            plant = sites.corrected(plant, corrections)
+            plant = sites.corrected(plant, corrections, self._place_in_session(trial))
             friction = theta.get("friction_scale", 1.0)
             if friction != 1.0 or inputs.positive_psi is not None:
                 plant = _altered(plant, friction, inputs.positive_psi)
@@ -130,6 +131,10 @@ class RobotSystem(System):
             return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
         channels = sites.corrected_readings(channels, corrections)
         return {name: channels[name] for name in trial.channels}
+
+    def _place_in_session(self, trial: Trial) -> float:
+        """0 for the day's first trial, 1 for its last; 0 where the order was not noted."""
+        return (trial.session_order or 0) / max(self._last_in_session, 1)
 
     def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
         return regressors.of(trial, prediction)

@@ -64,6 +64,11 @@ class Candidate:
             + 0.5 * own * np.log(max(self.pieces / len(trials), 2.0))
         )
 
+    @property
+    def excess(self) -> float:
+        """Of the cost, what noise at the floor would not leave."""
+        return max(self.cost - 0.5 * self.pieces, 0.0)
+
 
 def implausibility(fitted: Fit) -> float:
     """What it costs an explanation to need parameters that no sane system has."""

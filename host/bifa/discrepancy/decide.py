@@ -62,8 +62,7 @@ def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float) -> bo
     extra = len(larger.effects) - len(smaller.effects)
     gain = (smaller.cost - larger.cost) / dispersion
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
-    gap = smaller.cost - 0.5 * smaller.pieces
-    share = (smaller.cost - larger.cost) / max(gap, 1e-9) if gap > 0 else 1.0
+    share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
     least = extra * max(_LEAST_GAIN, _LEAST_GAIN_PER_PIECE * smaller.pieces)
     return gain > least and unseen > 0.25 * least and share > extra * _LEAST_SHARE
 

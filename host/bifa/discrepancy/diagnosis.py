@@ -90,7 +90,8 @@ def diagnose(
             return False
         return _explained(at_least, remainder) or _explained(on_known(candidate)[1], remainder)
 
-    found = search(base, split, base.problem.floor, enough=enough, crew=Crew(progress, executor))
+    crew = Crew(progress, executor)
+    found = search(base, split, base.problem.floor, enough=enough, crew=crew)
     choice = choose(found)
     base_known, remainder = on_known(found.base)
     explained, left = on_known(choice.candidate)
@@ -98,8 +99,7 @@ def diagnose(
     verdict = _verdict(choice, left, remainder, drifts)
     correction, final = None, explained
     if verdict == "unexplained":
-        progress("learning a correction")
-        correction = _correction(found.base, choice.candidate, base_known, split)
+        correction = _correction(found.base, choice.candidate, base_known, split, crew)
         final = correction.fitted if correction else explained
     signature = describe(
         explained if verdict == "unexplained" else base_known,
@@ -168,9 +168,9 @@ def _verdict(choice: Choice, left: Remainder, before: Remainder, drifts: tuple[s
     return "unexplained" if drifts else "none"
 
 
-def _correction(base: Candidate, chosen: Candidate, before: Fit, split: Split) -> Corrected | None:
+def _correction(base: Candidate, chosen: Candidate, before: Fit, split: Split, crew: Crew) -> Corrected | None:
     tried = [base] if chosen is base else [base, chosen]
-    corrected = learn_correction(tried, split)
+    corrected = learn_correction(tried, split, crew)
     return corrected if corrected and holds(corrected, before, split) else None
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profiles, sketches
 from bifa.discrepancy.crew import Crew
+from bifa.discrepancy.linear import remaining_after
 from bifa.discrepancy.split import Split
 from bifa.identify.fit import Fit, reweigh
 from bifa.identify.noise import NoiseFloor, estimate_noise
@@ -19,6 +20,8 @@ LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
 _FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
+_FRUITFUL = 0.05  # of its parent's excess: a sketch that takes less away is not finished, nor a beam grown further
+_HOPEFUL = 3.0  # times the least excess of the beam: sets that leave more are not grown
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
@@ -63,12 +66,8 @@ class Search:
 def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
     """Sensitivity to each effect at its typical size, projected off what the parent's parameters can do."""
     found = []
-    jacobians = parent.solution.jacobians
     reference = parent.problem.residuals(parent.solution.point)
-    flat = _stack(jacobians)
-    basis = _orthonormal(flat)
-    residual = np.concatenate(reference)
-    remaining = residual - basis @ (basis.T @ residual)
+    basis, remaining = remaining_after(parent)
     for name, effect in parent.structure.system.effects.items():
         if name in parent.structure.effects:
             continue
@@ -86,30 +85,6 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
         gain = 0.5 * float(left @ remaining) ** 2 / max(visible**2, 1e-300)
         found.append(Screened(name, visible, size == 0 or visible < _ABSORBED * size, gain))
     return found
-
-
-def _stack(jacobians) -> np.ndarray:
-    """Jacobian of everything: the structure's columns, then each trial's nuisances in their own rows."""
-    rows = sum(j.shape[0] for j, _ in jacobians)
-    own = sum(k.shape[1] for _, k in jacobians)
-    shared = np.vstack([j for j, _ in jacobians])
-    blocks = np.zeros((rows, own))
-    row = column = 0
-    for _, k in jacobians:
-        blocks[row : row + k.shape[0], column : column + k.shape[1]] = k
-        row, column = row + k.shape[0], column + k.shape[1]
-    return np.hstack([shared, blocks])
-
-
-def _orthonormal(matrix: np.ndarray) -> np.ndarray:
-    norms = np.linalg.norm(matrix, axis=0)
-    kept = matrix[:, norms > 0] / norms[norms > 0]
-    if kept.shape[1] == 0:
-        return np.zeros((matrix.shape[0], 0))
-    # by the Gram matrix: the columns are few and the rows many
-    values, vectors = np.linalg.eigh(kept.T @ kept)
-    good = values > 1e-10 * values[-1]
-    return kept @ (vectors[:, good] / np.sqrt(values[good]))
 
 
 def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, crew: Crew) -> Search:
@@ -139,9 +114,12 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, crew: Crew) ->
             crew.say("weighing again against a lower floor")
             reach = _REACH * _ranked(tried, size)[0].cost
             tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
+        before = min(tried[frozenset(c.effects)].excess for c in beam)
         beam = _ranked(tried, size)[: _BEAM[size]]
-        if enough(beam[0]):
+        least = beam[0].excess
+        if enough(beam[0]) or before - least < _FRUITFUL * before:
             break
+        beam = [c for c in beam if c.excess <= _HOPEFUL * least]
     return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened))
 
 
@@ -169,17 +147,19 @@ def _grow(parent: Candidate, library, split, floor, tried, enough, crew: Crew) -
         gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
         fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
     promising = profiles(parent.fitted, fresh, split, floor, crew)[: _SKETCHED[size]]
-    return _finish(sketches(promising, crew), _FINISHED[size], split, tried, enough, crew)
+    return _finish(parent, sketches(promising, crew), _FINISHED[size], split, tried, enough, crew)
 
 
-def _finish(sketched, count, split, tried, enough, crew: Crew) -> list[Candidate]:
-    """Refit the best `count` to the end; once one of them explains enough, only those that are not out of its
-    reach. What does not explain enough gets a second start, so that it is not the optimiser who failed."""
+def _finish(parent: Candidate, sketched, count, split, tried, enough, crew: Crew) -> list[Candidate]:
+    """Refit to the end the best `count` of those that explain something; once one of them explains enough, only those
+    that are not out of its reach. What does not explain enough gets a second start, so that it is not the optimiser
+    who failed."""
     grown: list[Candidate] = []
     explained = np.inf
     for place, (fitted, profiled) in enumerate(sketched):
         candidate = judge(fitted, split)
-        if place < count and fitted.cost < _REACH * explained:
+        fruitful = parent.cost - candidate.cost > _FRUITFUL * parent.excess
+        if place < count and fruitful and fitted.cost < _REACH * explained:
             crew.say(f"finishing {' + '.join(candidate.effects)}")
             candidate = judge(finish(fitted), split)
             if not enough(candidate):

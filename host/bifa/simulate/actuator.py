@@ -11,6 +11,7 @@ import math
 from bifa.simulate import layout
 from bifa.simulate.compiled import merged
 from bifa.simulate.hooks import chains
+from bifa.simulate.learnt import DAMPING, EMPTYING, FILLING, learnt_at
 
 _THRESHOLD = layout.THRESHOLD
 _ALPHA_S = layout.ALPHA_S
@@ -49,7 +50,10 @@ def pressure_after(plant, block, actuator, z, z_new, x, pressure, source, h):
     rate = chains.filling(active, q, convergence(q, block, x, inlet), inlet - pressure)
     total = rate + chains.loss(active, q)
     settled = inlet * rate / total
-    return settled + (pressure - settled) * math.exp(-total * h)
+    after = settled + (pressure - settled) * math.exp(-total * h)
+    if plant.learnt.shape[0]:
+        after += h * learnt_at(plant.learnt, FILLING if inlet > pressure else EMPTYING, pressure)[0]
+    return after
 
 
 @merged
@@ -76,6 +80,10 @@ def resistance(plant, curve, block, actuator, z, x, v, h):
         direction = 1.0 if v > 0.0 else (-1.0 if v < 0.0 else 0.0)
         more, steeper = chains.spring(active, q, z, actuator, block == layout.SMALL, direction, h)
         force += more
+        growth += steeper
+    if plant.learnt.shape[0] and block == layout.BODY:
+        more, steeper = learnt_at(plant.learnt, DAMPING, v)
+        force += more - steeper * v
         growth += steeper
     return force, growth
 

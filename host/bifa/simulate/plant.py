@@ -14,15 +14,18 @@ from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate import layout
 
 _INTERVALS = 256
+_NOTHING = np.zeros((0, 4))
 
 
 class Plant(NamedTuple):
-    """`q`: numbers as `layout` has them; `active`: a bit an effect; the curves: rows of cubic coefficients."""
+    """`q`: numbers as `layout` has them; `active`: a bit an effect; the curves: rows of cubic coefficients;
+    `learnt`: see `bifa.simulate.learnt`."""
 
     q: np.ndarray
     active: int
     body_curve: np.ndarray
     small_curve: np.ndarray
+    learnt: np.ndarray = _NOTHING
 
 
 def plant(model: Model | Plant) -> Plant:

@@ -16,6 +16,7 @@ from bifa.simulate import layout
 from bifa.simulate.actuator import area_at, convergence, pressure_after, remember, resistance
 from bifa.simulate.compiled import inner, merged
 from bifa.simulate.hooks import chains
+from bifa.simulate.learnt import BACKWARD, FORWARD, PLACE, learnt_at
 
 # State y: positions in m, velocities in m/s, pressures in psi.
 X_HEAD, V_HEAD, X_TAIL, V_TAIL, P_BODY, X_SMALL_HEAD, V_SMALL_HEAD, P_HEAD, X_SMALL_TAIL, V_SMALL_TAIL, P_TAIL = range(
@@ -203,6 +204,9 @@ def _limit(plant, rig, end, normal, direction, sliding, y):
     if rig.terrain.shape[0]:
         row = 1 + 2 * end + (0 if direction > 0.0 else 1)
         force += squeeze(rig.terrain, row, y[X_HEAD if end == 0 else X_TAIL])
+    if plant.learnt.shape[0]:
+        force += learnt_at(plant.learnt, FORWARD if direction > 0.0 else BACKWARD, sliding)[0]
+        force = max(force + learnt_at(plant.learnt, PLACE, y[X_HEAD if end == 0 else X_TAIL])[0], 0.0)
     return force
 
 
