@@ -13,7 +13,7 @@ from bifa.simulate import Plant, layout, learnt
 from .curves import FittedCurve
 from .inputs import ANCHOR, STATIC, STEP, WALK
 
-_SPEED_M_S = 0.3  # of a snap-through
+_SPEED_M_S = 0.8  # that a snap-through does not reach
 _PRESSURE_PSI = (-14.5, 14.5)
 _PIPE_M = (-0.1, 0.6)
 _TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
