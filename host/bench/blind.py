@@ -4,9 +4,9 @@
 
 Each data set is drawn by `python -m virtual_robot.sealed` from its seed: single effects in turn, sizes and pairs at
 random, outside the library those that were never in it and each library effect in turn, withheld from the diagnosis.
-Verdicts are kept in FOLDER, so that an interrupted trial continues. Prints the figures with 95 % Wilson intervals
-beside four baselines that see the same fits: the best single refit by error, BIC, greedy forward selection, and
-sparse regression on the base model's residual.
+Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues. Prints the
+figures with 95 % Wilson intervals beside four baselines that see the same fits: the best single refit by error, BIC,
+greedy forward selection, and sparse regression on the base model's residual.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 import tomllib
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -71,11 +72,12 @@ def diagnose_sealed(job: Job, out: Path) -> dict:
         sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(job.seed), "--out", str(folder), *options]
         subprocess.run([*sealed, "--label", str(label)], check=True)
         one = [sys.executable, "-m", "bench.blind", "--one", str(folder), "--json", str(verdict), *withheld]
-        subprocess.run(one, check=True)
+        out.mkdir(parents=True, exist_ok=True)
+        with kept.with_suffix(".log").open("w") as log:
+            subprocess.run(one, check=True, stdout=log)
         record = json.loads(verdict.read_text())
         truth = tomllib.loads(label.read_text())
     record |= {"seed": job.seed, "kind": job.kind, "truth": sorted(truth["effects"]), "sizes": truth["sizes"]}
-    out.mkdir(parents=True, exist_ok=True)
     kept.write_text(json.dumps(record, indent=1))
     return record
 
@@ -89,7 +91,8 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None) -> None:
 
     system = prepare(read_dataset(folder))
     system.effects = {name: effect for name, effect in system.effects.items() if name != without}
-    found = diagnose(system)
+    began = time.monotonic()
+    found = diagnose(system, progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
     verdict.write_text(json.dumps(as_record(found) | {"baselines": baselines(found.search)}))
 
 

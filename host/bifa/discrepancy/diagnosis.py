@@ -135,7 +135,9 @@ def _fit_base(system: System, split: Split, seed: int, starts: int) -> Fit:
     first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, from_afar=True)
     residuals = first.residuals() | evaluate_on(first, split.select).residuals()
     sharper = floor.lowered_by(estimate_noise(system, split.known, residuals))
-    again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], max_iterations=15)
+    # from afar once more: the walks no longer lead astray, now that the rest is nearly right
+    start = [first.solution.point.values]
+    again = fit(structure, split.fit, sharper, starts=start, max_iterations=15, relative=_FINE, from_afar=True)
     return Fit(again.problem, again.solution, first.starts, first.starts_agreeing)
 
 

@@ -154,18 +154,23 @@ def _finish(parent: Candidate, sketched, count, split, tried, enough, crew: Crew
     """Refit to the end the best `count` of those that explain something; once one of them explains enough, only those
     that are not out of its reach. What does not explain enough gets a second start, so that it is not the optimiser
     who failed."""
-    grown: list[Candidate] = []
+    grown = [judge(fitted, split) for fitted, _ in sketched]
+    profiled = {candidate.effects: profile for candidate, (_, profile) in zip(grown, sketched, strict=True)}
+    waiting = sorted(grown, key=lambda c: c.cost)
+    done: list[Candidate] = []
     explained = np.inf
-    for place, (fitted, profiled) in enumerate(sketched):
-        candidate = judge(fitted, split)
+    while waiting and len(done) < count:
+        candidate = waiting[0]
         fruitful = parent.cost - candidate.cost > _FRUITFUL * parent.excess
-        if place < count and fruitful and fitted.cost < _REACH * explained:
-            crew.say(f"finishing {' + '.join(candidate.effects)}")
-            candidate = judge(finish(fitted), split)
-            if not enough(candidate):
-                candidate = judge(finish_elsewhere(candidate.fitted, profiled), split)
-            if enough(candidate):
-                explained = min(explained, candidate.fitted.cost)
-        tried[frozenset(candidate.effects)] = candidate
-        grown.append(candidate)
-    return grown
+        if not fruitful or candidate.cost > _REACH * explained:
+            break
+        waiting.pop(0)
+        crew.say(f"finishing {' + '.join(candidate.effects)}")
+        candidate = judge(finish(candidate.fitted), split)
+        if not enough(candidate):
+            candidate = judge(finish_elsewhere(candidate.fitted, profiled[candidate.effects]), split)
+        if enough(candidate):
+            explained = min(explained, candidate.cost)
+        done.append(candidate)
+    tried.update((frozenset(candidate.effects), candidate) for candidate in [*done, *waiting])
+    return [*done, *waiting]
