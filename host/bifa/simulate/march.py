@@ -35,7 +35,8 @@ LONGEST_S = 0.1
 SHORTEST_S = 1e-5
 _FIRST_S = 1e-3
 _HOPELESS_S = 1e-6  # where even shorter steps are asked for there is no solution: the run goes on as NaN
-_MOST_STEPS = 600_000  # in a run: several times what two minutes of walking take. Beyond, it only crawls: NaN
+# In a run until now, for a tolerance of 1 um: ten times what walking takes, and some to begin with. Beyond: NaN
+_MOST_STEPS, _MOST_STEPS_PER_S = 40_000.0, 20_000.0
 _ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
 # Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
@@ -128,10 +129,11 @@ def march(plant, rig, run, until, tolerance):
     if not math.isfinite(y[0]):
         clock[0] = until
         return
+    patience = max(1.0, math.sqrt(1e-6 / tolerance))
     while until - clock[0] > 1e-12:
         left = until - clock[0]
         clock[2] += 1.0
-        if clock[2] > _MOST_STEPS:
+        if clock[2] > patience * (_MOST_STEPS + _MOST_STEPS_PER_S * max(clock[0], 0.0)):
             y[:] = np.nan
             break
         h = min(clock[1], LONGEST_S)
