@@ -21,7 +21,6 @@ from bifa.identify.uncertainty import effective_samples
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
-_SKETCHED_TWICE = 4  # sketches, the best of them, that start from afar as well
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
@@ -141,13 +140,13 @@ def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -
     return found[0].cost, tuple(s.point for s in found)
 
 
-def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Release everything for as long as it pays quickly, from the best point of each profile; the best few from afar
-    as well. The best first."""
+def sketches(profiled: Sequence[Profile], twice: int, crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Release everything for as long as it pays quickly, from the best point of each profile; the best few, `twice`,
+    from afar as well. The best first."""
     names = [p.problem.structure.effects for p in profiled]
     near = crew.map("refitting", names, _sketched, [(p.problem, p.points[0]) for p in profiled])
     pairs = sorted(zip(near, profiled, strict=True), key=lambda pair: pair[0].cost)
-    again = [p for _, p in pairs[:_SKETCHED_TWICE]]
+    again = [p for _, p in pairs[:twice]]
     names = [p.problem.structure.effects for p in again]
     afar = crew.map("refitting from afar", names, _sketched_from_afar, [(p.problem, p.from_afar()) for p in again])
     fits = [(best_of(p.problem, [solution, *afar[place : place + 1]]), p) for place, (solution, p) in enumerate(pairs)]

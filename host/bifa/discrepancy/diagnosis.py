@@ -23,7 +23,7 @@ from bifa.identify.noise import estimate_noise
 from bifa.identify.structure import Structure
 from bifa.identify.system import System
 
-_ROUGH = 1e-3  # of the cost: where the first fit of the base model may stop, before the floor is known
+_ROUGH = 1e-3  # of the cost: where a fit of the base model may stop that is not added to
 _FINE = 1e-4  # of the cost: where a refit to all known trials may stop
 _HOPELESS = 5.0  # times what is negligible, that no refit would take away
 _NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
@@ -78,9 +78,9 @@ def diagnose(
     remainder = _unfitted_remainder(judge(base, split), seed)
     refitted: dict[int, tuple[Candidate, Fit, Remainder]] = {}
 
-    def on_known(candidate: Candidate) -> tuple[Fit, Remainder]:
+    def on_known(candidate: Candidate, relative: float = _FINE) -> tuple[Fit, Remainder]:
         if id(candidate) not in refitted:
-            fitted = refit_on(candidate.fitted, split.known, relative=_FINE)
+            fitted = refit_on(candidate.fitted, split.known, relative=relative)
             refitted[id(candidate)] = candidate, fitted, _remainder(fitted, seed)
         return refitted[id(candidate)][1:]
 
@@ -93,8 +93,8 @@ def diagnose(
     crew = Crew(progress, executor)
     found = search(base, split, base.problem.floor, enough=enough, crew=crew)
     choice = choose(found)
-    base_known, remainder = on_known(found.base)
     explained, left = on_known(choice.candidate)
+    base_known, remainder = on_known(found.base, _ROUGH)
     drifts = find_drift(explained, seed=seed)
     verdict = _verdict(choice, left, remainder, drifts)
     correction, final = None, explained

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.discrepancy.candidate import Candidate, finish, finish_elsewhere, judge, profiles, sketches
+from bifa.discrepancy.candidate import Candidate, Profile, finish, finish_elsewhere, judge, profiles, sketches
 from bifa.discrepancy.crew import Crew
 from bifa.discrepancy.linear import remaining_after
 from bifa.discrepancy.split import Split
@@ -18,9 +18,10 @@ from bifa.identify.structure import Structure
 
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
-_SKETCHED = {1: 8, 2: 5, 3: 3}  # effects refitted for each parent, by the size of the set: roughly
-_FINISHED = {1: 3, 2: 2, 3: 2}  # and of these, to the end
-_FRUITFUL = 0.05  # of its parent's excess: a sketch that takes less away is not finished, nor a beam grown further
+_SKETCHED = {1: 8, 2: 8, 3: 6}  # sets refitted, by their size: roughly,
+_SKETCHED_TWICE = {1: 4, 2: 3, 3: 2}  # the best of these from afar as well,
+_FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
+_FRUITFUL = 0.05  # of the best smaller set's excess: a sketch that takes less away is not finished, nor a beam grown
 _HOPEFUL = 3.0  # times the least excess of the beam: sets that leave more are not grown
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
@@ -103,10 +104,7 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, crew: Crew) ->
     # all
     library = [s.effect for s in screened if s.gain > _SEEN] if enough(first) else everything
     for size in range(1, LARGEST_SET + 1):
-        grown: list[Candidate] = []
-        for parent in beam:
-            grown += _grow(parent, library, split, floor, tried, enough, crew)
-        if not grown:
+        if not _grow(beam, library, split, floor, tried, enough, crew):
             break
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
         if lower.share_of(floor) < _LOWER:
@@ -140,20 +138,28 @@ def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thorough
     return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split)
 
 
-def _grow(parent: Candidate, library, split, floor, tried, enough, crew: Crew) -> list[Candidate]:
-    size = len(parent.effects) + 1
-    fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
-    if parent.effects:
-        gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
-        fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
-    promising = profiles(parent.fitted, fresh, split, floor, crew)[: _SKETCHED[size]]
-    return _finish(parent, sketches(promising, crew), _FINISHED[size], split, tried, enough, crew)
+def _grow(beam: Sequence[Candidate], library, split, floor, tried, enough, crew: Crew) -> list[Candidate]:
+    """Every parent of the beam with one effect more: the most promising of all, with equal effort."""
+    size = len(beam[0].effects) + 1
+    profiled: dict[frozenset[str], Profile] = {}
+    for parent in beam:
+        fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
+        if parent.effects:
+            gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
+            fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
+        for found in profiles(parent.fitted, fresh, split, floor, crew):
+            same = frozenset(found.problem.structure.effects)
+            if same not in profiled or found.cost < profiled[same].cost:
+                profiled[same] = found
+    promising = sorted(profiled.values(), key=lambda p: p.cost)[: _SKETCHED[size]]
+    sketched = sketches(promising, _SKETCHED_TWICE[size], crew)
+    return _finish(min(beam, key=lambda c: c.cost), sketched, _FINISHED[size], split, tried, enough, crew)
 
 
-def _finish(parent: Candidate, sketched, count, split, tried, enough, crew: Crew) -> list[Candidate]:
-    """Refit to the end the best `count` of those that explain something; once one of them explains enough, only those
-    that are not out of its reach. What does not explain enough gets a second start, so that it is not the optimiser
-    who failed."""
+def _finish(before: Candidate, sketched, count, split, tried, enough, crew: Crew) -> list[Candidate]:
+    """Refit to the end the best `count` of those that explain more than the best set so far, `before`; once one of them
+    explains enough, only those that are not out of its reach. What does not explain enough gets a second start, so that
+    it is not the optimiser who failed."""
     grown = [judge(fitted, split) for fitted, _ in sketched]
     profiled = {candidate.effects: profile for candidate, (_, profile) in zip(grown, sketched, strict=True)}
     waiting = sorted(grown, key=lambda c: c.cost)
@@ -161,7 +167,7 @@ def _finish(parent: Candidate, sketched, count, split, tried, enough, crew: Crew
     explained = np.inf
     while waiting and len(done) < count:
         candidate = waiting[0]
-        fruitful = parent.cost - candidate.cost > _FRUITFUL * parent.excess
+        fruitful = before.cost - candidate.cost > _FRUITFUL * before.excess
         if not fruitful or candidate.cost > _REACH * explained:
             break
         waiting.pop(0)
