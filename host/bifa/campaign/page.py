@@ -53,7 +53,7 @@ def campaign_page(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping
                 ),
                 *_probabilities(diagnosis),
             ],
-            tables=[error_table(error)],
+            tables=[*_opened(summary), error_table(error)],
         ),
         Section(
             "The gaits",
@@ -73,7 +73,13 @@ def campaign_page(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping
             ],
         ),
     ]
-    return Page("What this robot does that the paper's model does not", _lead(summary), facts, sections, _seal(summary))
+    return Page(
+        "What this robot does that the paper's model does not",
+        _lead(summary),
+        facts,
+        sections,
+        "Made by bifa campaign.",
+    )
 
 
 def speed_table(gaits: Sequence[Mapping]) -> Table:
@@ -102,6 +108,21 @@ def error_table(error: Mapping) -> Table:
     for name in error["before"]["by_experiment"]:
         rows.append([name.replace("_", " "), *(f"{error[s]['by_experiment'][name]:.2f}" for s in sides), ""])
     return Table(["trials", "base model", "completed model", "noise floor"], rows, f"{error['unit']}.", 1)
+
+
+def _opened(summary: Mapping) -> list[Table]:
+    """The verdict beside what the seal held, where there is one."""
+    if summary["truth"] is None:
+        return []
+    named = {effect["name"]: effect["parameters"] for effect in summary["effects"]}
+    rows = []
+    for effect in sorted({*named, *summary["truth"]}):
+        found, true = named.get(effect, {}), summary["truth"].get(effect, {})
+        for parameter in dict.fromkeys([*found, *true]):
+            values = (f"{side[parameter]:.3g}" if parameter in side else "" for side in (found, true))
+            rows.append([f"{effect}: {parameter}".replace("_", " "), *values])
+    rows = rows or [["no effect", "", ""]]
+    return [Table(["", "found", "in the seal"], rows, "The seal, opened after the verdict.")]
 
 
 def _lead(summary: Mapping) -> str:
@@ -150,13 +171,3 @@ def _probabilities(diagnosis: Mapping) -> list:
             "Probability of each effect named",
         )
     ]
-
-
-def _seal(summary: Mapping) -> str:
-    if summary["truth"] is None:
-        return "Made by bifa campaign."
-    inside = "; ".join(
-        name.replace("_", " ") + " (" + ", ".join(f"{key} = {value:.3g}" for key, value in values.items()) + ")"
-        for name, values in summary["truth"].items()
-    )
-    return f"The seal, opened after the verdict: {inside or 'nothing'}. Made by bifa campaign."
