@@ -10,7 +10,7 @@ from bifa.cluster import cluster
 from bifa.gait.metric import Judged, Metric, Passage
 from bifa.simulate import Plant, Progress, cores, speeds
 
-_PIECES_PER_WORKER = 4  # gaits differ in cost
+_PIECES_PER_WORKER = 8  # gaits differ in cost
 
 
 class Simulations:

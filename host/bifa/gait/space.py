@@ -58,6 +58,13 @@ class SearchSpace:
             for row in values.tolist()
         ]
 
+    def slower(self, points: np.ndarray, share: float) -> np.ndarray:
+        """Points (n, dimensions) of the same gaits, the period longer by `share` as far as the space goes."""
+        number = next(number for number, axis in enumerate(self.axes) if "period_s" in axis.sets)
+        axis, slow = self.axes[number], points.copy()
+        slow[:, number] += share * (axis.lower / (axis.upper - axis.lower) + points[:, number])
+        return self.fold(slow)
+
     def point(self, gait: Gait) -> np.ndarray:
         """(dimensions,) of a gait; SpaceError where the gait lies outside or breaks an axis's equality."""
         values = gait.as_dict()
