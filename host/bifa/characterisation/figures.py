@@ -1,4 +1,5 @@
-"""Figures in the manner of the paper's Figs. 4, 5 and 6: what was measured, and what the identified model says."""
+"""Figures in the manner of the paper's Figs. 4, 5 and 6: what was measured, what the identified model says, and the
+difference."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bifa.identify.system import Channels, Trial
-from bifa.report.style import Palette, figure_style
+from bifa.report.style import CHAMBER_COLOURS, Palette, figure_style
 
 from .identification import Identification
 from .inputs import ANCHOR, STATIC, STEP, WALK
@@ -33,15 +34,49 @@ def draw(found: Identification, folder: Path) -> list[Path]:
     return written
 
 
-def _axes(rows: int, columns: int, width: float = 5.2, height: float = 3.4):
+class _Pair:
+    """A quantity as measured and as modelled, and below it the difference, which at this scale is all that shows."""
+
+    def __init__(self, above, below, unit: str, palette: Palette):
+        self.above, self.below = above, below
+        above.tick_params(labelbottom=False)
+        below.axhline(0.0, color=palette.quiet, lw=0.6)
+        below.set(ylabel=f"measured\n- model [{unit}]")
+
+    def add(self, x: np.ndarray, measured: np.ndarray, modelled: np.ndarray, colour, label: str | None = None) -> None:
+        self.above.plot(x, measured, color=colour, alpha=0.35, lw=2.4)
+        self.above.plot(x, modelled, color=colour, lw=1.0, label=label)
+        self.below.plot(x, measured - modelled, color=colour, alpha=0.6, lw=0.5)
+
+    def legend(self, palette: Palette, **place) -> None:
+        """Each label once, and which line is which."""
+        from matplotlib.lines import Line2D
+
+        handles, labels = self.above.get_legend_handles_labels()
+        unique = dict(zip(labels, handles, strict=True))
+        unique["measured"] = Line2D([], [], color=palette.ink, alpha=0.35, lw=2.4)
+        unique["model"] = Line2D([], [], color=palette.ink, lw=1.0)
+        self.above.legend(unique.values(), unique.keys(), **place)
+
+
+def _axes(heights: Sequence[float], columns: int, width: float = 5.2):
     import matplotlib.pyplot as plt
 
-    return plt.subplots(rows, columns, figsize=(width * columns, height * rows), squeeze=False, layout="constrained")
+    return plt.subplots(
+        len(heights),
+        columns,
+        figsize=(width * columns, sum(heights)),
+        height_ratios=heights,
+        sharex="col",
+        squeeze=False,
+        layout="constrained",
+    )
 
 
 def _save(figure, path: Path) -> None:
     import matplotlib.pyplot as plt
 
+    figure.align_ylabels()
     figure.savefig(path)
     plt.close(figure)
 
@@ -53,83 +88,75 @@ def _by_actuator(pairs) -> dict[str, list[tuple[Trial, Channels]]]:
     return dict(sorted(groups.items()))
 
 
-def _legend(axis) -> None:
-    """Each label once."""
-    handles, labels = axis.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    axis.legend(unique.values(), unique.keys())
-
-
-def _colours(values: Sequence[float]) -> dict[float, tuple]:
+def _pressures(pairs) -> dict[float, tuple]:
+    """A colour for each commanded pressure."""
     import matplotlib
 
-    places = sorted(set(values))
+    places = sorted({trial.payload.pressure_psi for trial, _ in pairs})
     colours = matplotlib.colormaps["viridis"](np.linspace(0.1, 0.85, len(places)))
     return dict(zip(places, map(tuple, colours), strict=True))
 
 
 def _stiffness(pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
-    figure, axes = _axes(1, len(groups))
-    for axis, (actuator, mine) in zip(axes[0], groups.items(), strict=True):
-        colours = _colours([trial.payload.pressure_psi for trial, _ in mine])
+    figure, axes = _axes((3.4, 1.3), len(groups))
+    for (above, below), (actuator, mine) in zip(axes.T, groups.items(), strict=True):
+        force, colours = _Pair(above, below, "N", palette), _pressures(mine)
         for trial, prediction in mine:
-            x = trial.payload.displacement_m * 1e3
-            pressure = trial.payload.pressure_psi
-            axis.plot(x, trial.channels["force_N"], color=colours[pressure], alpha=0.35, lw=0.7)
-            axis.plot(x, prediction["force_N"], color=colours[pressure], lw=1.2, ls="--", label=f"{pressure:g} psi")
-        axis.axhline(0.0, color=palette.quiet, lw=0.6)
-        axis.set(title=f"{actuator} actuator", xlabel="displacement [mm]", ylabel="force [N]")
-        _legend(axis)
+            x, psi = trial.payload.displacement_m * 1e3, trial.payload.pressure_psi
+            force.add(x, trial.channels["force_N"], prediction["force_N"], colours[psi], f"{psi:.3g} psi")
+        above.axhline(0.0, color=palette.quiet, lw=0.6)
+        above.set(title=f"{actuator} actuator", ylabel="force [N]")
+        below.set(xlabel="displacement [mm]")
+        force.legend(palette)
     _save(figure, path)
 
 
 def _steps(pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
-    figure, axes = _axes(2, len(groups))
+    figure, axes = _axes((3.0, 1.3, 3.0, 1.3), len(groups))
     for column, (actuator, mine) in zip(axes.T, groups.items(), strict=True):
-        colours = _colours([trial.payload.pressure_psi for trial, _ in mine])
+        colours = _pressures(mine)
+        panels = {
+            "displacement_mm": _Pair(column[0], column[1], "mm", palette),
+            "pressure_psi": _Pair(column[2], column[3], "psi", palette),
+        }
         for trial, prediction in mine:
-            pressure = trial.payload.pressure_psi
-            for axis, channel in zip(column, ("displacement_mm", "pressure_psi"), strict=True):
-                axis.plot(trial.time_s, trial.channels[channel], color=colours[pressure], alpha=0.35, lw=0.8)
-                axis.plot(
-                    trial.time_s,
-                    prediction[channel],
-                    color=colours[pressure],
-                    lw=1.0,
-                    ls="--",
-                    label=f"{pressure:g} psi",
-                )
+            psi = trial.payload.pressure_psi
+            for channel, panel in panels.items():
+                panel.add(trial.time_s, trial.channels[channel], prediction[channel], colours[psi], f"{psi:.3g} psi")
         column[0].set(title=f"{actuator} actuator", ylabel="displacement [mm]")
-        column[1].set(xlabel="time [s]", ylabel="pressure [psi]")
-        _legend(column[0])
+        column[2].set(ylabel="pressure [psi]")
+        column[3].set(xlabel="time [s]")
+        panels["displacement_mm"].legend(palette)
     _save(figure, path)
 
 
 def _anchor(pairs, palette: Palette, path: Path) -> None:
-    figure, axes = _axes(1, 1, 6.4, 4.0)
-    axis = axes[0, 0]
-    colours = _colours([trial.payload.pressure_psi for trial, _ in pairs])
+    figure, ((above,), (below,)) = _axes((3.6, 1.3), 1, 7.2)
+    force, colours = _Pair(above, below, "N", palette), _pressures(pairs)
     for trial, prediction in pairs:
-        pressure, pulled = trial.payload.pressure_psi, trial.payload.pulled_s * abs(trial.payload.rate_mm_s)
-        axis.plot(pulled, trial.channels["force_N"], color=colours[pressure], alpha=0.35, lw=0.8)
-        axis.plot(pulled, prediction["force_N"], color=colours[pressure], lw=1.2, ls="--", label=f"{pressure:g} psi")
-    axis.set(xlabel="pulled distance [mm]", ylabel="anchoring force [N]")
-    _legend(axis)
+        psi, pulled_mm = trial.payload.pressure_psi, trial.payload.pulled_s * abs(trial.payload.rate_mm_s)
+        force.add(pulled_mm, trial.channels["force_N"], prediction["force_N"], colours[psi], f"{psi:.3g} psi")
+    above.set(ylabel="anchoring force [N]")
+    below.set(xlabel="pulled distance [mm]")
+    force.legend(palette, loc="upper left", bbox_to_anchor=(1.0, 1.0))  # the curves leave no room
     _save(figure, path)
 
 
 def _walks(pairs, palette: Palette, path: Path) -> None:
+    """The first repeat of each gait: those that follow would lie on it."""
     first: dict[object, tuple[Trial, Channels]] = {}
     for trial, prediction in pairs:
         first.setdefault(trial.condition, (trial, prediction))
-    figure, axes = _axes(1, len(first))
-    for axis, (trial, prediction) in zip(axes[0], first.values(), strict=True):
-        for channel in ("displacement_head_mm", "displacement_tail_mm"):
-            if channel in trial.channels:
-                axis.plot(trial.time_s, trial.channels[channel], color=palette.measured, alpha=0.6, label="measured")
-                axis.plot(trial.time_s, prediction[channel], color=palette.predicted, ls="--", label="model")
-        axis.set(title=trial.name, xlabel="time [s]", ylabel="head and tail [mm]")
-        _legend(axis)
+    figure, axes = _axes((3.0, 1.3), len(first))
+    for (above, below), (trial, prediction) in zip(axes.T, first.values(), strict=True):
+        path_mm = _Pair(above, below, "mm", palette)
+        for end in ("head", "tail"):
+            if (channel := f"displacement_{end}_mm") in trial.channels:
+                measured, modelled = trial.channels[channel], prediction[channel]
+                path_mm.add(trial.time_s, measured, modelled, CHAMBER_COLOURS[end], end)
+        above.set(title=trial.name.removesuffix(".csv"), ylabel="displacement [mm]")
+        below.set(xlabel="time [s]")
+        path_mm.legend(palette)
     _save(figure, path)

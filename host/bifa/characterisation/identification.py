@@ -11,6 +11,7 @@ from bifa import robot
 from bifa.data import Dataset
 from bifa.identify.fit import Fit, fit_base
 from bifa.identify.problem import Problem
+from bifa.identify.settle import settle
 from bifa.identify.solve import solve
 from bifa.identify.uncertainty import Uncertainty, profile_interval, uncertainty
 from bifa.robot import Model
@@ -95,7 +96,8 @@ def identify(
     system = start(dataset, model or robot.nominal(), seed, progress)
     progress("all experiments together, pressures included")
     fit = fit_base(system, system.trials)
-    progress("what is known now")
+    progress("the last steps, and what is known now")
+    fit = settle(fit)
     known = uncertainty(fit, confidence=CONFIDENCE)
     intervals = _intervals(system, fit, known)
     intervals |= _profiles(fit, intervals)

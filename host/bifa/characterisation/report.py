@@ -10,6 +10,7 @@ from bifa.identify.uncertainty import effective_samples
 from .identification import Identification
 
 _CORRELATED = 0.9
+_AS_NOISE = 1.1  # an error of so many times the noise is noise
 
 
 def print_report(console: Console, found: Identification) -> None:
@@ -29,7 +30,7 @@ def _parameters(found: Identification) -> Table:
     for name, parameter in found.model.parameters.items():
         interval = found.intervals.get(name)
         if interval is None:
-            remark = "known" if name in found.system.dataset.known else "open"
+            remark = "known" if name in found.system.dataset.known else "open: stands in, not determined"
             table.add_row(name, f"{parameter.value:.5g}", "", parameter.unit, remark)
             continue
         estimate = estimates[name]
@@ -55,9 +56,17 @@ def remarks(found: Identification) -> list[str]:
     for first, second, r in found.uncertainty.correlations(_CORRELATED):
         if first in named and second in named:
             lines.append(f"{first} and {second} are known together rather than apart (correlation {r:+.2f}).")
+    needs: dict[str, list[str]] = {}
     for missing in found.open:
-        value = "" if missing.value != missing.value else f"; {missing.value:.4g} stands in"
-        lines.append(f"Not determined by this data: {missing.name}{value}. What gives it: {missing.needs}.")
+        needs.setdefault(missing.needs, []).append(missing.name)
+    for experiment, names in needs.items():
+        lines.append(f"Not determined by this data: {', '.join(names)}. What would tell: {experiment}.")
+    (experiment, channel), worst = max(found.error.items(), key=lambda item: item[1])
+    if worst > _AS_NOISE:
+        lines.append(
+            f"The model does not describe this data: its error is {worst:.1f} times the noise in {channel} of "
+            f"{experiment}. The intervals do not count that; `bifa diagnose` looks for what the model lacks."
+        )
     if not found.fit.solution.converged:
         lines.append("The joint refinement had not converged when it ended: take the intervals with care.")
     return lines

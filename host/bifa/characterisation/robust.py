@@ -15,22 +15,32 @@ from bifa.identify.fit import Fit
 
 def clustered_covariance(fit: Fit) -> np.ndarray:
     """Sandwich covariance of the free parameters, shape (P, P), clustered by experiment and condition."""
-    problem, solution = fit.problem, fit.solution
-    free = solution.free
-    # Twice: the first derivatives tell how wide the second ones should step.
-    steps = problem.first_steps()
-    rough = problem.jacobians(solution.point, free, steps)
-    squares = [np.concatenate([(j**2).sum(axis=0), (k**2).sum(axis=0)]) for j, k in rough]
-    steps = problem.tuned_steps(steps, free, squares)
-    jacobians = problem.jacobians(solution.point, free, steps)
-    residuals = problem.residuals(solution.point)
+    solution = fit.solution
     scores: dict[object, np.ndarray] = {}
-    for trial, (jacobian, _), residual in zip(problem.trials, jacobians, residuals, strict=True):
+    for trial, score in zip(fit.problem.trials, _scores(fit), strict=True):
         key = (trial.experiment, trial.condition)
-        scores[key] = scores.get(key, 0.0) + jacobian.T @ residual
+        scores[key] = scores.get(key, 0.0) + score
     clusters = len(scores)
     if clusters < 2:
-        return np.zeros((len(free), len(free)))
+        return np.zeros_like(solution.normal)
     meat = sum(np.outer(score, score) for score in scores.values()) * clusters / (clusters - 1)
-    bread = np.linalg.pinv(solution.normal, rcond=1e-12, hermitian=True)
-    return bread @ meat @ bread
+    units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
+    bread = np.linalg.pinv(solution.normal / np.outer(units, units), rcond=1e-12, hermitian=True)
+    return bread @ (meat / np.outer(units, units)) @ bread / np.outer(units, units)
+
+
+def _scores(fit: Fit) -> list[np.ndarray]:
+    """What each trial pulls the free parameters by, shape (P,), less what its own nuisances would take up: these need
+    only be near their best values then."""
+    problem, solution = fit.problem, fit.solution
+    found = []
+    residuals = problem.residuals(solution.point)
+    for (jacobian, own), residual, values, parameters in zip(
+        solution.jacobians, residuals, solution.point.nuisances, problem.nuisances, strict=True
+    ):
+        precision = np.array([p.step_scale**-2.0 for p in parameters])
+        means = np.array([p.value for p in parameters])
+        pull = own.T @ residual + precision * (values - means)
+        answer = np.linalg.solve(own.T @ own + np.diag(precision), pull)
+        found.append(jacobian.T @ (residual - own @ answer))
+    return found

@@ -39,7 +39,8 @@ def fit(
     console = Console()
     measured = read_dataset(dataset)
     begun = time.perf_counter()
-    with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console) as progress:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("reading")
         found = identify(
             measured,

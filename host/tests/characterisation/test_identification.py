@@ -69,8 +69,9 @@ def test_most_intervals_contain_the_truth(found, lab):
 
 
 def test_the_error_is_within_a_tenth_of_the_noise_floor(found):
-    for key, error in found.error.items():
-        assert error < 1.1, key
+    for (experiment, channel), error in found.error.items():
+        print(f"{experiment:15s} {channel:21s} {error:.2f}")
+        assert error < 1.1, (experiment, channel)
 
 
 def test_what_no_experiment_tells_is_said_with_what_would(found):
@@ -103,6 +104,12 @@ def test_figures_and_report_name_everything(found, tmp_path):
         assert name in text.getvalue()
 
 
+def test_a_model_that_does_not_fit_says_so(found):
+    assert not any("does not describe" in line for line in remarks(found))
+    poor = replace(found, error=found.error | {("step_response", "pressure_psi"): 4.2})
+    assert any("4.2 times the noise in pressure_psi of step_response" in line for line in remarks(poor))
+
+
 def test_too_little_data_says_what_cannot_be_had(lab):
     """Static loading of the large actuator alone: its curve and its area, and nothing else."""
     trials = tuple(
@@ -117,6 +124,7 @@ def test_too_little_data_says_what_cannot_be_had(lab):
     assert "anchor_pull" in needs["mu_s"]
     assert "balance" in needs["head_mass_kg"]
     assert "static_loading of the small" in needs["small stiffness curve"]
+    assert any("mu_s, mu_k. What would tell: anchor_pull" in line for line in remarks(found))
     again = identify(Dataset(path=None, name="static only", known={}, trials=trials))
     assert again.model.values == found.model.values
 

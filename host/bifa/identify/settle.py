@@ -1,0 +1,116 @@
+"""The last steps of a fit, with derivatives good enough to say how well its parameters are known.
+
+While a fit is far away, small steps of one parameter at a time do. At its end they do not: parameters that act almost
+alike (both frictions and the wall's place) are told apart by the little that is left of their derivatives once the
+others are taken out, and that is then mostly the simulation's own error, which passes for information. Here every step
+goes along a principal direction of what is known and is one standard deviation long, nuisances following, so that the
+residuals change by as much in the least certain direction as in the surest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifa.identify.fit import Fit
+from bifa.identify.problem import Point, Problem
+from bifa.identify.sensitivity import Sensitivity
+from bifa.identify.solve import Solution, solve
+
+_ROUNDS = 6
+_STEPS = 20  # a round: cheap beside its derivatives
+_ENOUGH = 1.0  # log-likelihood: after a round that gains less, derivatives from where it began still hold
+# Of the square of what a step should change. Less: it was too short, and its derivative is mostly error. More: it met a
+# jump (a foot that slips a sample sooner).
+_FORETOLD = (0.5, 4.0)
+_LONGEST = 1.0  # scales that a derivative may step, where the data leave a direction open
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """Where derivatives step. `structure`, shape (P, P): in the free parameters, a direction a column. Of each trial:
+    `following`, shape (q, P), what its nuisances do meanwhile, and `spread`, shape (q,), by how much each moves alone.
+    """
+
+    structure: np.ndarray
+    following: tuple[np.ndarray, ...]
+    spread: tuple[np.ndarray, ...]
+
+
+def settle(fitted: Fit) -> Fit:
+    """The fit at its optimum, with derivatives and a normal matrix to be trusted. A round costs P simulations of all
+    trials; there are one to six, two as a rule. A fit that is stopped by a bound stays as it is: the model is wrong."""
+    problem, solution = fitted.problem, fitted.solution
+    if _stopped(fitted):
+        return fitted
+    for _ in range(_ROUNDS):
+        along = _directions(problem, solution)
+        taken = _derivatives(problem, solution.point, solution.free, along)
+        options = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
+        here = solve(problem, solution.point, max_iterations=0, **options)
+        ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
+        trusted = _as_foretold(along, solution.normal, here.normal)
+        converged = trusted and here.cost - ahead.cost < _ENOUGH
+        # The steps' own corrections would bring the simulation's error back in.
+        solution = replace(here, point=ahead.point, cost=ahead.cost, converged=converged)
+        if converged:
+            break
+    return replace(fitted, solution=solution)
+
+
+def _stopped(fitted: Fit) -> bool:
+    free = list(fitted.solution.free)
+    values = fitted.solution.point.values[free]
+    lower, upper = (bound[free] for bound in fitted.structure.bounds())
+    return bool((np.minimum(values - lower, upper - values) < 1e-6 * (upper - lower)).any())
+
+
+def _directions(problem: Problem, solution: Solution) -> _Directions:
+    size = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
+    values, vectors = np.linalg.eigh(solution.normal / np.outer(size, size))
+    structure = vectors / np.sqrt(np.maximum(values, 1e-15)) / size[:, None]
+    scales = problem.structure.scales()[list(solution.free)]
+    structure /= np.maximum(1.0, np.abs(structure / scales[:, None]).max(axis=0) / _LONGEST)
+    following, spread = [], []
+    for one, parameters in zip(solution.sensitivities, problem.nuisances, strict=True):
+        p = one.structure
+        own = one.gram[p:, p:] + np.diag([n.step_scale**-2.0 for n in parameters])
+        following.append(-np.linalg.solve(own, one.gram[p:, :p]) @ structure)
+        spread.append(np.sqrt(np.diag(np.linalg.inv(own))))
+    return _Directions(structure, tuple(following), tuple(spread))
+
+
+def _as_foretold(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether steps along the directions changed the residuals about as much as they were meant to."""
+    meant, seen = (np.einsum("pk,pq,qk->k", along.structure, normal, along.structure) for normal in (before, after))
+    whole = meant > 0.5  # others stopped short of a standard deviation, because the data leave them open
+    return bool(((seen > _FORETOLD[0] * meant) & (seen < _FORETOLD[1] * meant))[whole].all())
+
+
+def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:
+    """Of every trial by the free parameters and by its nuisances, from differences along the directions."""
+    still, here = np.zeros_like(point.values), problem.residuals(point)
+
+    def change(values: np.ndarray, nuisances: list[np.ndarray]) -> list[np.ndarray]:
+        moved = tuple(n + m for n, m in zip(point.nuisances, nuisances, strict=True))
+        ahead = problem.residuals(Point(point.values + values, moved))
+        return [a - b for a, b in zip(ahead, here, strict=True)]
+
+    by_direction = []
+    for k in range(len(free)):
+        values = still.copy()
+        values[list(free)] = along.structure[:, k]
+        by_direction.append(change(values, [follow[:, k] for follow in along.following]))
+    by_nuisance = []
+    for q in range(max(map(len, point.nuisances), default=0)):
+        by_nuisance.append(change(still, [np.where(np.arange(len(s)) == q, s, 0.0) for s in along.spread]))
+
+    back = np.linalg.inv(along.structure)
+    found = []
+    for i, (follow, spread) in enumerate(zip(along.following, along.spread, strict=True)):
+        both = np.stack([column[i] for column in by_direction], axis=1)
+        alone = [column[i] / width for column, width in zip(by_nuisance, spread, strict=False)]
+        own = np.stack(alone, axis=1) if alone else np.zeros((len(both), 0))
+        found.append(Sensitivity.of((both - own @ follow) @ back, own))
+    return found
