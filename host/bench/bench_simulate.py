@@ -17,6 +17,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from bifa import robot, simulate
+from bifa.gait import paper_space
 from bifa.robot import Gait, Model, StiffnessCurve
 
 CYCLES = 4
@@ -47,6 +48,7 @@ def run() -> dict[str, float]:
     single, alone = _timed(lambda: simulate.speeds(model, batch, CYCLES, workers=1))
     together, both = _timed(lambda: simulate.speeds(model, batch, CYCLES))
     single, alone, together, both = (seconds / len(batch) for seconds in (single, alone, together, both))
+    halves, pieces = _dealt(model)
     reference = _reference_error(model, rows)
     print(f"one gait, {CYCLES} cycles, bifa, one core: {alone * 1e3:8.3f} ms")
     cores = simulate.cores()
@@ -54,6 +56,10 @@ def run() -> dict[str, float]:
     print(
         f"{cores} threads over one: {single / together:.2f} times as fast by the clock; "
         f"by the processor's time {cores * alone / both:.2f}, what threads cost each other"
+    )
+    print(
+        f"  gaits differ in cost: of batches of 50, dealt out in halves as prange does, {halves:.2f} times as fast at "
+        f"most; in small pieces {pieces:.2f}; the rest is what else ran"
     )
     print(
         f"ratio on one core, the {np.count_nonzero(ended)} gaits that LSODA finished: {speedup:.0f} (required: 5000); "
@@ -70,6 +76,8 @@ def run() -> dict[str, float]:
         "gait_evaluation_lsoda_s": float(theirs[ended].mean()),
         "gait_evaluation_core_scaling": single / together,
         "gait_evaluation_core_scaling_processor": cores * alone / both,
+        "gait_evaluation_scaling_halves": halves,
+        "gait_evaluation_scaling_pieces": pieces,
     }
 
 
@@ -94,6 +102,21 @@ def _timed(job) -> tuple[float, float]:
     clock, used = time.perf_counter(), time.process_time()
     job()
     return time.perf_counter() - clock, time.process_time() - used
+
+
+def _dealt(model: Model, batches: int = 8, batch: int = 50, pieces: int = 16) -> tuple[float, float]:
+    """How many times as fast two undisturbed threads could be, from what single gaits cost: a batch in two halves, and
+    in pieces that go to whoever is free."""
+    rows = simulate.gait_rows(paper_space().gaits(np.random.default_rng(0).random((batches * batch, 5))))
+    costs = np.array([min(_our_time(model, row, 1) for _ in range(3)) for row in rows]).reshape(batches, batch)
+    ends = np.zeros((2, batches))
+    for number, cost in enumerate(costs):
+        ends[0, number] = max(part.sum() for part in np.array_split(cost, 2))
+        busy = [0.0, 0.0]
+        for part in np.array_split(cost, pieces):
+            busy[int(np.argmin(busy))] += part.sum()
+        ends[1, number] = max(busy)
+    return tuple((costs.sum(axis=1) / ends).mean(axis=1))
 
 
 def _reference_error(model: Model, rows: np.ndarray) -> float:
