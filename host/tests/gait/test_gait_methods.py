@@ -33,6 +33,12 @@ def test_the_papers_method_learns_from_few_evaluations():
     assert len(found.values) == 16
 
 
+def test_the_papers_method_does_not_take_a_cliff_for_noise():
+    """With the package's own settings the length scale fell to nothing and the search was random: it found 0."""
+    found = METHODS["bo"](hill, WRAPS, 80, 0)
+    assert found.best_value > 0.8
+
+
 @pytest.mark.parametrize("method", ["de", "cma", "bo"])
 def test_a_seed_gives_the_same_search_again_and_progress_is_told(method):
     told = []
