@@ -24,7 +24,7 @@ def bayesian_optimisation(
 ) -> Found:
     """Maximise `objective` with `evaluations` calls, one at a time; `wraps` (dimensions,) marks full turns.
 
-    The cost is the Gaussian process's own, half a second a suggestion after some hundred evaluations.
+    The cost is the Gaussian process's own: a tenth of a second a suggestion at first, and more with each.
     The process knows nothing of full turns, as in the paper.
     """
     from bayes_opt import TargetSpace
