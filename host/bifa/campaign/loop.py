@@ -11,6 +11,7 @@ from bifa.campaign.residuals import residuals
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
 from bifa.characterisation import plan
+from bifa.characterisation.completed import completed_model
 from bifa.characterisation.identification import identify
 from bifa.characterisation.resolve import resolve
 from bifa.characterisation.session import run_session
@@ -131,8 +132,7 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
         del record["seconds"]  # the same seed gives the same bytes
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
         (outputs / "residuals.json").write_text(json.dumps(residuals(found)) + "\n")
-        structure = found.final.structure
-        save_model(outputs / "model-completed.toml", structure.system.model_at(found.final.theta, structure.effects))
+        save_model(outputs / "model-completed.toml", completed_model(found.final))
 
     makes = ("diagnosis.json", "residuals.json", "model-completed.toml", "separating")
     settings = bench.settings(_SEPARATING)

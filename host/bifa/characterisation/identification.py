@@ -19,7 +19,7 @@ from bifa.robot.model import Covariance
 
 from .estimate import Estimate
 from .inputs import ANCHOR
-from .robust import clustered_covariance
+from .robust import clustered_covariance, stretched
 from .start import fit_statics, start
 from .static import StaticFit
 from .system import RobotSystem
@@ -156,9 +156,9 @@ def _model(
     }
     names = [e.name for e in known.estimates]
     chosen = [names.index(name) for name in intervals]
-    matrix = known.covariance[np.ix_(chosen, chosen)]
-    stretch = np.array([intervals[name].sd for name in intervals]) / np.sqrt(np.diag(matrix))
-    covariance = Covariance(tuple(intervals), matrix * np.outer(stretch, stretch)) if chosen else None
+    sd = np.array([intervals[name].sd for name in intervals])
+    matrix = stretched(known.covariance[np.ix_(chosen, chosen)], sd)
+    covariance = Covariance(tuple(intervals), matrix) if chosen else None
     return replace(
         model,
         name=dataset.name,

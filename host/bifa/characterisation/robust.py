@@ -29,6 +29,12 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     return bread @ (meat / np.outer(units, units)) @ bread / np.outer(units, units)
 
 
+def stretched(covariance: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """The covariance with these standard deviations, its correlations kept; shapes (n, n) and (n,)."""
+    stretch = sd / np.sqrt(np.diag(covariance))
+    return covariance * np.outer(stretch, stretch)
+
+
 def _scores(fit: Fit) -> list[np.ndarray]:
     """What each trial pulls the free parameters by, shape (P,), less what its own nuisances would take up: these need
     only be near their best values then."""

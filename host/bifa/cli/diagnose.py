@@ -40,6 +40,7 @@ def diagnose(
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    from bifa.characterisation.completed import completed_model
     from bifa.characterisation.resolve import resolve as separate
     from bifa.characterisation.system import prepare
     from bifa.cluster import cluster
@@ -69,8 +70,7 @@ def diagnose(
     record = as_record(found)
     _print(console, record)
     if out is not None:
-        completed = found.final.structure
-        save_model(out, completed.system.model_at(found.final.theta, completed.effects))
+        save_model(out, completed_model(found.final))
         console.print(f"model: {out}. Next: bifa optimize --model {out} --out gait.toml", highlight=False)
     if json is not None:
         json.write_text(dumps(record, indent=2) + "\n")

@@ -80,7 +80,8 @@ def diagnose(
 
     def on_known(candidate: Candidate, relative: float = _FINE) -> tuple[Fit, Remainder]:
         if id(candidate) not in refitted:
-            fitted = refit_on(candidate.fitted, split.known, relative=relative)
+            near = (candidate.fitted, candidate.checked)
+            fitted = refit_on(candidate.fitted, split.known, near=near, relative=relative)
             refitted[id(candidate)] = candidate, fitted, _remainder(fitted, seed)
         return refitted[id(candidate)][1:]
 

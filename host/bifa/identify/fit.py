@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.identify.noise import NoiseFloor, estimate_noise
-from bifa.identify.problem import Problem
+from bifa.identify.problem import Point, Problem
 from bifa.identify.solve import RELATIVE, Solution, cost_of, solve
 from bifa.identify.structure import Structure
 from bifa.identify.system import Channels, System, Trial
@@ -94,11 +94,24 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
     return Fit(problem, best, len(solutions), agreeing)
 
 
-def refit_on(fitted: Fit, trials: Sequence[Trial], *, max_iterations: int = 20, relative: float = RELATIVE) -> Fit:
-    """The same structure fitted to other trials, from where it stands, see `solve_from_afar`."""
+def refit_on(
+    fitted: Fit,
+    trials: Sequence[Trial],
+    *,
+    near: Sequence[Fit] = (),
+    max_iterations: int = 20,
+    relative: float = RELATIVE,
+) -> Fit:
+    """The same structure fitted to other trials, from where it stands. `near`: fits that know their nuisances."""
     problem = Problem(fitted.structure, trials, fitted.problem.floor)
-    values = fitted.solution.point.values
-    solution = solve_from_afar(problem, values, max_iterations=max_iterations, relative=relative)
+    point = problem.start(fitted.solution.point.values)
+    known = {
+        trial.name: nuisances
+        for one in near
+        for trial, nuisances in zip(one.problem.trials, one.solution.point.nuisances, strict=True)
+    }
+    nuisances = tuple(known.get(t.name, n) for t, n in zip(trials, point.nuisances, strict=True))
+    solution = solve(problem, Point(point.values, nuisances), max_iterations=max_iterations, relative=relative)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 

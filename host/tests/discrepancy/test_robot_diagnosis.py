@@ -1,4 +1,4 @@
-"""A few of the sealed data sets of `make blind`: the whole trial takes hours, these three a few minutes."""
+"""A few of the sealed data sets of `make blind`: the whole trial takes hours, these few some minutes."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ import tomllib
 
 import pytest
 
+from bifa.characterisation.completed import completed_model
 from bifa.characterisation.system import prepare
 from bifa.data import read_dataset
 from bifa.discrepancy.diagnosis import diagnose
@@ -31,7 +32,10 @@ def test_finds_nothing_in_a_robot_without_an_effect(sealed):
     assert found.after.held_out < 1.1 * found.floor.held_out
 
 
-@pytest.mark.parametrize(("effect", "parameter"), [("hysteresis", "force_N"), ("supply_sag", "resistance_s")])
+@pytest.mark.parametrize(
+    ("effect", "parameter"),
+    [("hysteresis", "force_N"), ("supply_sag", "resistance_s"), ("choked_flow", "saturation_s_per_psi")],
+)
 def test_names_sizes_and_adds_an_effect_that_nobody_declared(sealed, effect, parameter):
     found, truth = sealed("--seed", "42", "--effect", effect, "--size", "0.6")
     assert found.verdict == "identified"
@@ -39,3 +43,13 @@ def test_names_sizes_and_adds_an_effect_that_nobody_declared(sealed, effect, par
     assert found.effects[0].parameters[parameter] == pytest.approx(truth[effect][parameter], rel=0.1)
     assert found.before.held_out > 1.5 * found.floor.held_out
     assert found.after.held_out < 1.1 * found.floor.held_out
+    model = completed_model(found.final)
+    assert model.effects[effect][parameter] == pytest.approx(found.effects[0].parameters[parameter], rel=0.02)
+    assert f"{effect}.{parameter}" in model.covariance.names
+
+
+def test_names_both_of_two_effects(sealed):
+    found, truth = sealed("--seed", "4000", "--pair")
+    assert found.verdict == "identified"
+    assert {e.name for e in found.effects} == set(truth)
+    assert found.after.held_out < 1.2 * found.floor.held_out
