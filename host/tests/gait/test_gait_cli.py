@@ -26,7 +26,7 @@ def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
     pictures = {path.name for path in (tmp_path / "gait").iterdir()}
     assert pictures == {"changes.png", "sensitivity.png", "front.png", "distribution.png"}
     assert "The body has" in result.output
-    assert "10th percentile of 2048 robots" in result.output
+    assert "10th percentile of 1024 robots" in result.output
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     """With a spread of 1 % a search on few robots ended at gaits that fail one robot in ten: 10th percentile 0."""
     sloping = nominal().with_effects({"inclination": {"angle_deg": 5.0}})
     settings, spread = Settings(spread=0.01), spread_of(sloping, 0.01)
-    brittle = settings.space.slower(settings.space.point(library.load("robust").gait)[None], -0.03)
+    brittle = settings.space.slower(settings.space.point(library.load("robust").gait)[None], -0.04)
     metric = settings.metric
     draws = spread.plants(sloping, 128, seed=99)
     before = distribution(runs, draws, gait_rows(settings.space.gaits(brittle)), metric)
