@@ -7,6 +7,7 @@ same bytes. `serve_pty` offers the same bench in real time to any serial program
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -116,8 +117,10 @@ class VirtualRig:
         instruments: Instruments,
         bootloader_s: float,
         effects: Mapping[str, Mapping[str, float]],
+        seed: int,
     ) -> None:
         self._effects = effects
+        self._session_seeds = itertools.count(1000 * seed)
         self.uno = uno
         self.plant = plant
         self.world = world
@@ -128,6 +131,10 @@ class VirtualRig:
     @property
     def truth(self) -> dict[str, float]:
         return dict(self.plant.parameters)
+
+    def next_session_seed(self) -> int:
+        """Another one for every session: the board takes a key that it had before for the old session."""
+        return next(self._session_seeds)
 
     def open_seal(self) -> dict[str, dict[str, float]]:
         """The effects that this robot has, with their parameters: for when the verdict is in."""
@@ -202,7 +209,7 @@ def open_rig(
     world = World(uno, clock_hz)
     instruments = Instruments(world, plant, noise, _WOBBLE[profile], random)
     instruments.mount("locomotion")
-    return VirtualRig(uno, plant, world, instruments, _BOOTLOADER_S[profile], inside)
+    return VirtualRig(uno, plant, world, instruments, _BOOTLOADER_S[profile], inside, seed)
 
 
 _profile = profile  # open_rig has a parameter of that name

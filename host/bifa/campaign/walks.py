@@ -27,7 +27,7 @@ def measure_walks(
 ) -> Dataset:
     """Walk every gait `repeats` times on the rig; the trials of one data set, named after the gaits."""
     trials = []
-    with Uno(rig.transport, rig.clock) as uno:
+    with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         hello = uno.connect()
         uno.clear()
         for name, gait in gaits.items():

@@ -6,6 +6,7 @@ through the pairs gives offset and drift; what is left is the alignment's error.
 """
 
 from dataclasses import dataclass
+from math import fsum
 
 import numpy as np
 
@@ -59,12 +60,20 @@ def align(sync_s: np.ndarray, strobe_s: np.ndarray, first_strobe_s: float) -> Cl
             "at the same time"
         )
     x, y = sync_s[edge_at], strobe_s[sample_at]
-    rate, offset_s = np.polynomial.polynomial.polyfit(x - x[0], y, 1)[::-1]
-    offset_s -= rate * x[0]
+    rate, offset_s = _line(x, y)
     rms_s = float(np.sqrt(np.mean((y - offset_s - rate * x) ** 2)))
     if rms_s > MAX_RMS_S:
         raise AlignmentError(
             f"the sync edges scatter by {rms_s * 1e3:.1f} ms about the Uno's samples (at most {MAX_RMS_S * 1e3:g} ms): "
             "check the sync wiring"
         )
-    return ClockLine(float(offset_s), float(rate), rms_s, len(edge_at))
+    return ClockLine(offset_s, rate, rms_s, len(edge_at))
+
+
+def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope and intercept of least squares. By exact sums: what a linear algebra library says may differ in the last
+    digit from run to run, and the same seed is to give the same bytes."""
+    x_mean, y_mean = fsum(x) / len(x), fsum(y) / len(y)
+    away = x - x_mean
+    slope = fsum(away * (y - y_mean)) / fsum(away * away)
+    return slope, y_mean - slope * x_mean

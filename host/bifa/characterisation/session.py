@@ -47,7 +47,7 @@ def run_session(
     Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session.
     """
     writer = DatasetWriter(folder, name, known, provenance, resume=True)
-    with Uno(rig.transport, rig.clock) as uno:
+    with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         uno.connect()
         uno.clear()
         for number, planned in enumerate(trials, start=1):

@@ -24,6 +24,9 @@ class Rig(Protocol):
     clock: Clock
     instruments: Any | None
 
+    def next_session_seed(self) -> int | None:
+        """What makes the next session's key, and so every byte of it, repeatable; None where time is real anyway."""
+
     def close(self) -> None:
         """Let go of everything; a second call does nothing."""
 
@@ -40,6 +43,9 @@ class SerialRig:
     def __init__(self, device: str) -> None:
         self.transport: Transport = SerialTransport(device)
         self.clock: Clock = WallClock()
+
+    def next_session_seed(self) -> None:
+        """See Rig."""
 
     def close(self) -> None:
         """See Rig."""

@@ -85,6 +85,17 @@ def test_a_static_loading_is_the_spring_less_the_pressure_force(recorded):
 
 
 @pytest.mark.uno
+def test_the_same_seed_gives_the_same_bytes(tmp_path):
+    for folder in ("once", "again"):
+        with open_rig("virtual", profile="realistic", seed=5) as rig:
+            run(rig, tmp_path / folder, PLAN[2:])
+    names = sorted(path.name for path in (tmp_path / "once").iterdir())
+    assert len(names) == 3
+    for name in names:
+        assert (tmp_path / "once" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+
+
+@pytest.mark.uno
 def test_an_interrupted_session_goes_on_and_is_never_written_over(tmp_path):
     plan = PLAN[1:3]
     with open_rig("virtual", profile="ideal", seed=4) as rig:
