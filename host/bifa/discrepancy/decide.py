@@ -35,12 +35,13 @@ class Choice:
     probabilities: dict[tuple[str, ...], float]
 
 
-def choose(search: Search) -> Choice:
-    """Pick the set that explains best, and no larger than the evidence carries."""
+def choose(search: Search, *, base_suffices: bool = False) -> Choice:
+    """Pick the set that explains best, and no larger than the evidence carries; the base model where that leaves
+    nothing to explain (an effect would only take up what noise there is)."""
     dispersion = dispersion_of(search.tried)
     chosen = search.base
     order: list[str] = []
-    while True:
+    while not base_suffices:
         larger = [
             c for c in search.tried if len(c.effects) > len(chosen.effects) and worth_adding(chosen, c, dispersion)
         ]

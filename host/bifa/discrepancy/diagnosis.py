@@ -27,7 +27,8 @@ _ROUGH = 1e-3  # of the cost: where a fit of the base model may stop that is not
 _FINE = 1e-4  # of the cost: where a refit to all known trials may stop
 _HOPELESS = 5.0  # times what is negligible, that no refit would take away
 _NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
-_NEGLIGIBLE_SHARE = 0.03  # of what the base model left
+_NEGLIGIBLE_SHARE = 0.03  # of what the base model left,
+_NEVER_NEGLIGIBLE = 1.0  # but not more than the noise itself: a second effect may hide behind a strong one
 
 
 class TooLittleDataError(BifaError):
@@ -93,7 +94,7 @@ def diagnose(
 
     crew = Crew(progress, executor)
     found = search(base, split, base.problem.floor, enough=enough, crew=crew)
-    choice = choose(found)
+    choice = choose(found, base_suffices=enough(found.base))
     explained, left = on_known(choice.candidate)
     base_known, remainder = on_known(found.base, _ROUGH)
     drifts = find_drift(explained, seed=seed)
@@ -155,7 +156,7 @@ def _unfitted_remainder(candidate: Candidate, seed: int) -> Remainder:
 
 
 def _negligible(before: Remainder) -> float:
-    return max(_NEGLIGIBLE, _NEGLIGIBLE_SHARE * before.largest)
+    return max(_NEGLIGIBLE, min(_NEGLIGIBLE_SHARE * before.largest, _NEVER_NEGLIGIBLE))
 
 
 def _explained(left: Remainder, before: Remainder) -> bool:
