@@ -14,7 +14,7 @@ from bifa.gait import simulations
 from bifa.gait.measured import measured_speed
 from bifa.gait.metric import Metric
 from bifa.gait.objectives import distribution
-from bifa.gait.uncertainty import spread_of
+from bifa.gait.uncertainty import SPREAD, spread_of
 from bifa.report.evidence import draw_errors
 from bifa.report.page import render
 from bifa.report.walks import Walk, draw_walks
@@ -27,7 +27,6 @@ TITLES = {
     "base": "gait from the base model",
     "completed": "gait from the completed model",
 }
-SPREAD = 0.02  # of every parameter, for which a gait has to stand: robots change from day to day
 _ROBOTS = 256
 PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3}
 

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bifa.campaign.bench import Bench
-from bifa.campaign.compare import SPREAD, compare
+from bifa.campaign.compare import compare
 from bifa.campaign.residuals import residuals
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
@@ -21,6 +21,7 @@ from bifa.discrepancy.diagnosis import Diagnosis, diagnose
 from bifa.discrepancy.record import as_record
 from bifa.gait import Settings, optimise, simulations
 from bifa.gait.library import provenance
+from bifa.gait.uncertainty import SPREAD
 from bifa.link.units import set_point_psi
 from bifa.robot import load_model, save_model
 from bifa.robot.gait import BASELINE, load_gait, save_gait
@@ -97,6 +98,7 @@ def _optimise(name: str, title: str, model: str, gait: str, bench: Bench, part: 
     def run(inputs: Path, outputs: Path) -> None:
         robot = load_model(inputs / model)
         with simulations() as runs:
+            # not the fit's covariance, which is narrower than what a robot changes by from day to day
             settings = Settings(seed=bench.seed, spread=SPREAD)
             best = optimise(robot, runs, settings, lambda what, share, _: part(what, share))
         save_gait(outputs / gait, best.gait, provenance(best, robot.name, "bifa campaign"))

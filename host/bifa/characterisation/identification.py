@@ -15,11 +15,10 @@ from bifa.identify.settle import settle
 from bifa.identify.solve import solve
 from bifa.identify.uncertainty import Uncertainty, profile_interval, uncertainty
 from bifa.robot import Model
-from bifa.robot.model import Covariance
 
 from .estimate import Estimate
 from .inputs import ANCHOR
-from .robust import clustered_covariance, stretched
+from .robust import clustered_covariance, with_uncertainty
 from .start import fit_statics, start
 from .static import StaticFit
 from .system import RobotSystem
@@ -149,23 +148,10 @@ def _model(
     system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, Estimate], dataset: Dataset
 ) -> Model:
     """The identified model: fitted values with their sd, and the covariance of those that are determined."""
-    model = system.model_at(fit.theta)
-    parameters = {
-        name: replace(p, sd=intervals[name].sd, source=f"fitted to {dataset.name}") if name in intervals else p
-        for name, p in model.parameters.items()
-    }
-    names = [e.name for e in known.estimates]
-    chosen = [names.index(name) for name in intervals]
-    sd = np.array([intervals[name].sd for name in intervals])
-    matrix = stretched(known.covariance[np.ix_(chosen, chosen)], sd)
-    covariance = Covariance(tuple(intervals), matrix) if chosen else None
-    return replace(
-        model,
-        name=dataset.name,
-        parameters=parameters,
-        covariance=covariance,
-        provenance=f"bifa fit, {len(dataset.trials)} trials of {dataset.name}",
-    )
+    sd = {name: interval.sd for name, interval in intervals.items()}
+    model = with_uncertainty(system.model_at(fit.theta), known, sd, f"fitted to {dataset.name}")
+    provenance = f"bifa fit, {len(dataset.trials)} trials of {dataset.name}"
+    return replace(model, name=dataset.name, provenance=provenance)
 
 
 def _open(system: RobotSystem, dataset: Dataset, known: Uncertainty) -> tuple[Open, ...]:

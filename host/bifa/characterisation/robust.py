@@ -8,9 +8,15 @@ Liang and Zeger 1986) takes each condition as one piece of evidence.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from bifa.identify.fit import Fit
+from bifa.identify.uncertainty import Uncertainty
+from bifa.robot import Model
+from bifa.robot.model import Covariance
 
 
 def clustered_covariance(fit: Fit) -> np.ndarray:
@@ -29,10 +35,22 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     return bread @ (meat / np.outer(units, units)) @ bread / np.outer(units, units)
 
 
-def stretched(covariance: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """The covariance with these standard deviations, its correlations kept; shapes (n, n) and (n,)."""
-    stretch = sd / np.sqrt(np.diag(covariance))
-    return covariance * np.outer(stretch, stretch)
+def with_uncertainty(model: Model, known: Uncertainty, sd: Mapping[str, float], source: str | None = None) -> Model:
+    """The model with standard deviations for the values named in `sd`, and their covariance: correlations as `known`.
+
+    source: where these values come from; None leaves what the parameters say.
+    """
+    if not sd:
+        return model
+    chosen = [k for k, e in enumerate(known.estimates) if e.name in sd]
+    names = tuple(known.estimates[k].name for k in chosen)
+    matrix = known.covariance[np.ix_(chosen, chosen)]
+    stretch = np.array([sd[name] for name in names]) / np.sqrt(np.diag(matrix))
+    parameters = {
+        name: replace(p, sd=sd[name], source=source or p.source) if name in sd else p
+        for name, p in model.parameters.items()
+    }
+    return replace(model, parameters=parameters, covariance=Covariance(names, matrix * np.outer(stretch, stretch)))
 
 
 def _scores(fit: Fit) -> list[np.ndarray]:

@@ -40,7 +40,6 @@ def choose(search: Search, *, base_suffices: bool = False) -> Choice:
     nothing to explain (an effect would only take up what noise there is)."""
     dispersion = dispersion_of(search.tried)
     chosen = search.base
-    order: list[str] = []
     while not base_suffices:
         larger = [
             c for c in search.tried if len(c.effects) > len(chosen.effects) and worth_adding(chosen, c, dispersion)
@@ -49,10 +48,9 @@ def choose(search: Search, *, base_suffices: bool = False) -> Choice:
             break
         size = min(len(c.effects) for c in larger)
         chosen = min((c for c in larger if len(c.effects) == size), key=lambda c: c.cost)
-    order = list(chosen.effects)
     rivals = [c for c in search.tried if len(c.effects) == len(chosen.effects)] or [chosen]
     weights = _weights(rivals, dispersion)
-    named = tuple(_name(effect, chosen, rivals, weights) for effect in order)
+    named = tuple(_name(effect, chosen, rivals, weights) for effect in chosen.effects)
     probabilities = {c.effects: float(w) for c, w in zip(rivals, weights, strict=True)}
     return Choice(chosen, named, probabilities)
 

@@ -173,9 +173,11 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, crew: Crew
         waiting.pop(0)
         crew.say(f"finishing {' + '.join(candidate.effects)}")
         candidate = judge(finish(candidate.fitted), split)
-        if not enough(candidate):
+        suffices = enough(candidate)
+        if not suffices:
             candidate = judge(finish_elsewhere(candidate.fitted, profiled[candidate.effects]), split)
-        if enough(candidate):
+            suffices = enough(candidate)
+        if suffices:
             explained = min(explained, candidate.cost)
         done.append(candidate)
     tried.update((frozenset(candidate.effects), candidate) for candidate in [*done, *waiting])

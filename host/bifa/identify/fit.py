@@ -102,16 +102,17 @@ def refit_on(
     max_iterations: int = 20,
     relative: float = RELATIVE,
 ) -> Fit:
-    """The same structure fitted to other trials, from where it stands. `near`: fits that know their nuisances."""
+    """The same structure fitted to other trials, from where it stands. `near`: fits that know the nuisances of all of
+    these trials; without them these begin at their means."""
     problem = Problem(fitted.structure, trials, fitted.problem.floor)
-    point = problem.start(fitted.solution.point.values)
+    values = fitted.solution.point.values
     known = {
         trial.name: nuisances
         for one in near
         for trial, nuisances in zip(one.problem.trials, one.solution.point.nuisances, strict=True)
     }
-    nuisances = tuple(known.get(t.name, n) for t, n in zip(trials, point.nuisances, strict=True))
-    solution = solve(problem, Point(point.values, nuisances), max_iterations=max_iterations, relative=relative)
+    start = Point(values, tuple(known[t.name] for t in trials)) if near else problem.start(values)
+    solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
