@@ -270,9 +270,13 @@ def _ends(plant, rig, gravity, tension, growth, y, y_new, h):
             w_t = drive_t / (m_t + growth)
         if s_h != 0.0 and w_h * s_h <= 0.0:
             s_h, may_h = 0.0, False
+            weaker, _ = _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y)
+            may_t = may_t and weaker == 0.0  # else the head, in the next step: to stop first is no privilege
             continue
         if s_t != 0.0 and w_t * s_t <= 0.0:
             s_t, may_t = 0.0, False
+            _, weaker = _first_to_start(plant, rig, normal_h, normal_t, push_h, push_t, y)
+            may_h = may_h and weaker == 0.0
             continue
         if s_h == 0.0 and may_h:
             s_h = _starts(plant, rig, 0, normal_h, push_h + growth * w_t, y)
