@@ -214,8 +214,18 @@ class RobotSystem(System):
         entry = self.model.parameters[name]
         low, high = entry.plausible
         share = 1.0 if name in _PIPE else 0.1  # friction shows in fewer samples: wider steps for its derivatives
+        # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
+        at_least = "mu_k" if name == "mu_s" else None
         return Parameter(
-            name, entry.unit, entry.value, entry.lower, entry.upper, (low, high), share * (high - low), entry.source
+            name,
+            entry.unit,
+            entry.value,
+            entry.lower,
+            entry.upper,
+            (low, high),
+            share * (high - low),
+            entry.source,
+            at_least=at_least,
         )
 
     def _weights(self, prefix: str, theta: Theta) -> tuple[float, ...]:

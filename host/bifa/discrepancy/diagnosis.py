@@ -28,7 +28,8 @@ _FINE = 1e-4  # of the cost: where a refit to all known trials may stop
 _HOPELESS = 5.0  # times what is negligible, that no refit would take away
 _NEGLIGIBLE = 0.1  # of the floor's variance: less than this is not worth a name
 _NEGLIGIBLE_SHARE = 0.03  # of what the base model left,
-_NEVER_NEGLIGIBLE = 1.0  # but not more than the noise itself: a second effect may hide behind a strong one
+_NEVER_NEGLIGIBLE = 1.0  # but not more than the noise itself
+_WORTH_A_SEARCH = 0.3  # of the floor's variance: a second effect may hide behind a strong one
 
 
 class TooLittleDataError(BifaError):
@@ -88,9 +89,10 @@ def diagnose(
 
     def enough(candidate: Candidate) -> bool:
         at_least = _unfitted_remainder(candidate, seed)
-        if at_least.largest > _HOPELESS * _negligible(remainder):
+        most = min(_negligible(remainder), _WORTH_A_SEARCH)
+        if at_least.largest > _HOPELESS * most:
             return False
-        return _explained(at_least, remainder) or _explained(on_known(candidate)[1], remainder)
+        return at_least.largest < most or on_known(candidate)[1].largest < most
 
     crew = Crew(progress, executor)
     found = search(base, split, base.problem.floor, enough=enough, crew=crew)

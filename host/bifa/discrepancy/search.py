@@ -21,8 +21,10 @@ _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 8, 3: 6}  # sets refitted, by their size: roughly,
 _SKETCHED_TWICE = {1: 4, 2: 3, 3: 2}  # the best of these from afar as well,
 _FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
+_ROUNDS = 4  # of finishing at most
 _FRUITFUL = 0.05  # of the best smaller set's excess: a sketch that takes less away is not finished, nor a beam grown
 _HOPEFUL = 3.0  # times the least excess of the beam: sets that leave more are not grown
+_HOPELESS = 10.0  # times the least excess of those finished: a sketch that leaves more is not finished
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
 _LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
@@ -156,6 +158,17 @@ def _grow(beam: Sequence[Candidate], library, split, floor, tried, enough, crew:
     return _finish(min(beam, key=lambda c: c.cost), sketched, _FINISHED[size], split, tried, enough, crew)
 
 
+def _finished(candidate: Candidate, split: Split) -> Candidate:
+    """From afar again for as long as that pays: a friction that went astray comes back in more than one go."""
+    for _ in range(_ROUNDS):
+        further = judge(finish(candidate.fitted), split)
+        fruitful = candidate.cost - further.cost > max(_FRUITFUL * candidate.excess, _SEEN)
+        candidate = min(candidate, further, key=lambda c: c.cost)
+        if not fruitful:
+            break
+    return candidate
+
+
 def _finish(before: Candidate, sketched, count, split, tried, enough, crew: Crew) -> list[Candidate]:
     """Refit to the end the best `count` of those that explain more than the best set so far, `before`; once one of them
     explains enough, only those that are not out of its reach. What does not explain enough gets a second start, so that
@@ -168,11 +181,12 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, crew: Crew
     while waiting and len(done) < count:
         candidate = waiting[0]
         fruitful = before.cost - candidate.cost > _FRUITFUL * before.excess
-        if not fruitful or candidate.cost > _REACH * explained:
+        hopeless = done and candidate.excess > _HOPELESS * min(c.excess for c in done)
+        if not fruitful or hopeless or candidate.cost > _REACH * explained:
             break
         waiting.pop(0)
         crew.say(f"finishing {' + '.join(candidate.effects)}")
-        candidate = judge(finish(candidate.fitted), split)
+        candidate = _finished(candidate, split)
         suffices = enough(candidate)
         if not suffices:
             candidate = judge(finish_elsewhere(candidate.fitted, profiled[candidate.effects]), split)

@@ -141,7 +141,7 @@ def evaluate_on(fitted: Fit, trials: Sequence[Trial]) -> Fit:
 def spread_starts(structure: Structure, around: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
     """`around` and count - 1 vectors scattered about it by a few scales, within the bounds; deterministic."""
     draw = np.random.default_rng(seed)
-    lower, upper = structure.bounds()
+    lower, upper = structure.bounds(around)
     scattered = [
         np.clip(around + 2 * structure.scales() * draw.standard_normal(len(around)), lower, upper)
         for _ in range(count - 1)

@@ -62,7 +62,7 @@ def settle(fitted: Fit) -> Fit:
 def _stopped(fitted: Fit) -> bool:
     free = list(fitted.solution.free)
     values = fitted.solution.point.values[free]
-    lower, upper = (bound[free] for bound in fitted.structure.bounds())
+    lower, upper = (bound[free] for bound in fitted.structure.bounds(fitted.solution.point.values))
     return bool((np.minimum(values - lower, upper - values) < 1e-6 * (upper - lower)).any())
 
 

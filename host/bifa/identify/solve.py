@@ -70,9 +70,9 @@ def solve(
     never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
     """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
-    lower, upper, scale = _limits(problem, free)
-    x = np.clip(_pack(start, free), lower, upper)
-    point = _unpack(start, free, x)
+    lower, upper, scale = _limits(problem, start, free)
+    point = _allowed(problem, _unpack(start, free, np.clip(_pack(start, free), lower, upper)))
+    x = _pack(point, free)
     residuals = problem.residuals(point)
     cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
     damping, converged, iteration = _LAMBDA_START, False, 0
@@ -85,12 +85,14 @@ def solve(
         iteration += 1
         system = _linearise(problem, point, free, residuals, sensitivities)
         accepted = False
+        lower, upper, _ = _limits(problem, point, free)
         while damping < _LAMBDA_MOST:
             reach = _REACH * scale
             step, promise = _step(system, x, np.maximum(lower, x - reach), np.minimum(upper, x + reach), scale, damping)
             if promise < max(_ENOUGH, relative * cost):
                 break
-            trial_point = _unpack(point, free, x + step)
+            trial_point = _allowed(problem, _unpack(point, free, x + step))
+            step = _pack(trial_point, free) - x
             trial_residuals = problem.residuals(trial_point)
             trial_cost = 0.5 * sum(float(r @ r) for r in trial_residuals) + problem.prior_cost(trial_point)
             ratio = (cost - trial_cost) / promise
@@ -138,8 +140,12 @@ def _corrected(sensitivities, step, scale, before, after, p: int) -> tuple[Sensi
     return tuple(found)
 
 
-def _limits(problem: Problem, free: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    lower, upper = problem.structure.bounds()
+def _allowed(problem: Problem, point: Point) -> Point:
+    return Point(problem.structure.lifted(point.values), point.nuisances)
+
+
+def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    lower, upper = problem.structure.bounds(point.values)
     scale = problem.structure.scales()
     nuisances = [p for ps in problem.nuisances for p in ps]
     return (

@@ -66,8 +66,24 @@ class Structure:
     def prior_mean(self) -> np.ndarray:
         return np.array([p.value for p in self.parameters])
 
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
+    def bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the parameters lie between, the others being as in `values`."""
+        lower, upper = np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
+        for index, floor in self._ordered:
+            lower[index] = max(lower[index], values[floor])
+        return lower, upper
+
+    def lifted(self, values: np.ndarray) -> np.ndarray:
+        """`values` with those raised that are below the one that they cannot be below."""
+        values = values.copy()
+        for index, floor in self._ordered:
+            values[index] = max(values[index], values[floor])
+        return values
+
+    @cached_property
+    def _ordered(self) -> tuple[tuple[int, int], ...]:
+        pairs = [(p.name, p.at_least) for p in self.parameters if p.at_least in self.names]
+        return tuple((self.names.index(name), self.names.index(floor)) for name, floor in pairs)
 
     def scales(self) -> np.ndarray:
         return np.array([p.step_scale for p in self.parameters])

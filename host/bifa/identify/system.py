@@ -30,7 +30,7 @@ class Parameter:
     not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
     a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
     deviation of its spread. `prior_sd`: standard deviation of what was known about it beforehand, around
-    `value`; None: nothing was.
+    `value`; None: nothing was. `at_least` names another parameter that it cannot be below.
     """
 
     name: str
@@ -42,6 +42,7 @@ class Parameter:
     scale: float | None = None
     source: str = ""
     prior_sd: float | None = None
+    at_least: str | None = None
 
     def __post_init__(self) -> None:
         if not self.lower < self.upper:

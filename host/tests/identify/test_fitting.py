@@ -11,7 +11,7 @@ from bifa.identify.noise import correlation_samples, estimate_noise
 from bifa.identify.problem import Problem
 from bifa.identify.solve import solve
 from bifa.identify.structure import Structure
-from bifa.identify.system import Parameter
+from bifa.identify.system import Parameter, System, Trial
 from bifa.identify.uncertainty import profile_interval, uncertainty
 
 
@@ -59,13 +59,43 @@ def test_a_fit_never_leaves_its_bounds_nor_gets_worse(shift):
     system = hide({"coulomb.force_N": 0.1}, seed=3, repeats=1)
     structure = Structure(system)
     problem = Problem(structure, system.trials[:2], estimate_noise(system, system.trials))
-    lower, upper = structure.bounds()
+    lower, upper = structure.bounds(structure.start())
     start = np.clip(structure.start() + np.array(shift) * structure.scales(), lower, upper)
     begun = solve(problem, problem.start(start), max_iterations=0)
     ended = solve(problem, problem.start(start), max_iterations=3)
     assert ended.cost <= begun.cost
     assert np.all(ended.point.values >= lower)
     assert np.all(ended.point.values <= upper)
+
+
+class Block(System):
+    """A block on a table holds at most `holding_N`, then slides; what slides at once shows no static friction."""
+
+    name, effects = "block on a table", {}
+    parameters = (
+        Parameter("holding_N", "N", 3.0, 0.0, 9.0, scale=0.5, at_least="sliding_N"),
+        Parameter("sliding_N", "N", 3.0, 0.0, 9.0, scale=0.5),
+    )
+
+    def __init__(self, holding_N, sliding_N):
+        draw, self.trials = np.random.default_rng(4), ()
+        for repeat in range(2):
+            trial = Trial(f"pull {repeat}", "pull", "pull", np.linspace(0.0, 1.0, 101), {})
+            force = self.predict({"holding_N": holding_N, "sliding_N": sliding_N}, (), trial)["force_N"]
+            measured = {"force_N": force + 0.05 * draw.standard_normal(101)}
+            self.trials += (Trial(trial.name, "pull", "pull", trial.time_s, measured),)
+
+    def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
+        static = max(theta["holding_N"], theta["sliding_N"])
+        return {"force_N": np.where(trial.time_s < 0.2, static, theta["sliding_N"])}
+
+
+@pytest.mark.parametrize("start", [(0.5, 5.0), (2.0, 2.0), (8.0, 1.0)])
+def test_static_friction_comes_back_from_below_the_kinetic_one(start):
+    system = Block(holding_N=4.0, sliding_N=3.0)
+    problem = Problem(Structure(system), system.trials, estimate_noise(system, system.trials))
+    found = solve(problem, problem.start(np.array(start)))
+    assert found.point.values == pytest.approx([4.0, 3.0], abs=0.05)
 
 
 def test_correlated_noise_counts_for_less():
