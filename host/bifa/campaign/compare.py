@@ -46,7 +46,7 @@ class GaitResult:
 def compare(sealed: bool) -> Stage:
     """The stage that makes `summary.json`, `report.html` and its two main figures."""
     needs = ["model-base.toml", "model-completed.toml", "walks-base", "walks-completed"]
-    needs += ["diagnosis.json", "residuals.json", *(["truth.json"] if sealed else [])]
+    needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "report.html")
     return Stage("compare", "compare and report", tuple(needs), makes, _run)
 
@@ -78,6 +78,7 @@ def _run(inputs: Path, outputs: Path) -> None:
         "verdict": diagnosis["verdict"],
         "effects": diagnosis["effects"],
         "error": diagnosis["error"],
+        "prediction_error": json.loads((inputs / "errors.json").read_text()),
         "robustness": _robustness(completed, trials),
         "truth": truth,
     }

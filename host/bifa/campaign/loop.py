@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bifa.campaign.bench import Bench
 from bifa.campaign.compare import compare
+from bifa.campaign.prediction_error import prediction_errors
 from bifa.campaign.residuals import residuals
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
@@ -133,10 +134,11 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
         record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
+        (outputs / "errors.json").write_text(json.dumps(prediction_errors(found), indent=1) + "\n")
         (outputs / "residuals.json").write_text(json.dumps(residuals(found)) + "\n")
         save_model(outputs / "model-completed.toml", completed_model(found.final))
 
-    makes = ("diagnosis.json", "residuals.json", "model-completed.toml", "separating")
+    makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
     settings = bench.settings(_SEPARATING)
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings)
 

@@ -53,7 +53,7 @@ def campaign_page(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping
                 ),
                 *_probabilities(diagnosis),
             ],
-            tables=[*_opened(summary), error_table(error)],
+            tables=[*_opened(summary), prediction_table(summary["prediction_error"]), error_table(error)],
         ),
         Section(
             "The gaits",
@@ -96,6 +96,18 @@ def speed_table(gaits: Sequence[Mapping]) -> Table:
     ]
     columns = ["gait", "base model predicts", "completed model predicts", "measured", "paper"]
     return Table(columns, rows, "Settled speed in mm/s; measured: mean and spread of the repeats.", len(rows) - 1)
+
+
+def prediction_table(errors: Sequence[Mapping]) -> Table:
+    """Errors before and after in the units of the instruments, of fitted and held-out trials, against the floor."""
+    rows = [
+        [
+            "{} in {}, {}".format(*error["quantity"].rsplit("_", 1), error["trials"]),
+            *(f"{error[side]:.3f}" for side in ("before", "after", "noise_floor")),
+        ]
+        for error in errors
+    ]
+    return Table(["trials", "base model", "completed model", "noise floor"], rows, "RMS error of prediction.")
 
 
 def error_table(error: Mapping) -> Table:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bifa.identify.fit import Fit
 from bifa.identify.uncertainty import uncertainty
 from bifa.robot import Model
+from bifa.simulate import plant
 
 from .robust import clustered_covariance, with_uncertainty
+from .sites import learnt_curves
 
 
 def completed_model(fit: Fit) -> Model:
-    """The fitted values, effects included, with the covariance of those that the data determine. A learnt curve has no
-    place in a model file and stays out."""
+    """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of those
+    values that the data determine."""
     structure = fit.structure
     system = structure.system
     model = system.model_at(fit.theta, structure.effects)
+    model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
     known = uncertainty(fit)
     sd = np.sqrt(np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fit))))
     named = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}

@@ -8,7 +8,9 @@ import numpy as np
 
 from bifa.identify.system import Correction, CorrectionSite
 from bifa.robot import Model
-from bifa.simulate import Plant, layout, learnt
+from bifa.robot.learnt import ROWS, LearntCurve
+from bifa.simulate import Plant, layout
+from bifa.simulate.learnt_curves import with_curve
 
 from .curves import FittedCurve
 from .inputs import ANCHOR, STATIC, STEP, WALK
@@ -16,13 +18,6 @@ from .inputs import ANCHOR, STATIC, STEP, WALK
 _SPEED_M_S = 0.8  # that a snap-through does not reach
 _PRESSURE_PSI = (-14.5, 14.5)
 _PIPE_M = (-0.1, 0.6)
-_TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
-_TERMS = {
-    "filling": (learnt.FILLING, learnt.EMPTYING),
-    "friction_speed": (learnt.FORWARD, learnt.BACKWARD),
-    "friction_place": (learnt.PLACE,),
-    "body_damper": (learnt.DAMPING,),
-}
 _FIXED_SITES = (
     CorrectionSite(
         "filling", "rate of a chamber's pressure, eq. (2)", "pressure", "psi/s", *_PRESSURE_PSI, 0.3, True, (STEP, WALK)
@@ -113,13 +108,27 @@ def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session:
     """The plant with the learnt curves in it. place_in_session: 0 for the day's first trial, 1 for its last."""
     for correction in corrections:
         name = correction.site
-        if name in _TABLES:
-            plant = plant._replace(**{_TABLES[name]: _added(getattr(plant, _TABLES[name]), correction.table[0])})
-        elif name in _TERMS:
-            plant = plant._replace(learnt=_learnt(plant.learnt, _FIXED[name], _TERMS[name], correction.table))
+        if name in ROWS:
+            lower, upper = _range(plant, name)
+            plant = with_curve(plant, name, LearntCurve(lower, upper, correction.table))
         elif name.endswith("_of_the_day"):
             plant = plant._replace(q=_of_the_day(plant.q, name, _at(_FIXED[name], correction, place_in_session)))
     return plant
+
+
+def learnt_curves(plant: Plant, corrections: Sequence[Correction]) -> dict[str, LearntCurve]:
+    """Those of the corrections that are in the robot's equations, as a model has them; what is in the instruments or
+    passes with the day is none of the robot's."""
+    kept = [correction for correction in corrections if correction.site in ROWS]
+    return {c.site: LearntCurve(*_range(plant, c.site), c.table) for c in kept}
+
+
+def _range(plant: Plant, name: str) -> tuple[float, float]:
+    """Of the quantity that a learnt curve is a function of; a spring's is that of its own table."""
+    if name in _FIXED:
+        return _FIXED[name].lower, _FIXED[name].upper
+    table = plant.body_curve if name == "body_spring" else plant.small_curve
+    return float(table[0, 0]), float(table[0, 1])
 
 
 def corrected_readings(channels: dict[str, np.ndarray], corrections: Sequence[Correction]) -> dict[str, np.ndarray]:
@@ -154,23 +163,3 @@ def _of_the_day(q: np.ndarray, name: str, value: float) -> np.ndarray:
     else:
         q[layout.SUPPLY_NEGATIVE] += value
     return q
-
-
-def _learnt(rows: np.ndarray, site: CorrectionSite, terms: Sequence[int], table: np.ndarray) -> np.ndarray:
-    """The integrator's rows with those of a site's terms filled in."""
-    filled = rows.copy() if len(rows) else np.zeros((learnt.TERMS, 2 + table.shape[1]))
-    for term, values in zip(terms, table, strict=True):
-        filled[term, :2] = site.lower, (len(values) - 1) / (site.upper - site.lower)
-        filled[term, 2:] = values
-    return filled
-
-
-def _added(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """A stiffness table (`bifa.simulate.plant.table`) plus a curve given on a uniform grid over the same range."""
-    lower, upper = rows[0, 0], rows[0, 1]
-    nodes = np.linspace(lower, upper, rows.shape[0])
-    added = np.interp(nodes, np.linspace(lower, upper, len(values)), values)
-    total = rows.copy()
-    total[1:, 0] += added[:-1]
-    total[1:, 1] += np.diff(added)
-    return total

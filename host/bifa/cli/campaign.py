@@ -37,7 +37,7 @@ def run_campaign(out: Path, port: str, seed: int, quick: bool, rerun: Sequence[s
 
     from bifa.campaign.bench import Bench
     from bifa.campaign.loop import Effort, campaign
-    from bifa.campaign.page import error_table, speed_table
+    from bifa.campaign.page import error_table, prediction_table, speed_table
     from bifa.campaign.progress import stage_progress
     from bifa.campaign.stages import run_stages
 
@@ -53,7 +53,8 @@ def run_campaign(out: Path, port: str, seed: int, quick: bool, rerun: Sequence[s
     if summary["truth"] is not None:
         inside = "; ".join(_sized(name, values) for name, values in summary["truth"].items())
         console.print(f"the seal, opened: {inside or 'nothing'}", highlight=False)
-    for table in (error_table(summary["error"]), speed_table(summary["gaits"])):
+    errors = prediction_table(summary["prediction_error"]), error_table(summary["error"])
+    for table in (*errors, speed_table(summary["gaits"])):
         _print_table(console, table)
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,15 +53,16 @@ def floor_of(fitted: Fit, held_out: Sequence[Trial]) -> Floor:
     known_pairs, unseen_pairs = [], []
     for first, second in repeat_pairs((*fitted.problem.trials, *held_out)):
         pairs = unseen_pairs if {first.name, second.name} & names else known_pairs
-        pairs.append(_difference(first, second, scaled))
+        pairs.append(difference(first, second, scaled))
     return Floor(*(rms(pairs) if pairs else 1.0 for pairs in (known_pairs, unseen_pairs)))
 
 
-def _difference(first: Trial, second: Trial, scaled: dict[str, Channels]) -> Channels:
+def difference(first: Trial, second: Trial, residuals: Mapping[str, Channels]) -> Channels:
+    """What two repeats differ by, over the root of 2: as large as the noise of one of them."""
     return {
-        c: (z - np.interp(first.time_s, second.time_s, scaled[second.name][c])) / np.sqrt(2)
-        for c, z in scaled[first.name].items()
-        if c in scaled[second.name]
+        c: (r - np.interp(first.time_s, second.time_s, residuals[second.name][c])) / np.sqrt(2)
+        for c, r in residuals[first.name].items()
+        if c in residuals[second.name]
     }
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bifa import effects as library
+from bifa.robot.learnt import LearntCurve
+from bifa.robot.learnt import check as check_learnt
 from bifa.robot.parameters import BASE_PARAMETERS, Parameter, ParameterError, check_bounds
 from bifa.robot.stiffness import StiffnessCurve
 
@@ -33,7 +35,8 @@ class Covariance:
 class Model:
     """A robot. Immutable: `with_values` and `with_effects` give changed copies, checked against the bounds.
 
-    `effects` maps an active effect's name to its parameters, e.g. {"hysteresis": {"force_N": 4.0, ...}}.
+    `effects` maps an active effect's name to its parameters, e.g. {"hysteresis": {"force_N": 4.0, ...}}; `learnt` the
+    name of a term to the curve learnt there.
     """
 
     name: str
@@ -41,6 +44,7 @@ class Model:
     body_stiffness: StiffnessCurve
     small_stiffness: StiffnessCurve
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    learnt: Mapping[str, LearntCurve] = field(default_factory=dict)
     covariance: Covariance | None = None
     provenance: str = ""
 
@@ -53,6 +57,8 @@ class Model:
         for parameter in self.parameters.values():
             check_bounds(parameter.name, parameter.value, parameter.lower, parameter.upper, parameter.unit)
         object.__setattr__(self, "effects", {name: library.complete(name, v) for name, v in self.effects.items()})
+        for name, curve in self.learnt.items():
+            check_learnt(name, curve)
         if self.covariance is not None:
             for name in self.covariance.names:
                 self[name]

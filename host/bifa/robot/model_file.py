@@ -10,6 +10,7 @@ import numpy as np
 import tomli_w
 
 from bifa.errors import BifaError
+from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Covariance, Model
 from bifa.robot.parameters import BASE_PARAMETERS
 from bifa.robot.stiffness import StiffnessCurve
@@ -53,6 +54,10 @@ def save_model(path: str | Path, model: Model) -> None:
     document["stiffness"] = {"body": _curve(model.body_stiffness), "small": _curve(model.small_stiffness)}
     if model.effects:
         document["effects"] = {name: dict(values) for name, values in model.effects.items()}
+    if model.learnt:
+        document["learnt"] = {
+            name: {"lower": c.lower, "upper": c.upper, "values": c.values.tolist()} for name, c in model.learnt.items()
+        }
     if model.covariance is not None:
         covariance = model.covariance
         document["covariance"] = {"names": list(covariance.names), "matrix": covariance.matrix.tolist()}
@@ -82,7 +87,8 @@ def _parse(text: str, where: str) -> Model:
 
 
 def _build(document: dict) -> Model:
-    _only(document, "the file", {"format", "name", "parameters", "stiffness"}, {"provenance", "effects", "covariance"})
+    optional = {"provenance", "effects", "learnt", "covariance"}
+    _only(document, "the file", {"format", "name", "parameters", "stiffness"}, optional)
     _only(document["stiffness"], "stiffness", {"body", "small"})
     entries = document["parameters"]
     _only(entries, "parameters", set(BASE_PARAMETERS))
@@ -102,6 +108,7 @@ def _build(document: dict) -> Model:
         body_stiffness=_read_curve("body", document["stiffness"]["body"]),
         small_stiffness=_read_curve("small", document["stiffness"]["small"]),
         effects=effects,
+        learnt={name: _learnt(name, entry) for name, entry in document.get("learnt", {}).items()},
         covariance=covariance,
         provenance=str(document.get("provenance", "")),
     )
@@ -127,6 +134,11 @@ def _read_curve(name: str, entry: dict) -> StiffnessCurve:
         raise ModelFileError(f"stiffness.{name} must hold numbers") from None
     curve.equilibria_m  # noqa: B018 - a curve that is not bistable is refused here, with its reason
     return curve
+
+
+def _learnt(name: str, entry: dict) -> LearntCurve:
+    _only(entry, f"learnt.{name}", {"lower", "upper", "values"})
+    return LearntCurve(**entry)
 
 
 def _only(table: dict, where: str, required: set[str], optional: set[str] = frozenset()) -> None:

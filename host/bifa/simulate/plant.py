@@ -12,6 +12,7 @@ from bifa import effects
 from bifa.robot.model import Model
 from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate import layout
+from bifa.simulate.learnt_curves import with_curve
 
 _INTERVALS = 256
 _NOTHING = np.zeros((0, 4))
@@ -33,7 +34,10 @@ def plant(model: Model | Plant) -> Plant:
     if isinstance(model, Plant):
         return model
     body, small = model.body_stiffness, model.small_stiffness
-    return Plant(numbers(model.values, body, small), mask(model.effects), table(body), table(small))
+    flat = Plant(numbers(model.values, body, small), mask(model.effects), table(body), table(small))
+    for name, curve in model.learnt.items():
+        flat = with_curve(flat, name, curve)
+    return flat
 
 
 def numbers(values: Mapping[str, float], body: StiffnessCurve, small: StiffnessCurve) -> np.ndarray:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from independent_lab import BASELINE, Lab
 
+from bifa.characterisation.sites import corrected, learnt_curves
 from bifa.characterisation.system import prepare
 from bifa.data import Dataset
 from bifa.identify.system import Correction
+from bifa.simulate import plant
 
 
 @pytest.fixture(scope="module")
@@ -87,3 +89,18 @@ def test_the_camera_reads_with_what_was_learnt(system, theta):
     assert scaled["displacement_tail_mm"][inside] == pytest.approx(
         1.03 * plain["displacement_tail_mm"][inside], abs=1e-6
     )
+
+
+def test_a_model_takes_along_what_was_learnt_in_the_robot_but_not_in_its_instruments(system, theta):
+    corrections = [
+        curve(system, "body_spring", lambda x: 3.0 * np.sin(300.0 * x)),
+        curve(system, "filling", lambda p: -0.03 * p),
+        curve(system, "camera", lambda x: 0.03 * x),
+    ]
+    model = system.model_at(theta, ())
+    kept = learnt_curves(plant(model), corrections)
+    assert set(kept) == {"body_spring", "filling"}
+    got, want = plant(replace(model, learnt=kept)), corrected(plant(model), corrections)
+    for ours, theirs in zip(got, want, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert not np.array_equal(got.body_curve, plant(model).body_curve)

@@ -1,10 +1,15 @@
 """Model files: written and read back to the same numbers, and refused by name and range."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bifa.robot import Covariance, ModelFileError, ParameterError, load_model, nominal, save_model
+from bifa.robot import BASELINE, Covariance, ModelFileError, ParameterError, load_model, nominal, save_model
+from bifa.robot.learnt import LearntCurve
+from bifa.simulate import walk
 
+_LEARNT = "[learnt.{}]\nlower = 0.0\nupper = 1.0\nvalues = {}\n[stiffness.body]"
 CHANGED = {
     "other format": ("format = 1", "format = 2", "format 2"),
     "unknown parameter": ("[parameters.mu_k]", "[parameters.mu_q]", "mu_q"),
@@ -13,6 +18,10 @@ CHANGED = {
     "not finite": ("value = 0.175", "value = nan", "head_mass_kg"),
     "wrong unit": ('unit = "N/psi"', 'unit = "N/bar"', "N/bar"),
     "unknown effect": ("[stiffness.body]", "[effects.magic]\nsize = 1.0\n[stiffness.body]", "magic"),
+    "no such learnt curve": ("[stiffness.body]", _LEARNT.format("magic", "[[0.0, 1.0]]"), "magic"),
+    "learnt rows": ("[stiffness.body]", _LEARNT.format("filling", "[[0.0, 1.0]]"), "1 rows instead of 2"),
+    "learnt values": ("[stiffness.body]", _LEARNT.format("body_damper", '[["a", 1.0]]'), "rows"),
+    "learnt, uneven": ("[stiffness.body]", _LEARNT.format("filling", "[[0.0, 1.0], [0.0]]"), "rows"),
     "not TOML": ("format = 1", "format = ", "TOML"),
     "not bistable": ("-139.2774809279526", "1e9", "bistable"),
 }
@@ -31,6 +40,19 @@ def test_round_trip_keeps_every_number(tmp_path):
     assert back.small_stiffness == model.small_stiffness
     assert back.covariance.names == changed.covariance.names
     np.testing.assert_array_equal(back.covariance.matrix, changed.covariance.matrix)
+
+
+def test_learnt_curves_are_kept_and_act(tmp_path):
+    slower = LearntCurve(-0.8, 0.8, [[-16.0, 0.0, 16.0]])  # 20 Ns/m more
+    changed = replace(nominal(), learnt={"body_damper": slower})
+    save_model(tmp_path / "m.toml", changed)
+    back = load_model(tmp_path / "m.toml").learnt["body_damper"]
+    assert (back.lower, back.upper) == (-0.8, 0.8)
+    np.testing.assert_array_equal(back.values, slower.values)
+    more = nominal().with_values({"body_damping_Ns_m": nominal()["body_damping_Ns_m"] + 20.0})
+    got, want = (walk(model, BASELINE, 2)["displacement_head_mm"] for model in (load_model(tmp_path / "m.toml"), more))
+    assert got == pytest.approx(want, abs=0.05)
+    assert np.abs(got - walk(nominal(), BASELINE, 2)["displacement_head_mm"]).max() > 0.2
 
 
 @pytest.mark.parametrize("case", CHANGED)

@@ -1,0 +1,43 @@
+"""A plant with a learnt curve in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bifa.robot.learnt import LearntCurve
+from bifa.simulate import learnt
+
+_POINTS = 65  # of a row of `Plant.learnt`
+_TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
+_TERMS = {
+    "filling": (learnt.FILLING, learnt.EMPTYING),
+    "friction_speed": (learnt.FORWARD, learnt.BACKWARD),
+    "friction_place": (learnt.PLACE,),
+    "body_damper": (learnt.DAMPING,),
+}
+
+
+def with_curve(plant, name: str, curve: LearntCurve):
+    """The plant with `curve` added to the term `name` (`bifa.robot.learnt.ROWS`)."""
+    if name in _TABLES:
+        return plant._replace(**{_TABLES[name]: _added(getattr(plant, _TABLES[name]), curve)})
+    filled = plant.learnt.copy() if len(plant.learnt) else np.zeros((learnt.TERMS, 2 + _POINTS))
+    at = np.linspace(curve.lower, curve.upper, _POINTS)
+    for term, values in zip(_TERMS[name], curve.values, strict=True):
+        filled[term, :2] = curve.lower, (_POINTS - 1) / (curve.upper - curve.lower)
+        filled[term, 2:] = np.interp(at, _grid(curve), values)
+    return plant._replace(learnt=filled)
+
+
+def _added(rows: np.ndarray, curve: LearntCurve) -> np.ndarray:
+    """A stiffness table (`bifa.simulate.plant.table`) plus a curve."""
+    nodes = np.linspace(rows[0, 0], rows[0, 1], rows.shape[0])
+    added = np.interp(nodes, _grid(curve), curve.values[0])
+    total = rows.copy()
+    total[1:, 0] += added[:-1]
+    total[1:, 1] += np.diff(added)
+    return total
+
+
+def _grid(curve: LearntCurve) -> np.ndarray:
+    return np.linspace(curve.lower, curve.upper, curve.values.shape[1])
