@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,8 @@ from bifa.discrepancy.search import Search
 
 _LEAST_GAIN = 8.0  # log-likelihood, in units of what the best explanation leaves, that one more effect must bring
 _LEAST_GAIN_PER_PIECE = 5e-4  # and per piece of information: less than that any small misfit pays for
-_LEAST_SHARE = 0.15  # of the gap to the floor that one more effect must close
+_LEAST_SHARE = 0.15  # of the gap to the floor that one more effect must close,
+_LEAST_SHARE_BEYOND = 0.5  # and where what is left is negligible: a second effect, not what any would take up
 _CONFUSABLE = 0.02  # an exchange of effects at least so probable is not ruled out
 
 
@@ -35,14 +36,17 @@ class Choice:
     probabilities: dict[tuple[str, ...], float]
 
 
-def choose(search: Search, *, base_suffices: bool = False) -> Choice:
-    """Pick the set that explains best, and no larger than the evidence carries; the base model where that leaves
-    nothing to explain (an effect would only take up what noise there is)."""
+def choose(search: Search, suffices: Callable[[Candidate], bool] = lambda _: False) -> Choice:
+    """Pick the set that explains best, and no larger than the evidence carries; the base model where that `suffices`,
+    leaving nothing to explain (an effect would only take up what noise there is)."""
     dispersion = dispersion_of(search.tried)
     chosen = search.base
-    while not base_suffices:
+    while chosen is not search.base or not suffices(chosen):
+        least = _LEAST_SHARE_BEYOND if suffices(chosen) else _LEAST_SHARE
         larger = [
-            c for c in search.tried if len(c.effects) > len(chosen.effects) and worth_adding(chosen, c, dispersion)
+            c
+            for c in search.tried
+            if len(c.effects) > len(chosen.effects) and worth_adding(chosen, c, dispersion, least)
         ]
         if not larger:
             break
@@ -55,15 +59,15 @@ def choose(search: Search, *, base_suffices: bool = False) -> Choice:
     return Choice(chosen, named, probabilities)
 
 
-def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float) -> bool:
+def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, least_share: float = _LEAST_SHARE) -> bool:
     """Whether the larger explanation is better on trials it was not fitted to, beyond the noise's and the
-    remaining misfit's doubt, and closes a share of what was left."""
+    remaining misfit's doubt, and closes a share of what was left for every effect more."""
     extra = len(larger.effects) - len(smaller.effects)
     gain = (smaller.cost - larger.cost) / dispersion
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
     share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
     least = extra * max(_LEAST_GAIN, _LEAST_GAIN_PER_PIECE * smaller.pieces)
-    return gain > least and unseen > 0.25 * least and share > extra * _LEAST_SHARE
+    return gain > least and unseen > 0.25 * least and share > min(extra * least_share, 0.9)
 
 
 def dispersion_of(tried: Sequence[Candidate]) -> float:

@@ -87,16 +87,21 @@ def diagnose(
             refitted[id(candidate)] = candidate, fitted, _remainder(fitted, seed)
         return refitted[id(candidate)][1:]
 
-    def enough(candidate: Candidate) -> bool:
-        at_least = _unfitted_remainder(candidate, seed)
-        most = min(_negligible(remainder), _WORTH_A_SEARCH)
-        if at_least.largest > _HOPELESS * most:
+    def leaves_less(candidate: Candidate, most: float) -> bool:
+        at_least = _unfitted_remainder(candidate, seed).largest
+        if at_least > _HOPELESS * most:
             return False
-        return at_least.largest < most or on_known(candidate)[1].largest < most
+        return at_least < most or on_known(candidate)[1].largest < most
+
+    def enough(candidate: Candidate) -> bool:
+        return leaves_less(candidate, min(_negligible(remainder), _WORTH_A_SEARCH))
+
+    def suffices(candidate: Candidate) -> bool:
+        return leaves_less(candidate, _negligible(remainder))
 
     crew = Crew(progress, executor)
     found = search(base, split, base.problem.floor, enough=enough, crew=crew)
-    choice = choose(found, base_suffices=enough(found.base))
+    choice = choose(found, suffices)
     explained, left = on_known(choice.candidate)
     base_known, remainder = on_known(found.base, _ROUGH)
     drifts = find_drift(explained, seed=seed)

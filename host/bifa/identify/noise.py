@@ -95,7 +95,7 @@ def estimate_noise(
         if pairs := by_key.get(key):
             channels[key] = _from_pairs(pairs, key[1], sensor, residuals)
         else:
-            sd = sensor or float(np.median([_fast_noise(trial.channels[key[1]]) for trial in members]))
+            sd = max(sensor, float(np.median([_fast_noise(trial.channels[key[1]]) for trial in members])))
             channels[key] = ChannelNoise(max(sd, _smallest(members, key[1])), 0.0, 1.0, 0)
     return NoiseFloor(channels)
 

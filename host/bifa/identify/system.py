@@ -207,8 +207,8 @@ class System(Protocol):
         return True
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
-        """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound, and
-        all there is where no condition was repeated. 0: not known."""
+        """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound.
+        0: not known."""
         return 0.0
 
     @property
