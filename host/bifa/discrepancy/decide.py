@@ -12,8 +12,10 @@ from bifa.discrepancy.search import Search
 
 _LEAST_GAIN = 8.0  # log-likelihood, in units of what the best explanation leaves, that one more effect must bring
 _LEAST_GAIN_PER_PIECE = 5e-4  # and per piece of information: less than that any small misfit pays for
-_LEAST_SHARE = 0.15  # of the gap to the floor that one more effect must close,
-_LEAST_SHARE_BEYOND = 0.5  # and where what is left is negligible: a second effect, not what any would take up
+_LEAST_SHARE = 0.15  # of the gap to the floor that one more effect must close
+# Where repeats share nothing more to speak of, many times the gain, and most of the gap: a weak effect brings that, but
+# not one that would only take up what noise there is.
+_BEYOND, _LEAST_SHARE_BEYOND = 15.0, 0.5
 _CONFUSABLE = 0.02  # an exchange of effects at least so probable is not ruled out
 
 
@@ -37,16 +39,16 @@ class Choice:
 
 
 def choose(search: Search, suffices: Callable[[Candidate], bool] = lambda _: False) -> Choice:
-    """Pick the set that explains best, and no larger than the evidence carries; the base model where that `suffices`,
-    leaving nothing to explain (an effect would only take up what noise there is)."""
+    """Pick the set that explains best, and no larger than the evidence carries: where one `suffices`, repeats sharing
+    nothing more to speak of, that has to be much."""
     dispersion = dispersion_of(search.tried)
     chosen = search.base
-    while chosen is not search.base or not suffices(chosen):
-        least = _LEAST_SHARE_BEYOND if suffices(chosen) else _LEAST_SHARE
+    while True:
+        beyond = suffices(chosen)
         larger = [
             c
             for c in search.tried
-            if len(c.effects) > len(chosen.effects) and worth_adding(chosen, c, dispersion, least)
+            if len(c.effects) > len(chosen.effects) and worth_adding(chosen, c, dispersion, beyond)
         ]
         if not larger:
             break
@@ -59,14 +61,17 @@ def choose(search: Search, suffices: Callable[[Candidate], bool] = lambda _: Fal
     return Choice(chosen, named, probabilities)
 
 
-def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, least_share: float = _LEAST_SHARE) -> bool:
+def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, beyond: bool = False) -> bool:
     """Whether the larger explanation is better on trials it was not fitted to, beyond the noise's and the
-    remaining misfit's doubt, and closes a share of what was left for every effect more."""
+    remaining misfit's doubt, and closes a share of what was left for every effect more. `beyond`: the smaller one
+    leaves nothing that repeats share."""
     extra = len(larger.effects) - len(smaller.effects)
     gain = (smaller.cost - larger.cost) / dispersion
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
     share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
     least = extra * max(_LEAST_GAIN, _LEAST_GAIN_PER_PIECE * smaller.pieces)
+    least *= _BEYOND if beyond else 1.0
+    least_share = _LEAST_SHARE_BEYOND if beyond else _LEAST_SHARE
     return gain > least and unseen > 0.25 * least and share > min(extra * least_share, 0.9)
 
 
