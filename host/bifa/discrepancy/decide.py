@@ -15,7 +15,7 @@ _LEAST_GAIN_PER_PIECE = 5e-4  # and per piece of information: less than that any
 _LEAST_SHARE = 0.15  # of the gap to the floor that one more effect must close
 # Where repeats share nothing more to speak of, many times the gain, and most of the gap: a weak effect brings that, but
 # not one that would only take up what noise there is.
-_BEYOND, _LEAST_SHARE_BEYOND = 15.0, 0.5
+_BEYOND, _LEAST_SHARE_BEYOND = 10.0, 0.5
 _CONFUSABLE = 0.02  # an exchange of effects at least so probable is not ruled out
 
 
