@@ -1,5 +1,7 @@
 """What holds for every test: properties are checked on the same examples every time, and never against the clock."""
 
+import signal
+import threading
 from collections.abc import Callable
 from functools import partial
 
@@ -8,6 +10,10 @@ from hypothesis import settings
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+# A shell starts what it runs in the background deaf to Ctrl-C, and so would be all that the tests start.
+if threading.current_thread() is threading.main_thread():
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
