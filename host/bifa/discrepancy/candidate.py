@@ -27,7 +27,7 @@ _REFIT = {"max_iterations": 40, "relative": 1e-4}
 _IMPLAUSIBLE_COST = 2.0  # log-likelihood for a parameter half its plausible range outside it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """`fitted` on the trials to fit, judged on those to select as well; `checked` on the latter."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cache
 
 from bifa.discrepancy.candidate import Candidate, judge
 from bifa.discrepancy.correct import Corrected, holds, learn_correction
@@ -78,20 +79,23 @@ def diagnose(
     progress("fitting the base model")
     base = _fit_base(system, split, seed, starts)
     remainder = _unfitted_remainder(judge(base, split), seed)
-    refitted: dict[int, tuple[Candidate, Fit, Remainder]] = {}
+    refitted: dict[Candidate, tuple[Fit, Remainder]] = {}
 
     def on_known(candidate: Candidate, relative: float = _FINE) -> tuple[Fit, Remainder]:
-        if id(candidate) not in refitted:
+        if candidate not in refitted:
             near = (candidate.fitted, candidate.checked)
             fitted = refit_on(candidate.fitted, split.known, near=near, relative=relative)
-            refitted[id(candidate)] = candidate, fitted, _remainder(fitted, seed)
-        return refitted[id(candidate)][1:]
+            refitted[candidate] = fitted, _remainder(fitted, seed)
+        return refitted[candidate]
+
+    @cache
+    def unfitted(candidate: Candidate) -> float:
+        return _unfitted_remainder(candidate, seed).largest
 
     def leaves_less(candidate: Candidate, most: float) -> bool:
-        at_least = _unfitted_remainder(candidate, seed).largest
-        if at_least > _HOPELESS * most:
+        if unfitted(candidate) > _HOPELESS * most:
             return False
-        return at_least < most or on_known(candidate)[1].largest < most
+        return unfitted(candidate) < most or on_known(candidate)[1].largest < most
 
     def enough(candidate: Candidate) -> bool:
         return leaves_less(candidate, min(_negligible(remainder), _WORTH_A_SEARCH))

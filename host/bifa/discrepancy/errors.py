@@ -49,16 +49,24 @@ def floor_of(fitted: Fit, held_out: Sequence[Trial]) -> Floor:
     unseen = evaluate_on(fitted, held_out)
     scaled = dict(zip((t.name for t in fitted.problem.trials), fitted.scaled_residuals(), strict=True))
     scaled |= dict(zip((t.name for t in held_out), unseen.scaled_residuals(), strict=True))
+    pairs = repeat_differences(fitted.problem.trials, held_out, scaled)
+    return Floor(*(rms(members) if members else 1.0 for members in pairs))
+
+
+def repeat_differences(
+    known: Sequence[Trial], held_out: Sequence[Trial], residuals: Mapping[str, Channels]
+) -> tuple[list[Channels], list[Channels]]:
+    """What repeats differ by, over the root of 2 (as large as the noise of one of them): of the pairs among the known
+    trials, and of those with a held-out one. `residuals` by trial."""
     names = {t.name for t in held_out}
     known_pairs, unseen_pairs = [], []
-    for first, second in repeat_pairs((*fitted.problem.trials, *held_out)):
+    for first, second in repeat_pairs((*known, *held_out)):
         pairs = unseen_pairs if {first.name, second.name} & names else known_pairs
-        pairs.append(difference(first, second, scaled))
-    return Floor(*(rms(pairs) if pairs else 1.0 for pairs in (known_pairs, unseen_pairs)))
+        pairs.append(_difference(first, second, residuals))
+    return known_pairs, unseen_pairs
 
 
-def difference(first: Trial, second: Trial, residuals: Mapping[str, Channels]) -> Channels:
-    """What two repeats differ by, over the root of 2: as large as the noise of one of them."""
+def _difference(first: Trial, second: Trial, residuals: Mapping[str, Channels]) -> Channels:
     return {
         c: (r - np.interp(first.time_s, second.time_s, residuals[second.name][c])) / np.sqrt(2)
         for c, r in residuals[first.name].items()

@@ -120,7 +120,7 @@ def optimise(
         )
     if settings.robust:
         refined = _refine_on_robots(model, runs, spread, explored, settings, say) if settings.refine else []
-        gait, nominal = _robustly(model, runs, spread, [explored, *refined][-1], settings, say, explored)
+        gait, nominal = _robustly(model, runs, spread, explored, [explored, *refined][-1], settings, say)
     else:
         refined = [_refine(objective, explored, settings, say)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, say)
@@ -202,7 +202,7 @@ def _nominally(model, runs, explored: Found, settings, say) -> tuple[Gait, float
     return _best(rows, speeds)
 
 
-def _robustly(model, runs, spread, refined: Found, settings, say, explored: Found | None = None) -> tuple[Gait, float]:
+def _robustly(model, runs, spread, explored: Found, refined: Found, settings, say) -> tuple[Gait, float]:
     """The best of the finalists, over robots that the search did not meet, that stands the check; slower copies of it
     follow, for the case that all are beyond the cliff. Where none stands, the one that walks best on average."""
     groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=0.003))
@@ -214,7 +214,7 @@ def _robustly(model, runs, spread, refined: Found, settings, say, explored: Foun
     checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])
     # Only where none of these walks at all by the metric in full: what the method found elsewhere.
-    far = ranked[_ROBUST_FINALISTS:] if explored is None else explored.finalists(_NOMINAL_FINALISTS, apart=0.02)
+    far = explored.finalists(_NOMINAL_FINALISTS, apart=0.02)
     otherwise, most = None, -1.0
     for candidates in (near, far):
         rows = gait_rows(settings.space.gaits(candidates))

@@ -74,7 +74,8 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     draws = spread.plants(sloping, 128, seed=99)
     before = distribution(runs, draws, gait_rows(settings.space.gaits(brittle)), metric)
     assert np.quantile(before, 0.1) < 1.0
-    gait, speed = _robustly(sloping, runs, spread, Found(brittle, np.ones(1)), settings, lambda *_: None)
+    found = Found(brittle, np.ones(1))
+    gait, speed = _robustly(sloping, runs, spread, found, found, settings, lambda *_: None)
     after = distribution(runs, draws, gait_rows([gait]), metric)
     assert np.quantile(after, 0.1) > 0.95 * speed > 20.0
 
@@ -83,7 +84,8 @@ def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
     """Half the robots of a 20 % spread cannot walk at such speeds: no error, and not just any gait."""
     settings, spread = Settings(spread=0.2), spread_of(nominal(), 0.2)
     points = np.array([settings.space.point(library.load(name).gait) for name in ("fast", "robust")])
-    gait, speed = _robustly(nominal(), runs, spread, Found(points, np.ones(2)), settings, lambda *_: None)
+    found = Found(points, np.ones(2))
+    gait, speed = _robustly(nominal(), runs, spread, found, found, settings, lambda *_: None)
     assert speed > 20.0
     assert gait.period_s > points[:, 0].max() * 2.0 + 2.0
 
