@@ -11,8 +11,8 @@ from bifa.identify.uncertainty import uncertainty
 from bifa.robot import Model
 from bifa.simulate import plant
 
+from .learnt_terms import learnt_curves
 from .robust import clustered_covariance, with_uncertainty
-from .sites import learnt_curves
 
 
 def completed_model(fit: Fit) -> Model:

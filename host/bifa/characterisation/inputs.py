@@ -74,6 +74,8 @@ class StepInputs:
 
 @dataclass(frozen=True)
 class PullInputs:
+    """`grip`: factor of the friction's coefficients, (n,) or one for all samples."""
+
     pulled_s: np.ndarray
     rate_mm_s: float
     pressure_psi: float
@@ -81,6 +83,7 @@ class PullInputs:
     channels: tuple[str, ...] = ("force_N", "pressure_psi")
     actuator: None = None
     positive_psi: None = None
+    grip: np.ndarray | float = 1.0
 
     @property
     def sample_s(self) -> float:
@@ -100,7 +103,7 @@ class PullInputs:
         A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change
         of a parameter would move it, and no derivative could find mu_s.
         """
-        wound, holding, kinetic = record["wound_N"], record["holding_N"], record["kinetic_N"]
+        wound, holding, kinetic = record["wound_N"], self.grip * record["holding_N"], self.grip * record["kinetic_N"]
         gives = np.flatnonzero(wound >= holding)
         if not len(gives):
             return wound

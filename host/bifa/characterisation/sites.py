@@ -2,164 +2,171 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-import numpy as np
-
-from bifa.identify.system import Correction, CorrectionSite
+from bifa.identify.system import CorrectionSite
 from bifa.robot import Model
-from bifa.robot.learnt import ROWS, LearntCurve
-from bifa.simulate import Plant, layout
-from bifa.simulate.learnt_curves import with_curve
+from bifa.robot.cpg import CHAMBERS
 
 from .curves import FittedCurve
 from .inputs import ANCHOR, STATIC, STEP, WALK
 
-_SPEED_M_S = 0.8  # that a snap-through does not reach
-_PRESSURE_PSI = (-14.5, 14.5)
-_PIPE_M = (-0.1, 0.6)
-_FIXED_SITES = (
-    CorrectionSite(
-        "filling", "rate of a chamber's pressure, eq. (2)", "pressure", "psi/s", *_PRESSURE_PSI, 0.3, True, (STEP, WALK)
-    ),
-    CorrectionSite(
-        "friction_speed",
-        "friction of an end by its speed, eq. (5)",
-        "velocity",
-        "N",
-        0.0,
-        _SPEED_M_S,
-        1.0,
-        True,
-        (WALK,),
-    ),
-    CorrectionSite(
-        "friction_place",
-        "friction of an end by its place in the pipe, eq. (5)",
-        "position",
-        "N",
-        *_PIPE_M,
-        1.0,
-        False,
-        (WALK,),
-    ),
-    CorrectionSite(
-        "body_damper",
-        "the body's damper, b v in eq. (1)",
-        "velocity",
-        "N",
-        -_SPEED_M_S,
-        _SPEED_M_S,
-        1.0,
-        False,
-        (STEP, WALK),
-    ),
-    CorrectionSite("pressure_sensor", "what the pressure sensors say", "pressure", "psi", *_PRESSURE_PSI, 0.1),
-    CorrectionSite("camera", "what the motion capture says", "position", "m", *_PIPE_M, 0.002, False, (WALK,)),
-    CorrectionSite(
-        "area_of_the_day", "the area a of eq. (2), as the day goes on", "place in the session", "", 0.0, 1.0, 0.01
-    ),
-    CorrectionSite(
-        "vacuum_of_the_day",
-        "the vacuum, as the day goes on",
-        "place in the session",
-        "psi",
-        0.0,
-        1.0,
-        0.1,
-        False,
-        (STEP, WALK),
-    ),
-    CorrectionSite(
-        "friction_of_the_day",
-        "the friction's coefficients, as the day goes on",
-        "place in the session",
-        "",
-        0.0,
-        1.0,
-        0.01,
-        False,
-        (ANCHOR, WALK),
-    ),
-)
-_FIXED = {site.name: site for site in _FIXED_SITES}
+_PRESSURE = ("pressure (psi)", -14.5, 14.5)
+_SPEED = ("velocity (m/s)", 0.0, 0.8)  # that a snap-through does not reach
+_VELOCITY = ("velocity (m/s)", -0.8, 0.8)
+_PLACE = ("position (m)", -0.1, 0.6)
+_PULLED = ("pulled distance (m)", 0.0, 0.08)
+_DAY = ("place in the session", 0.0, 1.0)
+_ACTUATORS = ("large", "small")
+PAIRS = tuple((mine, other) for mine in range(3) for other in range(3) if mine != other)
+
+
+def _site(name, term, over, change, rows=("",), experiments=(), knots=9) -> CorrectionSite:
+    """`over`: variable, lower and upper end; `change`: unit of the term, and how much of it matters."""
+    (variable, lower, upper), (unit, scale) = over, change
+    return CorrectionSite(name, term, variable, unit, lower, upper, scale, rows, experiments, knots)
+
+
+FIXED = {
+    site.name: site
+    for site in (
+        _site(
+            "filling",
+            "rate of a chamber's pressure, eq. (2)",
+            _PRESSURE,
+            ("psi/s", 0.3),
+            rows=("filling", "emptying"),
+            experiments=(STEP, WALK),
+        ),
+        _site(
+            "valves",
+            "when the valves switch",
+            _DAY,
+            ("s", 0.005),
+            rows=("to vacuum", "to positive"),
+            experiments=(STEP, WALK),
+            knots=2,
+        ),
+        _site(
+            "friction_speed",
+            "friction of an end by its speed, eq. (5)",
+            _SPEED,
+            ("N", 1.0),
+            rows=("forward", "backward"),
+            experiments=(WALK,),
+        ),
+        _site(
+            "friction_place",
+            "friction of an end by its place in the pipe, eq. (5)",
+            _PLACE,
+            ("N", 1.0),
+            experiments=(WALK,),
+            knots=129,
+        ),
+        _site(
+            "grip_speed",
+            "friction coefficient of an end, eq. (5), by its speed",
+            _SPEED,
+            ("", 0.03),
+            rows=("forward", "backward"),
+            experiments=(ANCHOR, WALK),
+        ),
+        _site(
+            "grip_place",
+            "friction coefficient of an end, eq. (5), by its place in the pipe",
+            _PLACE,
+            ("", 0.03),
+            experiments=(WALK,),
+            knots=129,
+        ),
+        _site(
+            "grip_pulled",
+            "friction coefficient of a pulled end, eq. (5), by how far it was pulled",
+            _PULLED,
+            ("", 0.03),
+            rows=("forward", "backward"),
+            experiments=(ANCHOR,),
+            knots=33,
+        ),
+        _site(
+            "body_damper",
+            "the body's damper, b v in eq. (1)",
+            _VELOCITY,
+            ("N", 1.0),
+            experiments=(STEP, WALK),
+        ),
+        _site("pressure_sensor", "what the pressure sensors say", _PRESSURE, ("psi", 0.1)),
+        _site(
+            "pressure_sensor_memory",
+            "what the pressure sensors say by how the pressure has changed, by how long ago",
+            ("time ago (s)", 0.0, 0.4),
+            ("psi/psi", 0.1),
+            rows=_ACTUATORS,
+            experiments=(STEP, WALK),
+            knots=17,
+        ),
+        _site(
+            "pressure_sensor_inflow",
+            "what the pressure sensors say by how far the chamber is from what the valve lets in",
+            ("pressure drop (psi)", -25.0, 25.0),
+            ("psi", 0.1),
+            rows=_ACTUATORS,
+            experiments=(STEP, WALK),
+        ),
+        _site(
+            "pressure_sensor_others",
+            "what the pressure sensors say by the pressure of each other chamber",
+            _PRESSURE,
+            ("psi", 0.1),
+            rows=tuple(f"{CHAMBERS[mine]} by {CHAMBERS[other]}" for mine, other in PAIRS),
+            experiments=(WALK,),
+        ),
+        _site(
+            "camera",
+            "what the motion capture says",
+            _PLACE,
+            ("m", 0.002),
+            experiments=(WALK,),
+        ),
+        _site(
+            "area_stroke",
+            "the area a of eq. (2), by the share of the stroke",
+            ("share of the stroke", 0.0, 1.0),
+            ("", 0.01),
+        ),
+        _site("area_of_the_day", "the area a of eq. (2), as the day goes on", _DAY, ("", 0.01)),
+        _site("vacuum_of_the_day", "the vacuum, as the day goes on", _DAY, ("psi", 0.1), experiments=(STEP, WALK)),
+        _site(
+            "friction_of_the_day",
+            "the friction's coefficients, as the day goes on",
+            _DAY,
+            ("", 0.01),
+            experiments=(ANCHOR, WALK),
+        ),
+    )
+}
 
 
 def sites(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, CorrectionSite]:
     """The sites of a model: both springs, and those that are every model's."""
     found = {}
-    for prefix in ("body", "small"):
+    for prefix, actuator in (("body", "large"), ("small", "small")):
         curve = model.body_stiffness if prefix == "body" else model.small_stiffness
         ends = curves[prefix].fit if prefix in curves else curve
-        found[f"{prefix}_spring"] = CorrectionSite(
-            name=f"{prefix}_spring",
-            term=f"force of the {'large' if prefix == 'body' else 'small'} actuator's spring, K(x) in eq. (1)",
-            variable="displacement",
-            unit="N",
-            lower=ends.lower_m,
-            upper=ends.upper_m,
-            scale=1.0,
+        stroke = ("displacement (m)", ends.lower_m, ends.upper_m)
+        found[f"{prefix}_spring"] = _site(
+            f"{prefix}_spring",
+            f"force of the {actuator} actuator's spring, K(x) in eq. (1)",
+            stroke,
+            ("N", 1.0),
             experiments=(STATIC, STEP, WALK) if prefix == "body" else (STATIC, STEP, ANCHOR, WALK),
         )
-    return found | _FIXED
-
-
-def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session: float = 0.0) -> Plant:
-    """The plant with the learnt curves in it. place_in_session: 0 for the day's first trial, 1 for its last."""
-    for correction in corrections:
-        name = correction.site
-        if name in ROWS:
-            lower, upper = _range(plant, name)
-            plant = with_curve(plant, name, LearntCurve(lower, upper, correction.table))
-        elif name.endswith("_of_the_day"):
-            plant = plant._replace(q=_of_the_day(plant.q, name, _at(_FIXED[name], correction, place_in_session)))
-    return plant
-
-
-def learnt_curves(plant: Plant, corrections: Sequence[Correction]) -> dict[str, LearntCurve]:
-    """Those of the corrections that are in the robot's equations, as a model has them; what is in the instruments or
-    passes with the day is none of the robot's."""
-    kept = [correction for correction in corrections if correction.site in ROWS]
-    return {c.site: LearntCurve(*_range(plant, c.site), c.table) for c in kept}
-
-
-def _range(plant: Plant, name: str) -> tuple[float, float]:
-    """Of the quantity that a learnt curve is a function of; a spring's is that of its own table."""
-    if name in _FIXED:
-        return _FIXED[name].lower, _FIXED[name].upper
-    table = plant.body_curve if name == "body_spring" else plant.small_curve
-    return float(table[0, 0]), float(table[0, 1])
-
-
-def corrected_readings(channels: dict[str, np.ndarray], corrections: Sequence[Correction]) -> dict[str, np.ndarray]:
-    """The channels with what the instruments add to them."""
-    for correction in corrections:
-        if correction.site == "pressure_sensor":
-            changed = {c: v + _at(_FIXED[correction.site], correction, v) for c, v in _like(channels, "pressure")}
-        elif correction.site == "camera":
-            walked = _like(channels, "displacement_head", "displacement_tail")
-            changed = {c: v + 1e3 * _at(_FIXED[correction.site], correction, 1e-3 * v) for c, v in walked}
-        else:
-            continue
-        channels = channels | changed
-    return channels
-
-
-def _like(channels: dict[str, np.ndarray], *starts: str) -> list[tuple[str, np.ndarray]]:
-    return [(name, values) for name, values in channels.items() if name.startswith(starts)]
-
-
-def _at(site: CorrectionSite, correction: Correction, where):
-    grid = np.linspace(site.lower, site.upper, correction.table.shape[1])
-    return np.interp(where, grid, correction.table[0])
-
-
-def _of_the_day(q: np.ndarray, name: str, value: float) -> np.ndarray:
-    q = q.copy()
-    if name == "area_of_the_day":
-        q[[layout.BODY + layout.AREA, layout.SMALL + layout.AREA]] *= 1.0 + value
-    elif name == "friction_of_the_day":
-        q[[layout.MU_S, layout.MU_K]] *= 1.0 + value
-    else:
-        q[layout.SUPPLY_NEGATIVE] += value
-    return q
+        found[f"{prefix}_loading"] = _site(
+            f"{prefix}_loading",
+            f"force of the {actuator} actuator's spring while it is loaded slowly, by direction",
+            stroke,
+            ("N", 1.0),
+            rows=("extending", "contracting"),
+            experiments=(STATIC,),
+        )
+    return found | FIXED

@@ -15,6 +15,7 @@ from bifa.data import Trial
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
 from bifa.simulate import Timeline, of_gait, of_samples, recorded_commands, refine, timeline
+from bifa.simulate.timeline import COMMANDS
 
 _ROUND_S = 0.05  # scripted steps begin at multiples of this
 _SPARE_S = 1e-6  # for times that fall on a sample
@@ -33,6 +34,12 @@ def shifted(commands: Timeline, late_s: float) -> Timeline:
         return commands
     time_s = np.where(commands.time_s > 0.0, commands.time_s + late_s, commands.time_s)
     return Timeline(time_s, commands.chamber, commands.command)
+
+
+def delayed(commands: Timeline, to_vacuum_s: float, to_positive_s: float) -> Timeline:
+    """As valves switch that take so long. Not sorted anew: a simulation does that."""
+    delay_s = np.where(commands.command == COMMANDS["positive"], to_positive_s, to_vacuum_s)
+    return Timeline(commands.time_s + delay_s, commands.chamber, commands.command)
 
 
 def switch_sd_s(trial: Trial) -> float:

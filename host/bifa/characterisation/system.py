@@ -31,7 +31,7 @@ from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate import Plant, layout
 from bifa.simulate.plant import mask, numbers, table
 
-from . import candidates, regressors, sites
+from . import candidates, learnt_terms, regressors, sites
 from .curves import FittedCurve
 from .errors import TooLittleDataError
 from .inputs import ANCHOR, STATIC, STEP, WALK, Inputs, inputs_of
@@ -118,10 +118,11 @@ class RobotSystem(System):
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
     ) -> Channels:
-        inputs: Inputs = trial.payload
+        place = self._place_in_session(trial)
+        inputs: Inputs = learnt_terms.corrected_inputs(trial.payload, corrections, place)
         try:
             plant, zeros = self._plant(self._key(theta, effects))
-            plant = sites.corrected(plant, corrections, self._place_in_session(trial))
+            plant = learnt_terms.corrected(plant, corrections, place)
             friction = theta.get("friction_scale", 1.0)
             if friction != 1.0 or inputs.positive_psi is not None:
                 plant = _altered(plant, friction, inputs.positive_psi)
@@ -129,7 +130,7 @@ class RobotSystem(System):
             channels = inputs.simulate(plant, zeros, tolerance_m, theta)
         except BifaError:  # a curve that is no longer bistable, values out of range
             return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
-        channels = sites.corrected_readings(channels, corrections)
+        channels = learnt_terms.corrected_readings(channels, corrections, inputs, plant)
         return {name: channels[name] for name in trial.channels}
 
     def _place_in_session(self, trial: Trial) -> float:

@@ -112,6 +112,8 @@ def _print(console, record: dict) -> None:
         table.add_row(name, *(f"{error[side]['by_experiment'][name]:.2f}" for side in ("before", "after")))
     table.add_row("noise floor", "", f"{error['noise_floor']['held_out']:.2f}")
     console.print(table)
+    for curve in record["learnt"]:
+        console.print(f"Learnt: a curve over {curve['variable']}, added to {curve['term']}.", highlight=False)
     if record["not_detectable_here"]:
         console.print(f"Not detectable with this data: {', '.join(record['not_detectable_here'])}.", highlight=False)
     if record["next_experiment"]["experiment"]:

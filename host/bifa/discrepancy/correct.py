@@ -1,4 +1,4 @@
-"""A curve learnt from data in the equation where the discrepancy lives: for what no effect of the library explains."""
+"""Curves learnt from data in the equations where the discrepancy lives: for what no effect of the library explains."""
 
 from __future__ import annotations
 
@@ -7,28 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.discrepancy.candidate import Candidate
+from bifa.discrepancy.candidate import Candidate, finish, judge
 from bifa.discrepancy.crew import Crew
+from bifa.discrepancy.errors import rms
 from bifa.discrepancy.linear import remaining_after, stacked
 from bifa.discrepancy.split import Split
-from bifa.identify.fit import Fit, evaluate_on, refit_on, starting_point
+from bifa.identify.fit import Fit, evaluate_on, starting_point
 from bifa.identify.problem import Point, Problem
 from bifa.identify.solve import Solution, solve
 from bifa.identify.structure import Structure
-from bifa.identify.system import Correction
+from bifa.identify.uncertainty import effective_samples
 
-_LEARNT = 3  # curves fitted, by what a linear regression promises
-_EFFORT = {"max_iterations": 15, "relative": 3e-4}
-
-
-@dataclass(frozen=True)
-class Corrected:
-    """An explanation with a learnt curve at `site`, which stands for `term`, fitted to all known trials."""
-
-    site: str
-    term: str
-    fitted: Fit
-    curve: Correction
+_MOST = 4  # curves in one correction
+_FITTED = 4  # sites where a curve is sketched, the most promising first,
+_PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
+_FRUITFUL = 0.1  # of what is left on unseen trials beyond noise: what a curve must take away
+_SKETCH = {"max_iterations": 8, "relative": 3e-3}
 
 
 @dataclass(frozen=True)
@@ -41,37 +35,58 @@ class _Promise:
     cost: float
 
 
-def learn_correction(candidates: Sequence[Candidate], split: Split, crew: Crew) -> Corrected | None:
-    """The best curve at any of the system's sites on top of any of `candidates`; None if none helps the
-    trials that it was not fitted to."""
-    promises = sorted((p for c in candidates for p in _promises(c, split)), key=lambda p: p.cost)[:_LEARNT]
+def learn_correction(candidates: Sequence[Candidate], split: Split, *, enough, crew: Crew) -> Candidate | None:
+    """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
+    `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
+    None if none helps."""
+    best: Candidate | None = None
+    while best is None or len(best.fitted.structure.sites) < _MOST:
+        grown = _best_grown([best] if best else candidates, split, crew)
+        if grown is None:
+            break
+        best = grown
+        if enough(best):
+            break
+    return best
+
+
+def _best_grown(parents: Sequence[Candidate], split: Split, crew: Crew) -> Candidate | None:
+    before = min(parents, key=lambda c: c.checked.cost)
+    promises = sorted((p for c in parents for p in _promises(c, split)), key=lambda p: p.cost)[:_FITTED]
+    promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
-    solutions = crew.map("learning a curve for", names, _fitted, [(p.problem, p.start) for p in promises])
-    best: tuple[float, Fit] | None = None
-    for promise, solution in zip(promises, solutions, strict=True):
-        fitted = Fit(promise.problem, solution, 1, 1)
-        unseen = evaluate_on(fitted, split.select).cost
-        if unseen < promise.candidate.checked.cost and (best is None or unseen < best[0]):
-            best = unseen, fitted
-    if best is None:
+    solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
+    grown = [judge(Fit(p.problem, solution, 1, 1), split) for p, solution in zip(promises, solutions, strict=True)]
+    best = min(grown, key=lambda c: c.checked.cost, default=before)
+    if before.checked.cost - best.checked.cost < _FRUITFUL * _excess(before.checked):
         return None
-    refitted = refit_on(best[1], split.known, relative=_EFFORT["relative"])
-    (site,) = refitted.structure.sites
-    (curve,) = refitted.structure.corrections(refitted.theta)
-    return Corrected(site, refitted.structure.system.correction_sites[site].term, refitted, curve)
+    best = min(best, judge(finish(best.fitted), split), key=lambda c: c.checked.cost)
+    return best if _rms(best) < _rms(before) else None
 
 
-def _fitted(problem: Problem, start: Point) -> Solution:
-    return solve(problem, start, **_EFFORT)
+def _rms(candidate: Candidate) -> float:
+    """On unseen trials, large residuals at their full size: a fit may not buy small ones with them."""
+    return rms(candidate.checked.scaled_residuals())
+
+
+def _excess(fit: Fit) -> float:
+    """Of a fit's cost, what noise at the floor would not leave."""
+    return max(fit.cost - 0.5 * effective_samples(fit), 0.0)
+
+
+def _sketched(problem: Problem, start: Point) -> Solution:
+    return solve(problem, start, **_SKETCH)
 
 
 def _promises(candidate: Candidate, split: Split) -> list[_Promise]:
-    """Every site's curve, regressed on what `candidate` leaves and its own parameters cannot take up."""
+    """Every further site's curve, regressed on what `candidate` leaves and its own parameters cannot take up."""
     parent = candidate.fitted
     basis, remaining = remaining_after(parent)
     found = []
     for site in parent.structure.system.correction_sites:
-        structure = Structure(parent.structure.system, candidate.effects, (site,))
+        if site in parent.structure.sites:
+            continue
+        structure = Structure(parent.structure.system, candidate.effects, (*parent.structure.sites, site))
         problem = Problem(structure, split.fit, parent.problem.floor)
         start = problem.start(starting_point(parent, structure), parent.solution.point.nuisances)
         knots = range(len(parent.structure.names), len(structure.names))
@@ -84,8 +99,8 @@ def _promises(candidate: Candidate, split: Split) -> list[_Promise]:
     return found
 
 
-def holds(corrected: Corrected, before: Fit, split: Split) -> bool:
-    """Whether the curve also helps on the trials that informed nothing."""
+def holds(corrected: Fit, before: Fit, split: Split) -> bool:
+    """Whether the curves also help on the trials that informed nothing."""
     if not split.final:
         return False
-    return evaluate_on(corrected.fitted, split.final).cost < evaluate_on(before, split.final).cost
+    return evaluate_on(corrected, split.final).cost < evaluate_on(before, split.final).cost

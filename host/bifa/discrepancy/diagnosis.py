@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from bifa.discrepancy.candidate import Candidate, judge
-from bifa.discrepancy.correct import Corrected, holds, learn_correction
+from bifa.discrepancy.correct import holds, learn_correction
 from bifa.discrepancy.crew import Crew, Progress
 from bifa.discrepancy.decide import Choice, Named, choose, dispersion_of
 from bifa.discrepancy.drift import find_drift
@@ -22,7 +22,7 @@ from bifa.errors import BifaError
 from bifa.identify.fit import Fit, evaluate_on, fit, refit_on, spread_starts
 from bifa.identify.noise import estimate_noise
 from bifa.identify.structure import Structure
-from bifa.identify.system import System
+from bifa.identify.system import Correction, CorrectionSite, System
 
 _ROUGH = 1e-3  # of the cost: where a fit of the base model may stop that is not added to
 _FINE = 1e-4  # of the cost: where a refit to all known trials may stop
@@ -40,8 +40,7 @@ class TooLittleDataError(BifaError):
 @dataclass(frozen=True)
 class Diagnosis:
     """The engine's answer. `verdict` is "none", "identified" or "unexplained"; `final` is the explanation
-    fitted to all known trials (the base model for "none", with the learnt curve if there is one that
-    holds)."""
+    fitted to all known trials (the base model for "none"), with the curves `learnt` if there are any that hold."""
 
     verdict: str
     effects: tuple[Named, ...]
@@ -53,7 +52,7 @@ class Diagnosis:
     remainder_before: Remainder
     remainder_after: Remainder
     signature: Signature
-    correction: Corrected | None
+    learnt: tuple[tuple[CorrectionSite, Correction], ...]
     next: NextExperiment
     search: Search
     choice: Choice
@@ -110,10 +109,12 @@ def diagnose(
     base_known, remainder = on_known(found.base, _ROUGH)
     drifts = find_drift(explained, seed=seed)
     verdict = _verdict(choice, left, remainder, drifts)
-    correction, final = None, explained
+    final = explained
     if verdict == "unexplained":
-        correction = _correction(found.base, choice.candidate, base_known, split, crew)
-        final = correction.fitted if correction else explained
+        tried = list(dict.fromkeys((found.base, choice.candidate)))
+        corrected = learn_correction(tried, split, enough=suffices, crew=crew)
+        if corrected and holds(on_known(corrected)[0], base_known, split):
+            final = on_known(corrected)[0]
     signature = describe(
         explained if verdict == "unexplained" else base_known,
         left if verdict == "unexplained" else remainder,
@@ -130,7 +131,7 @@ def diagnose(
         remainder,
         left,
         signature,
-        correction,
+        tuple((system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
         _next(choice, found) if verdict == "identified" else NextExperiment(),
         found,
         choice,
@@ -181,12 +182,6 @@ def _verdict(choice: Choice, left: Remainder, before: Remainder, drifts: tuple[s
     if choice.effects:
         return "identified"
     return "unexplained" if drifts else "none"
-
-
-def _correction(base: Candidate, chosen: Candidate, before: Fit, split: Split, crew: Crew) -> Corrected | None:
-    tried = [base] if chosen is base else [base, chosen]
-    corrected = learn_correction(tried, split, crew)
-    return corrected if corrected and holds(corrected, before, split) else None
 
 
 def _next(choice: Choice, found: Search) -> NextExperiment:

@@ -7,6 +7,7 @@ from typing import Any
 
 from bifa.discrepancy.diagnosis import Diagnosis
 from bifa.discrepancy.errors import Error
+from bifa.identify.system import Correction, CorrectionSite
 
 FORMAT = 1
 _TRIED = 8  # explanations listed, the best first
@@ -39,7 +40,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             "depends_on": list(d.signature.depends_on),
             "text": d.signature.text,
         },
-        "correction": d.correction and {"site": d.correction.site, "term": d.correction.term},
+        "learnt": [_curve(site, learnt) for site, learnt in d.learnt],
         "tried": [
             {"effects": list(c.effects), "error": _number(c.rms)}
             for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]
@@ -51,6 +52,19 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             "settings": dict(d.next.settings),
         },
         "seconds": _number(d.seconds),
+    }
+
+
+def _curve(site: CorrectionSite, learnt: Correction) -> dict[str, Any]:
+    """What is added to a term: a row of values each, at equal intervals from `lower` to `upper` of the variable."""
+    return {
+        "site": site.name,
+        "term": site.term,
+        "unit": site.unit,
+        "variable": site.variable,
+        "lower": site.lower,
+        "upper": site.upper,
+        "rows": {row: [_number(v) for v in values] for row, values in zip(site.rows, learnt.table, strict=True)},
     }
 
 

@@ -144,7 +144,7 @@ class ToySystem(System):
 
     @property
     def correction_sites(self) -> Mapping[str, CorrectionSite]:
-        site = CorrectionSite("spring", "force of the spring", "position", "N", -0.08, 0.08, 0.2, experiments=())
+        site = CorrectionSite("spring", "force of the spring", "position (m)", "N", -0.08, 0.08, 0.2, experiments=())
         return {site.name: site}
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:

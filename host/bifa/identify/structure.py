@@ -11,8 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from bifa.identify.system import Correction, CorrectionSite, Parameter, System, Theta, Trial
 
-_KNOTS = 9
-_TABLE_POINTS = 65
+_TABLE_INTERVALS = 64  # at least
 
 
 @dataclass(frozen=True)
@@ -105,13 +104,13 @@ class Structure:
         """Precision of the prior around the parameters' starts, shape (P, P): what was known of each, and for learnt
         curves knots within 10 scales of zero and bending within 3 scales a knot."""
         precision = np.diag([p.prior_sd**-2.0 if p.prior_sd else 0.0 for p in self.parameters])
-        bend = np.diff(np.eye(_KNOTS), 2, axis=0)
         for name in self.sites:
             site = self.system.correction_sites[name]
-            block = (np.eye(_KNOTS) / 10**2 + bend.T @ bend / 3**2) / site.scale**2
-            for row in range(_rows(site)):
+            bend = np.diff(np.eye(site.knots), 2, axis=0)
+            block = (np.eye(site.knots) / 10**2 + bend.T @ bend / 3**2) / site.scale**2
+            for row in range(len(site.rows)):
                 at = self.names.index(_knot_name(site, row, 0))
-                precision[at : at + _KNOTS, at : at + _KNOTS] = block
+                precision[at : at + site.knots, at : at + site.knots] = block
         return precision
 
     def moves(self, index: int, trial) -> bool:
@@ -127,10 +126,6 @@ class Structure:
         return not experiments or trial.experiment in experiments
 
 
-def _rows(site: CorrectionSite) -> int:
-    return 2 if site.by_direction else 1
-
-
 def _knot_name(site: CorrectionSite, row: int, knot: int) -> str:
     return f"correction.{site.name}.{row}_{knot}"
 
@@ -139,16 +134,17 @@ def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
     far = 50 * site.scale
     return [
         Parameter(_knot_name(site, row, knot), site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
-        for row in range(_rows(site))
-        for knot in range(_KNOTS)
+        for row in range(len(site.rows))
+        for knot in range(site.knots)
     ]
 
 
 def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
-    at = np.linspace(0, 1, _TABLE_POINTS)
-    knots = np.linspace(0, 1, _KNOTS)
+    each = max(_TABLE_INTERVALS // (site.knots - 1), 2)  # intervals of the table between two knots
+    at = np.linspace(0, 1, each * (site.knots - 1) + 1)
+    knots = np.linspace(0, 1, site.knots)
     rows = [
-        CubicSpline(knots, [theta[_knot_name(site, row, k)] for k in range(_KNOTS)], bc_type="natural")(at)
-        for row in range(_rows(site))
+        CubicSpline(knots, [theta[_knot_name(site, row, k)] for k in range(site.knots)], bc_type="natural")(at)
+        for row in range(len(site.rows))
     ]
     return Correction(site.name, np.array(rows))

@@ -118,9 +118,10 @@ class Trial:
 class CorrectionSite:
     """A term of an equation that may be replaced by "the model's term plus a curve learnt from data".
 
-    The curve is a function of `variable` between `lower` and `upper` (constant beyond), one curve for each
-    direction of motion if `by_direction`. `scale` is the change of the term that matters, in `unit`.
-    Example: site `body_spring`, term "force of the body's spring", variable "displacement", unit N.
+    The curve is a function of `variable` between `lower` and `upper` (constant beyond), a spline through as many
+    `knots`; one curve for each of `rows`, where it differs by direction, actuator or the like. `scale` is the change of
+    the term that matters, in `unit`. Example: site `body_spring`, term "force of the body's spring", variable
+    "displacement (m)", unit N.
     """
 
     name: str
@@ -130,8 +131,9 @@ class CorrectionSite:
     lower: float
     upper: float
     scale: float
-    by_direction: bool = False
+    rows: tuple[str, ...] = ("",)
     experiments: tuple[str, ...] = ()
+    knots: int = 9
 
 
 @dataclass(frozen=True)
@@ -139,8 +141,7 @@ class Correction:
     """A learnt curve at a site: `table` holds its values on a uniform grid from the site's lower to its
     upper end.
 
-    Shape (1, n), or (2, n) by direction: row 0 for increasing, row 1 for decreasing `variable`. Interpolate
-    linearly.
+    Shape (rows of the site, n). Interpolate linearly.
     """
 
     site: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bifa.report.evidence import draw_errors, draw_probabilities
+from bifa.report.evidence import draw_errors, draw_learnt, draw_probabilities
 from bifa.report.page import Page, Section, Table, both_palettes
 
 _LEADS = {
@@ -40,6 +40,12 @@ def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
             (effect["name"], ", ".join(f"{k} = {v:g}" for k, v in effect["parameters"].items())) for effect in effects
         ]
         sections.insert(0, Section("Evidence", tables=(Table(("effect", "parameters"), rows),), figures=(evidence,)))
+    for curve in record["learnt"]:
+        text = f"Added to the model: a curve for {curve['term']}."
+        figure = both_palettes(
+            lambda stream, dark, curve=curve: draw_learnt(curve, stream, dark), f"the curve over {curve['variable']}"
+        )
+        sections.append(Section("Learnt from the data", (text,), figures=(figure,)))
     hidden = record["not_detectable_here"]
     if hidden:
         sections.append(Section("Not detectable with this data", (", ".join(hidden),)))

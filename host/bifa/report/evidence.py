@@ -26,7 +26,7 @@ def draw_errors(error: Mapping, path: Path | BytesIO, dark: bool = False) -> Non
         axis.scatter(
             [before[n] for n in names], rows, s=60, color=palette.before, edgecolor=palette.ink, label="base model"
         )
-        axis.scatter([after[n] for n in names], rows, s=60, color=palette.after, label="with the effect", zorder=3)
+        axis.scatter([after[n] for n in names], rows, s=60, color=palette.after, label="after", zorder=3)
         axis.axvline(error["noise_floor"]["held_out"], color=palette.ink, linestyle=":", label="noise floor")
         axis.set_xscale("log")
         axis.set_yticks(rows, names)
@@ -53,6 +53,23 @@ def draw_probabilities(effects: Sequence[Mapping], path: Path | BytesIO, dark: b
         axis.set_xlim(0, 1.25)
         axis.set_xticks([0, 0.5, 1])
         axis.set_xlabel("probability")
+        figure.savefig(path, format=_format(path))
+        plt.close(figure)
+
+
+def draw_learnt(curve: Mapping, path: Path | BytesIO, dark: bool = False) -> None:
+    """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
+    with figure_style(dark) as palette:
+        import matplotlib.pyplot as plt
+
+        figure, axis = plt.subplots(figsize=(7.2, 2.4))
+        axis.axhline(0.0, color=palette.quiet, linewidth=0.8)
+        for row, values in curve["rows"].items():
+            axis.plot(np.linspace(curve["lower"], curve["upper"], len(values)), values, label=row)
+        axis.set_xlabel(curve["variable"])
+        axis.set_ylabel(f"added ({curve['unit']})" if curve["unit"] else "added (relative)")
+        if len(curve["rows"]) > 1:
+            axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         figure.savefig(path, format=_format(path))
         plt.close(figure)
 

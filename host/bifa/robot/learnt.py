@@ -16,6 +16,9 @@ ROWS = {
     "friction_speed": 2,
     "friction_place": 1,
     "body_damper": 1,
+    "grip_speed": 2,
+    "grip_place": 1,
+    "area_stroke": 1,
 }
 
 

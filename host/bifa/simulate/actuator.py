@@ -11,7 +11,7 @@ import math
 from bifa.simulate import layout
 from bifa.simulate.compiled import merged
 from bifa.simulate.hooks import chains
-from bifa.simulate.learnt import DAMPING, EMPTYING, FILLING, learnt_at
+from bifa.simulate.learnt import AREA, DAMPING, EMPTYING, FILLING, learnt_at
 
 _THRESHOLD = layout.THRESHOLD
 _ALPHA_S = layout.ALPHA_S
@@ -61,7 +61,10 @@ def area_at(plant, block, x):
     """a of eq. (2), in N/psi."""
     q = plant.q
     share = (x - q[block + layout.CONTRACTED]) / q[block + layout.STROKE]
-    return q[block + layout.AREA] * chains.area(plant.active, q, share)
+    factor = chains.area(plant.active, q, share)
+    if plant.learnt.shape[0]:
+        factor *= 1.0 + learnt_at(plant.learnt, AREA, share)[0]
+    return q[block + layout.AREA] * factor
 
 
 @merged

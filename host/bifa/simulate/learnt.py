@@ -14,7 +14,11 @@ FILLING, EMPTYING = 0, 1
 FORWARD, BACKWARD, PLACE = 2, 3, 4
 # N of the body's damper beyond b v of eq. (1), by velocity in m/s
 DAMPING = 5
-TERMS = 6
+# Share of the friction's coefficients beyond eq. (5), by an end's speed in m/s: forward, backward; and by its place
+GRIP_FORWARD, GRIP_BACKWARD, GRIP_PLACE = 6, 7, 8
+# Share of the area a beyond eq. (2), by the share of the stroke
+AREA = 9
+TERMS = 10
 
 
 @merged

@@ -7,13 +7,16 @@ import numpy as np
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import learnt
 
-_POINTS = 65  # of a row of `Plant.learnt`
+_POINTS = 513  # of a row of `Plant.learnt`: fine enough for the lips of a pipe's joints
 _TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
 _TERMS = {
     "filling": (learnt.FILLING, learnt.EMPTYING),
     "friction_speed": (learnt.FORWARD, learnt.BACKWARD),
     "friction_place": (learnt.PLACE,),
     "body_damper": (learnt.DAMPING,),
+    "grip_speed": (learnt.GRIP_FORWARD, learnt.GRIP_BACKWARD),
+    "grip_place": (learnt.GRIP_PLACE,),
+    "area_stroke": (learnt.AREA,),
 }
 
 

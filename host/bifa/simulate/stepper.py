@@ -16,7 +16,7 @@ from bifa.simulate import layout
 from bifa.simulate.actuator import area_at, convergence, pressure_after, remember, resistance
 from bifa.simulate.compiled import inner, merged
 from bifa.simulate.hooks import chains
-from bifa.simulate.learnt import BACKWARD, FORWARD, PLACE, learnt_at
+from bifa.simulate.learnt import BACKWARD, FORWARD, GRIP_BACKWARD, GRIP_FORWARD, GRIP_PLACE, PLACE, learnt_at
 
 # State y: positions in m, velocities in m/s, pressures in psi.
 X_HEAD, V_HEAD, X_TAIL, V_TAIL, P_BODY, X_SMALL_HEAD, V_SMALL_HEAD, P_HEAD, X_SMALL_TAIL, V_SMALL_TAIL, P_TAIL = range(
@@ -190,6 +190,8 @@ def coefficient(plant, direction, sliding):
     q, active = plant.q, plant.active
     rest = max(q[layout.MU_S], q[layout.MU_K])
     base = rest if sliding == 0.0 else q[layout.MU_K]
+    if plant.learnt.shape[0]:
+        base *= 1.0 + learnt_at(plant.learnt, GRIP_FORWARD if direction > 0.0 else GRIP_BACKWARD, sliding)[0]
     if not active & (chains.FRICTION | chains.GRIP):
         return base
     return chains.friction(active, q, base, rest, sliding) * chains.grip(active, q, direction)
@@ -199,14 +201,18 @@ def coefficient(plant, direction, sliding):
 def _limit(plant, rig, end, normal, direction, sliding, y):
     """Greatest friction of an end against motion in a direction."""
     force = coefficient(plant, direction, sliding) * normal
+    place = y[X_HEAD if end == 0 else X_TAIL]
+    if plant.learnt.shape[0]:
+        force *= 1.0 + learnt_at(plant.learnt, GRIP_PLACE, place)[0]
+        force += learnt_at(plant.learnt, FORWARD if direction > 0.0 else BACKWARD, sliding)[0]
+        force += learnt_at(plant.learnt, PLACE, place)[0]
     if end == 1:
-        force += chains.drag(plant.active, plant.q, y[X_TAIL])
+        force += chains.drag(plant.active, plant.q, place)
     if rig.terrain.shape[0]:
         row = 1 + 2 * end + (0 if direction > 0.0 else 1)
-        force += squeeze(rig.terrain, row, y[X_HEAD if end == 0 else X_TAIL])
+        force += squeeze(rig.terrain, row, place)
     if plant.learnt.shape[0]:
-        force += learnt_at(plant.learnt, FORWARD if direction > 0.0 else BACKWARD, sliding)[0]
-        force = max(force + learnt_at(plant.learnt, PLACE, y[X_HEAD if end == 0 else X_TAIL])[0], 0.0)
+        force = max(force, 0.0)
     return force
 
 

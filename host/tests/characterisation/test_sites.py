@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from independent_lab import BASELINE, Lab
 
-from bifa.characterisation.sites import corrected, learnt_curves
+from bifa.characterisation.learnt_terms import corrected, learnt_curves
 from bifa.characterisation.system import prepare
 from bifa.data import Dataset
 from bifa.identify.system import Correction
@@ -33,7 +33,7 @@ def curve(system, name, function) -> Correction:
     """`function` of the site's variable, on its grid, for every direction."""
     site = system.correction_sites[name]
     values = function(np.linspace(site.lower, site.upper, 65))
-    return Correction(name, np.array([values] * (2 if site.by_direction else 1)))
+    return Correction(name, np.array([values] * len(site.rows)))
 
 
 def trial_of(system, experiment):
@@ -89,6 +89,90 @@ def test_the_camera_reads_with_what_was_learnt(system, theta):
     assert scaled["displacement_tail_mm"][inside] == pytest.approx(
         1.03 * plain["displacement_tail_mm"][inside], abs=1e-6
     )
+
+
+def with_effect(theta, name, **values):
+    return theta | {f"{name}.{parameter}": value for parameter, value in values.items()}
+
+
+# A curve (a row each where they differ), the effect of the library that does the same, and where it shows.
+ALIKE = {
+    "valves": ([lambda _: 0.03], with_effect({}, "valve_latency", delay_s=0.03), ("step_response", "locomotion")),
+    "area_stroke": ([lambda x: 0.1 * x], with_effect({}, "area_variation", slope=0.1), ("static_loading",)),
+    "grip_speed": (
+        [lambda _: 0.15, lambda _: -0.15],
+        with_effect({}, "friction_direction", asymmetry=0.15),
+        ("anchor_pull", "locomotion"),
+    ),
+    "pressure_sensor_memory": (
+        [lambda ago_s: -np.exp(-ago_s / 0.05)],
+        with_effect({}, "sensor_lag", time_s=0.05),
+        ("step_response", "locomotion"),
+    ),
+    "pressure_sensor_inflow": (
+        [lambda drop_psi: 0.05 * drop_psi],
+        with_effect({}, "sensor_position", share=0.05),
+        ("step_response", "locomotion"),
+    ),
+}
+
+
+@pytest.mark.parametrize(("site", "experiment"), [(name, where) for name, alike in ALIKE.items() for where in alike[2]])
+def test_a_curve_in_the_shape_of_an_effect_is_that_effect(system, theta, site, experiment):
+    rows, effect, _ = ALIKE[site]
+    here = system.correction_sites[site]
+    at = np.linspace(here.lower, here.upper, 257)
+    every = rows if len(rows) == len(here.rows) else rows * len(here.rows)
+    learnt = Correction(site, np.array([np.broadcast_to(row(at), at.shape) for row in every]))
+    names = tuple({name.split(".")[0] for name in effect})
+    plain = system.predict(theta, (), trial_of(system, experiment))
+    want = system.predict(theta | effect, names, trial_of(system, experiment))
+    got = system.predict(theta, (), trial_of(system, experiment), corrections=(learnt,))
+    moved = {channel: np.abs(want[channel] - plain[channel]).max() for channel in want}
+    assert max(moved.values()) > 0.05
+    for channel, much in moved.items():
+        missed = np.sqrt(np.mean((got[channel] - want[channel]) ** 2))
+        assert missed < 0.05 * np.sqrt(np.mean((want[channel] - plain[channel]) ** 2)) + 2e-3, (channel, much)
+
+
+def test_a_pull_meets_the_friction_of_the_place_that_it_has_reached(system, theta):
+    site = system.correction_sites["grip_pulled"]
+    lip = np.exp(-0.5 * ((np.linspace(site.lower, site.upper, 513) - 0.03) / 0.004) ** 2)
+    pull = trial_of(system, "anchor_pull")
+    got, plain = (
+        system.predict(theta, (), pull, corrections=corrections)["force_N"]
+        for corrections in ((Correction("grip_pulled", np.array([0.4 * lip, 0.0 * lip])),), ())
+    )
+    pulled_m = 1e-3 * pull.payload.pulled_s * abs(pull.payload.rate_mm_s)
+    sliding = pulled_m > 0.01
+    want = 1.0 + 0.4 * np.exp(-0.5 * ((pulled_m - 0.03) / 0.004) ** 2)
+    assert got[sliding] / plain[sliding] == pytest.approx(want[sliding], rel=0.01)
+
+
+def test_a_sensor_sees_another_chamber_by_the_row_of_that_pair(system, theta):
+    site = system.correction_sites["pressure_sensor_others"]
+    table = np.zeros((len(site.rows), 9))
+    table[site.rows.index("head by body")] = 0.04 * np.linspace(site.lower, site.upper, 9)
+    got = predict(system, theta, "locomotion", Correction(site.name, table))
+    plain = predict(system, theta, "locomotion")
+    seen = plain["pressure_head_psi"] + 0.04 * plain["pressure_body_psi"]
+    assert got["pressure_head_psi"] == pytest.approx(seen, abs=1e-9)
+    assert got["pressure_tail_psi"] == pytest.approx(plain["pressure_tail_psi"], abs=1e-12)
+
+
+def test_slow_loading_differs_by_direction_on_the_actuator_that_it_was_learnt_for(system, theta):
+    table = np.array([np.full(9, 2.0), np.full(9, -1.0)])
+    large, small = (
+        [t for t in system.trials if t.experiment == "static_loading" and t.payload.actuator == which][-1]
+        for which in ("large", "small")
+    )
+    learnt = (Correction("body_loading", table),)
+    added = (
+        system.predict(theta, (), large, corrections=learnt)["force_N"] - system.predict(theta, (), large)["force_N"]
+    )
+    assert added == pytest.approx(np.where(large.payload.direction > 0, 2.0, -1.0))
+    untouched = system.predict(theta, (), small, corrections=learnt)["force_N"]
+    np.testing.assert_array_equal(untouched, system.predict(theta, (), small)["force_N"])
 
 
 def test_a_model_takes_along_what_was_learnt_in_the_robot_but_not_in_its_instruments(system, theta):

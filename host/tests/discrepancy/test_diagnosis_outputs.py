@@ -19,6 +19,13 @@ def test_page_says_the_effect_and_loads_nothing():
     assert "<script" not in page
 
 
+def test_page_shows_what_was_learnt_where_no_effect_explains_the_data():
+    record = as_record(diagnose(hide({"cubic_spring.stiffness_N_m3": 2000.0}, seed=15, withhold=["cubic_spring"])))
+    (curve,) = record["learnt"]
+    assert curve["term"] in render(diagnosis_page("toy", record))
+    assert curve["rows"][""][-1] * curve["rows"][""][0] < 0.0
+
+
 def test_unusable_input_ends_with_status_2(tmp_path):
     command = [sys.executable, "-c", "from bifa.cli import main; main()", "diagnose", str(tmp_path / "nothing")]
     ended = subprocess.run(command, capture_output=True, text=True)
