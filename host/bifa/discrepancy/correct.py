@@ -57,7 +57,9 @@ def _best_grown(parents: Sequence[Candidate], split: Split, crew: Crew) -> Candi
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
     solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
     grown = [judge(Fit(p.problem, solution, 1, 1), split) for p, solution in zip(promises, solutions, strict=True)]
-    best = min(grown, key=lambda c: c.checked.cost, default=before)
+    if not grown:
+        return None
+    best = min(grown, key=lambda c: c.checked.cost)
     if before.checked.cost - best.checked.cost < _FRUITFUL * _excess(before.checked):
         return None
     best = min(best, judge(finish(best.fitted), split), key=lambda c: c.checked.cost)

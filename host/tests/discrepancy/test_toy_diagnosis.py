@@ -7,7 +7,7 @@ import pytest
 
 from bifa.discrepancy.diagnosis import TooLittleDataError, diagnose
 from bifa.discrepancy.record import as_record
-from bifa.discrepancy.toy import hide
+from bifa.discrepancy.toy import ToySystem, hide
 
 SIZES = {
     "coulomb": {"coulomb.force_N": 0.1},
@@ -59,6 +59,13 @@ def test_a_learnt_curve_takes_the_place_of_a_withheld_spring():
     assert [site.name for site, _ in found.learnt] == ["spring"]
     gap_before = found.before.held_out - found.floor.held_out
     assert found.after.held_out - found.floor.held_out < 0.5 * gap_before
+
+
+def test_a_system_without_terms_to_learn_at_learns_nothing(monkeypatch):
+    monkeypatch.setattr(ToySystem, "correction_sites", {})
+    found = diagnose(hide({}, seed=16, repeats=6, drift=0.02))
+    assert found.verdict == "unexplained"
+    assert found.learnt == ()
 
 
 def test_a_drift_over_the_session_is_seen():
