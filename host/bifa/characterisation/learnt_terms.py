@@ -27,7 +27,7 @@ def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session:
     for correction in corrections:
         name = correction.site
         if name in ROWS:
-            plant = with_curve(plant, name, LearntCurve(*_range(plant, name), correction.table))
+            plant = with_curve(plant, name, _curve(plant, correction))
         elif name.endswith("_of_the_day"):
             plant = plant._replace(q=_of_the_day(plant.q, name, float(_at(correction, place_in_session))))
     return plant
@@ -36,8 +36,11 @@ def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session:
 def learnt_curves(plant: Plant, corrections: Sequence[Correction]) -> dict[str, LearntCurve]:
     """Those of the corrections that are in the robot's equations, as a model has them; what is in the instruments or
     passes with the day is none of the robot's."""
-    kept = [correction for correction in corrections if correction.site in ROWS]
-    return {c.site: LearntCurve(*_range(plant, c.site), c.table) for c in kept}
+    return {c.site: _curve(plant, c) for c in corrections if c.site in ROWS}
+
+
+def _curve(plant: Plant, correction: Correction) -> LearntCurve:
+    return LearntCurve(*_range(plant, correction.site), correction.table)
 
 
 def _range(plant: Plant, name: str) -> tuple[float, float]:
@@ -73,8 +76,8 @@ def corrected_readings(channels: Channels, corrections: Sequence[Correction], in
 def _loaded(correction: Correction, channels: Channels, inputs: Inputs, plant: Plant) -> Channels:
     if not isinstance(inputs, StaticInputs) or correction.site != _LOADING[inputs.actuator]:
         return {}
-    grid = np.linspace(*_range(plant, correction.site), correction.table.shape[1])
-    extending, contracting = (np.interp(inputs.displacement_m, grid, row) for row in correction.table)
+    ends_m = _range(plant, correction.site)
+    extending, contracting = (_between(ends_m, row, inputs.displacement_m) for row in correction.table)
     return {"force_N": channels["force_N"] + np.where(inputs.direction > 0, extending, contracting)}
 
 
@@ -140,8 +143,11 @@ def _like(channels: Channels, *starts: str) -> list[tuple[str, np.ndarray]]:
 
 def _at(correction: Correction, where, row: int = 0):
     site = FIXED[correction.site]
-    grid = np.linspace(site.lower, site.upper, correction.table.shape[1])
-    return np.interp(where, grid, correction.table[row])
+    return _between((site.lower, site.upper), correction.table[row], where)
+
+
+def _between(ends: tuple[float, float], values: np.ndarray, where):
+    return np.interp(where, np.linspace(*ends, len(values)), values)
 
 
 def _of_the_day(q: np.ndarray, name: str, value: float) -> np.ndarray:
