@@ -23,7 +23,7 @@ const uint16_t kSupplyEvery_ms = 100;
 /// every tick, conversion and sent byte otherwise, some thousand times a second for nothing.
 volatile bool attend = true;
 /// How often it looks without a byte: about as often as the EEPROM can take one.
-const uint8_t kAttendEvery_ms = 4;
+const uint8_t kAttendEvery_ms = 5;
 
 /// Tells the regulator its set-point when that has changed, and again from time to time.
 void tell_supply() {
@@ -48,9 +48,10 @@ bool board::on_tick(bool emergency_stop_pressed) {
   port.tick_in_interrupt();
   return controller.tick(emergency_stop_pressed);
 }
-void board::on_byte(uint8_t byte) {
+bool board::strobes() { return controller.strobes(); }
+void board::on_byte(uint8_t byte, bool damaged) {
   attend = true;
-  if (port.byte_in_interrupt(byte)) controller.stop_in_interrupt();
+  if (port.byte_in_interrupt(byte, damaged)) controller.stop_in_interrupt();
 }
 void board::on_emergency_stop() { controller.stop_in_interrupt(); }
 void board::on_round(const bifa::RawRound& round) { controller.converted_in_interrupt(round); }

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import cpp_commands
 import cpp_parameters
+import doc_parameters
 import doc_tables
+import py_ranges
 import py_tables
 from tables import WIRE_BYTES, command_table, parameter_table, table_hash
 
@@ -24,12 +26,14 @@ def generated() -> dict[Path, str]:
     protocol = ROOT / "docs/protocol.md"
     return {
         protocol: doc_tables.page(protocol.read_text(), parameters, commands),
+        ROOT / "docs/parameters.md": doc_parameters.page(parameters, commands),
         ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
         ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters),
         ROOT / "lib/commands/command_table.h": cpp_commands.command_header(commands),
         ROOT / "lib/commands/command_table.cpp": cpp_commands.command_source(commands),
         ROOT / "lib/link/message_table.h": cpp_commands.message_header(commands, set_size, agreed),
         ROOT / "lib/link/message_table.cpp": cpp_commands.message_source(commands, set_size),
+        ROOT / "host/bifa/ranges.py": py_ranges.module(parameters),
         ROOT / "host/bifa/link/table.py": py_tables.module(parameters, commands, agreed),
     }
 

@@ -5,6 +5,7 @@
 
 #include "converter.h"
 #include "pins.h"
+#include "start.h"
 #include "wires.h"
 
 namespace board {
@@ -16,6 +17,7 @@ const uint8_t kSetAtTick = 1 << COM1B1 | 1 << COM1B0;
 const uint8_t kClearAtTick = 1 << COM1B1;
 
 bool round_begins = false;
+volatile bool under_way = false;
 
 }  // namespace
 
@@ -40,8 +42,13 @@ void strobe_end() {
 // Interrupts may nest: a stop byte does not wait for the oscillators.
 ISR(TIMER1_COMPA_vect, ISR_NOBLOCK) {
   using namespace board;
+  watchdog_tick();
+  if (under_way) return;  // never twice, also when one hangs
+  under_way = true;
   converter_tick();
   if (round_begins) converter_begin_round();
   round_begins = on_tick(emergency_stop_pressed());
-  if (round_begins) TCCR1A = kSetAtTick;
+  if (round_begins && strobes()) TCCR1A = kSetAtTick;
+  watchdog_ticked();
+  under_way = false;
 }

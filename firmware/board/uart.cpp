@@ -12,7 +12,7 @@ namespace board {
 namespace {
 
 const uint32_t kBaud = 250000;
-const uint8_t kRingBytes = 100;
+const uint8_t kRingBytes = 92;
 const uint8_t kRest = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
 const uint8_t kSending = kRest | 1 << UDRIE0;
 
@@ -49,7 +49,10 @@ uint8_t bifa::output_room() {
   return out > head ? out - head - 1 : kRingBytes + out - head - 1;
 }
 
-ISR(USART_RX_vect) { board::on_byte(UDR0); }
+ISR(USART_RX_vect) {
+  const uint8_t errors = UCSR0A & (1 << DOR0 | 1 << FE0);  // of the byte that is read next
+  board::on_byte(UDR0, errors != 0);
+}
 
 ISR(USART_UDRE_vect) {
   using namespace board;

@@ -8,7 +8,7 @@ const char kCommandTexts[] BIFA_FLASH =
     "help [NAME]\0"
     "list everything, or explain one\0"
     "version\0"
-    "versions, and why the Uno last restarted\0"
+    "versions, cause of the last start\0"
     "status\0"
     "state, fault, pressures, valves, link\0"
     "show [NAME]\0"
@@ -18,19 +18,19 @@ const char kCommandTexts[] BIFA_FLASH =
     "run\0"
     "walk\0"
     "stop\0"
-    "stop walking or holding; all chambers vent\0"
+    "stop, and vent all chambers\0"
     "hold CHAMBER positive|vacuum|off\0"
     "inflate, evacuate or vent body, head or tail\0"
     "clear\0"
-    "release a stop (!) or a fault whose cause is gone\0"
+    "release a stop (!) or a fault\0"
     "stream on|off\0"
     "telemetry: one line (>) a sample\0"
     "plot on|off\0"
     "telemetry for the Serial Plotter\0"
     "save [NAME]\0"
-    "keep the parameters; without a name, for power-up\0"
+    "keep the parameters; without NAME for power-up\0"
     "load PRESET\0"
-    "take the parameters of a preset\0"
+    "use a preset\0"
     "presets\0"
     "list the presets\0"
     "forget PRESET\0"
@@ -38,9 +38,9 @@ const char kCommandTexts[] BIFA_FLASH =
     "defaults confirm\0"
     "erase all presets and settings\0"
     "zero confirm|factory\0"
-    "take the present pressures as zero; or undo that\0"
+    "take the pressures as zero; or undo that\0"
     "echo on|off\0"
-    "repeat what you type (for a bare terminal)\0";
+    "repeat what you type (bare terminal)\0";
 const char kResultTexts[] BIFA_FLASH =
     "ok\0"
     "no such command; type help\0"
@@ -50,14 +50,16 @@ const char kResultTexts[] BIFA_FLASH =
     "stopped: type clear first\0"
     "not in this state; type status\0"
     "no such preset; type presets\0"
-    "a name is 1 to 12 of a-z 0-9 _ -, not a factory preset's\0"
-    "no room left; forget a preset first\0"
+    "a name is 1 to 12 of a-z 0-9 _ -, not factory\0"
+    "no room left\0"
     "the EEPROM failed\0"
     "busy saving; try again\0"
-    "no begin, or a field was refused\0"
+    "no begin, or a part was refused\0"
     "the set arrived damaged\0"
     "its cause is still there; type status\0"
-    "times must not go backwards\0";
+    "times must not go backwards\0"
+    "pressures still move: rest 4 s first\0"
+    "more than 0.9 psi from zero\0";
 const char kChamberWords[] BIFA_FLASH =
     "body\0"
     "head\0"
@@ -81,11 +83,13 @@ const char kFaultWords[] BIFA_FLASH =
     "supply_control\0"
     "host_silent\0"
     "watchdog\0"
-    "brown_out\0";
+    "brown_out\0"
+    "restart\0";
 const char kStartCauseWords[] BIFA_FLASH =
     "power\0"
     "external\0"
     "brown_out\0"
-    "watchdog\0";
+    "watchdog\0"
+    "restart\0";
 
 }  // namespace bifa

@@ -26,6 +26,8 @@ enum class Result : uint8_t {
   kCheck,
   kFault,
   kOrder,
+  kUnrest,
+  kOffset,
 };
 
 /// The commands that people type.

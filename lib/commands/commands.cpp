@@ -6,22 +6,15 @@ namespace bifa {
 
 namespace {
 
+/// In the order of Verdict.
+const Result kResults[] BIFA_FLASH = {
+    Result::kOk,   Result::kLatched, Result::kRefused, Result::kFault,
+    Result::kFull, Result::kOrder,   Result::kUnrest,  Result::kOffset,
+};
+static_assert(sizeof kResults == static_cast<uint8_t>(Verdict::kOffset) + 1, "one for each verdict");
+
 __attribute__((noinline)) Result result_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kDone:
-      return Result::kOk;
-    case Verdict::kLatched:
-      return Result::kLatched;
-    case Verdict::kCauseStands:
-      return Result::kFault;
-    case Verdict::kFull:
-      return Result::kFull;
-    case Verdict::kOrder:
-      return Result::kOrder;
-    case Verdict::kRefused:
-      break;
-  }
-  return Result::kRefused;
+  return static_cast<Result>(flash_byte(&kResults[static_cast<uint8_t>(verdict)]));
 }
 
 bool is_hold(uint8_t chamber, uint8_t state) {
@@ -41,6 +34,7 @@ void Commands::begin(StartCause cause) {
     if (!is_valid(calibration)) calibration = {};
   }
   if (!store_.load(kStartPreset, wanted_)) wanted_ = factory_preset(0);
+  running_ = wanted_;
   controller_.begin(cause, wanted_, calibration);
 }
 
@@ -53,18 +47,30 @@ Result Commands::hold(uint8_t chamber, uint8_t state) {
   return result_of(controller_.hold(static_cast<Chamber>(chamber), static_cast<ChamberState>(state)));
 }
 
-Result Commands::schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state) {
-  if (!is_hold(chamber, state)) return Result::kRange;
-  return result_of(controller_.schedule_add(time_ms, static_cast<Chamber>(chamber), static_cast<ChamberState>(state)));
+Result Commands::schedule_clear() {
+  schedule_spoilt_ = false;
+  return result_of(controller_.schedule_clear());
 }
 
-Result Commands::schedule_clear() { return result_of(controller_.schedule_clear()); }
-Result Commands::schedule_start() { return result_of(controller_.schedule_start()); }
+Result Commands::schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state) {
+  if (schedule_spoilt_) return Result::kTransaction;
+  const Result result = is_hold(chamber, state)
+                            ? result_of(controller_.schedule_add(time_ms, static_cast<Chamber>(chamber),
+                                                                 static_cast<ChamberState>(state)))
+                            : Result::kRange;
+  schedule_spoilt_ = result != Result::kOk;
+  return result;
+}
+
+Result Commands::schedule_start() {
+  if (schedule_spoilt_) return Result::kTransaction;
+  return result_of(controller_.schedule_start());
+}
 
 void Commands::use(const ParameterSet& set) {
-  wanted_ = set;
+  running_ = wanted_ = set;
   pending_ = false;
-  controller_.apply(wanted_);
+  controller_.apply(running_);
 }
 
 Result Commands::take_over_soon(const ParameterSet& set) {
@@ -87,9 +93,9 @@ void Commands::follow(const Sample& sample) {
 
 Result Commands::set(ParameterId id, uint32_t value) {
   if (!in_range(id, value)) return Result::kRange;
-  ParameterSet changed = wanted_;
-  put_value(changed, id, value);
-  use(changed);
+  put_value(wanted_, id, value);
+  put_value(running_, id, value);
+  controller_.apply(running_);
   return Result::kOk;
 }
 

@@ -21,11 +21,12 @@ class Commands {
   Result stop();
   Result clear();
   Result hold(uint8_t chamber, uint8_t state);
-  Result schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state);
+  // A schedule as a whole: clear, entries, start. The first error makes start fail, until the schedule is cleared.
   Result schedule_clear();
+  Result schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state);
   Result schedule_start();
 
-  /// Changes one parameter (value in wire units) at once.
+  /// Changes one parameter (value in wire units) at once, also in a set that waits for the cycle boundary.
   Result set(ParameterId id, uint32_t value);
 
   // A new set as a whole: begin, fields, commit. The first error makes commit fail, and the old set goes on. While
@@ -62,10 +63,12 @@ class Commands {
 
   Controller& controller_;
   Store store_;
+  ParameterSet running_;
   ParameterSet wanted_;
   ParameterSet draft_;
   Draft draft_state_ = Draft::kNone;
   bool pending_ = false;
+  bool schedule_spoilt_ = false;
   uint16_t last_phase_ = 0;
 };
 

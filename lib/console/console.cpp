@@ -28,6 +28,15 @@ uint8_t find_command(const char* name) {
   }
   return kCommandCount;
 }
+/// Whether a command takes so many words, itself included, as its usage shows.
+bool takes_words(uint8_t command, uint8_t count) {
+  uint8_t most = 1, optional = 0;
+  for (const char* at = reinterpret_cast<const char*>(usage_of(command)); flash_byte(at) != '\0'; ++at) {
+    if (flash_byte(at) == ' ') ++most;
+    if (flash_byte(at) == '[') ++optional;
+  }
+  return count <= most && count + optional >= most;
+}
 uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
 }  // namespace
 
@@ -76,7 +85,7 @@ void Console::end_line() {
   if (spoilt_) {
     print(BIFA_TEXT("error the line arrived damaged\n"));
   } else if (too_long_) {
-    print(BIFA_TEXT("error the line is longer than 63 characters\n"));
+    print(BIFA_TEXT("error the line exceeds 63 characters\n"));
   } else {
     execute();
   }
@@ -97,7 +106,10 @@ void Console::execute() {
   }
   if (word_count_ == 0) return answer(Result::kOk);
   const uint8_t command = find_command(words_[0]);
-  if (command < kCommandCount) return dispatch(static_cast<CommandId>(command));
+  if (command < kCommandCount) {
+    commands_.controller().host_heard();
+    return dispatch(static_cast<CommandId>(command));
+  }
   answer(Result::kUnknown);
 }
 
@@ -106,37 +118,27 @@ bool Console::is(uint8_t word, FlashText text) const {
 }
 
 void Console::dispatch(CommandId id) {
-  const uint8_t arguments = word_count_ - 1;
+  if (!takes_words(static_cast<uint8_t>(id), word_count_)) return answer_usage(id);
   switch (id) {
     case CommandId::kHelp:
-      if (arguments == 0) return help();
-      if (arguments == 1) return help_on(words_[1]);
-      break;
+      return word_count_ == 1 ? help() : help_on(words_[1]);
     case CommandId::kVersion:
-      if (arguments > 0) break;
       version();
       return answer(Result::kOk);
     case CommandId::kStatus:
-      if (arguments > 0) break;
       status();
       return answer(Result::kOk);
     case CommandId::kShow:
-      if (arguments > 1) break;
       return show();
     case CommandId::kSet:
-      if (arguments != 2) break;
       return set();
     case CommandId::kRun:
-      if (arguments > 0) break;
       return answer(commands_.run());
     case CommandId::kStop:
-      if (arguments > 0) break;
       return answer(commands_.stop());
     case CommandId::kHold:
-      if (arguments != 2) break;
       return hold();
     case CommandId::kClear:
-      if (arguments > 0) break;
       return answer(commands_.clear());
     case CommandId::kStream:
       return switch_to(id, streaming_);
@@ -145,24 +147,19 @@ void Console::dispatch(CommandId id) {
     case CommandId::kEcho:
       return switch_to(id, echo_);
     case CommandId::kSave:
-      if (arguments > 1) break;
       return with_preset(&Commands::save);
     case CommandId::kLoad:
-      if (arguments != 1) break;
       return with_preset(&Commands::load);
     case CommandId::kForget:
-      if (arguments != 1) break;
       return with_preset(&Commands::forget);
     case CommandId::kPresets:
-      if (arguments > 0) break;
       return presets();
     case CommandId::kDefaults:
-      if (arguments != 1 || !is(1, BIFA_TEXT("confirm"))) break;
+      if (!is(1, BIFA_TEXT("confirm"))) break;
       return finish_later(commands_.defaults());
     case CommandId::kZero:
-      if (arguments != 1) break;
-      if (is(1, BIFA_TEXT("confirm"))) return finish_later(commands_.zero(false));
-      if (is(1, BIFA_TEXT("factory"))) return finish_later(commands_.zero(true));
+      if (is(1, BIFA_TEXT("confirm"))) return zero(false);
+      if (is(1, BIFA_TEXT("factory"))) return zero(true);
       break;
   }
   answer_usage(id);
@@ -202,7 +199,6 @@ void Console::poll(const LinkCounters& counters) {
 }
 
 void Console::switch_to(CommandId id, bool& flag) {
-  if (word_count_ != 2) return answer_usage(id);
   const bool on = is(1, BIFA_TEXT("on"));
   if (!on && !is(1, BIFA_TEXT("off"))) return answer_usage(id);
   flag = on;
@@ -219,7 +215,7 @@ void Console::help() {
     print(' ');
     print(name_of(static_cast<ParameterId>(i)));
   }
-  print(BIFA_TEXT("\n[try: set period_s 6, run, hold head positive, stop, help period_s\n"));
+  print(BIFA_TEXT("\n[try: set period_s 6, run, help run\n"));
   answer(Result::kOk);
 }
 
@@ -393,6 +389,19 @@ void Console::with_preset(Result (Commands::*command)(const char*)) {
     strncpy(name, words_[1], kNameSize);
   }
   finish_later((commands_.*command)(name));
+}
+
+void Console::zero(bool factory) {
+  print_offsets();
+  const Result started = commands_.zero(factory);
+  if (started == Result::kOk) print_offsets();
+  finish_later(started);
+}
+
+void Console::print_offsets() {
+  print(BIFA_TEXT("[offset psi "));
+  print_triple(commands_.controller().calibration().offset_mpsi);
+  print('\n');
 }
 
 void Console::presets() {

@@ -7,6 +7,8 @@ namespace bifa {
 namespace {
 
 const uint8_t kRestShift = 5;  ///< the slow means follow within about a third of a second
+const int16_t kRest_mpsi = 40;
+const uint16_t kRest_ms = 4000;
 const uint8_t kPhaseShift = 16;
 const uint16_t kSilenceUnit_ms = 10;
 
@@ -21,9 +23,11 @@ int16_t clipped(int32_t pressure_mpsi) {
 void Controller::begin(StartCause cause, const ParameterSet& set, const Calibration& calibration) {
   apply(set);
   calibrate(calibration);
-  const Critical guard;
-  if (cause == StartCause::kWatchdog) trip(Fault::kWatchdog, kNoChannel, 0, 0);
-  if (cause == StartCause::kBrownOut) trip(Fault::kBrownOut, kNoChannel, 0, 0);
+  if (cause == StartCause::kPower || cause == StartCause::kExternal) return;
+  const Fault fault = cause == StartCause::kWatchdog   ? Fault::kWatchdog
+                      : cause == StartCause::kBrownOut ? Fault::kBrownOut
+                                                       : Fault::kRestart;
+  trip(fault, kNoChannel, 0, 0);
 }
 
 Verdict Controller::run() {
@@ -96,15 +100,28 @@ Verdict Controller::schedule_start() {
 Verdict Controller::measure_zero(Calibration& measured) const {
   const Critical guard;
   if (supervisor_.state() != State::kIdle) return Verdict::kRefused;
+  if (rested_ < kRest_ms / kSamplePeriod_ms) return Verdict::kUnrest;
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     measured.offset_mpsi[i] = static_cast<int16_t>((rest_[i] + (1 << (kRestShift - 1))) >> kRestShift);
   }
-  return is_valid(measured) ? Verdict::kDone : Verdict::kRefused;
+  return is_valid(measured) ? Verdict::kDone : Verdict::kOffset;
 }
 
 void Controller::calibrate(const Calibration& calibration) {
   const Critical guard;
   calibration_ = calibration;
+}
+
+void Controller::mark_strobe() {
+  const Critical guard;
+  // In the last millisecond of a period the next strobe can no longer be called off.
+  strobes_left_out_ = kMarkPause + (since_sample_ms_ == kSamplePeriod_ms - 1 ? 1 : 0);
+  marked_ = sampling_.sequence + 1 + strobes_left_out_;
+}
+
+uint16_t Controller::marked() const {
+  const Critical guard;
+  return marked_;
 }
 
 bool Controller::take_sample(Sample& sample) {
@@ -202,6 +219,7 @@ void Controller::follow_schedule() {
 void Controller::begin_sample() {
   const Critical guard;
   ++sampling_.sequence;
+  if (strobes_left_out_ > 0) --strobes_left_out_;
   sampling_.time_us = uptime_ms_ * 1000;
   sampling_.state = supervisor_.state();
   sampling_.valves = supervisor_.valves().bits();
@@ -213,10 +231,17 @@ void Controller::begin_sample() {
 
 void Controller::finish_sample() {
   round_complete_ = false;
+  if (rested_ < UINT16_MAX) ++rested_;
   int16_t pressure_mpsi[kChamberCount];
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     const int16_t raw_mpsi = sensor_mpsi(round_.sum[i]);
-    rest_[i] += raw_mpsi - (rest_[i] >> kRestShift);
+    const int16_t mean_mpsi = static_cast<int16_t>(rest_[i] >> kRestShift);
+    rest_[i] += raw_mpsi - mean_mpsi;
+    const int16_t moved_mpsi = mean_mpsi - place_[i];
+    if (moved_mpsi > kRest_mpsi || moved_mpsi < -kRest_mpsi) {
+      place_[i] = mean_mpsi;
+      rested_ = 0;
+    }
     pressure_mpsi[i] = clipped(static_cast<int32_t>(raw_mpsi) - calibration_.offset_mpsi[i]);
     sampling_.pressure_mpsi[i] = pressure_mpsi[i];
   }
@@ -240,8 +265,9 @@ void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
 }
 
 void Controller::watch_host() {
+  if (host_timeout_ms_ == 0) return;
   if (host_silence_ms_ < UINT16_MAX) ++host_silence_ms_;
-  if (host_timeout_ms_ == 0 || host_silence_ms_ < host_timeout_ms_ || !supervisor_.moves_air()) return;
+  if (host_silence_ms_ < host_timeout_ms_ || !supervisor_.moves_air()) return;
   trip(Fault::kHostSilent, kNoChannel, static_cast<int16_t>(host_silence_ms_ / kSilenceUnit_ms),
        static_cast<int16_t>(host_timeout_ms_ / kSilenceUnit_ms));
 }

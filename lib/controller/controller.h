@@ -17,6 +17,8 @@
 
 namespace bifa {
 
+const uint8_t kMarkPause = 10;  ///< strobes that a mark leaves out
+
 /// What became of a request.
 enum class Verdict : uint8_t {
   kDone,
@@ -25,6 +27,8 @@ enum class Verdict : uint8_t {
   kCauseStands,  ///< clear: the emergency stop is still pressed, or the cause of the fault is still there
   kFull,         ///< the schedule is full
   kOrder,        ///< the schedule's times must not go backwards
+  kUnrest,       ///< the pressures have not rested for long enough
+  kOffset,       ///< a pressure is too far from zero to be an offset
 };
 
 /// What a person or the host wants to know at once.
@@ -39,14 +43,14 @@ struct Status {
   uint16_t samples_lost;  ///< samples that the main loop did not take in time
 };
 
-/// Why the chip started.
-enum class StartCause : uint8_t { kPower, kExternal, kBrownOut, kWatchdog };
+/// Why the chip started. kRestart: by itself, because it hung with interrupts off or its supply dipped.
+enum class StartCause : uint8_t { kPower, kExternal, kBrownOut, kWatchdog, kRestart };
 
 class Controller {
  public:
   // ---- main loop ----
 
-  /// Once, before the first tick. After a watchdog reset or a brown-out the controller begins in a fault.
+  /// Once, before the first tick. When the chip restarted by itself the controller begins in a fault.
   void begin(StartCause cause, const ParameterSet& set, const Calibration& calibration);
 
   Verdict run();   ///< from idle; the oscillators start settled, the body at phase 0
@@ -63,9 +67,16 @@ class Controller {
   Verdict schedule_clear();
   Verdict schedule_start();
 
-  /// Takes the present pressures as zero: only while idle, and only if each is within kGreatestOffset_mpsi.
+  /// Takes the present pressures as zero: only while idle, if they have rested for 4 s (within 0.04 psi: a count of the
+  /// converter), and if each is within kGreatestOffset_mpsi.
   Verdict measure_zero(Calibration& measured) const;
   void calibrate(const Calibration& calibration);
+  const Calibration& calibration() const { return calibration_; }
+
+  /// Leaves out the next kMarkPause strobes, not the samples: an instrument that stamps the strobe sees the pause.
+  void mark_strobe();
+  /// The number of the sample whose strobe is the first after the last such pause; 0 before any.
+  uint16_t marked() const;
 
   /// The next sample, if there is a new one.
   bool take_sample(Sample& sample);
@@ -82,9 +93,12 @@ class Controller {
 
   // ---- interrupts ----
 
-  /// Every millisecond. Returns true if the strobe is to rise with the next tick and a round of conversions to begin
-  /// then (every tenth tick). Other interrupts may nest in it: what they share is guarded inside.
+  /// Every millisecond. Returns true if a round of conversions is to begin with the next tick, and the strobe to rise
+  /// then if it strobes() (every tenth tick). Other interrupts may nest in it: what they share is guarded inside.
   bool tick(bool emergency_stop_pressed);
+
+  /// After a tick that returned true: whether the strobe really is to rise, or is left out for a mark.
+  bool strobes() const { return strobes_left_out_ == 0; }
 
   /// A round of the converter is complete.
   void converted_in_interrupt(const RawRound& round);
@@ -106,6 +120,8 @@ class Controller {
   // What is small comes first: an AVR reaches 64 bytes from an object's beginning with its shortest instructions.
   uint32_t uptime_ms_ = 0;
   uint8_t since_sample_ms_ = 0;
+  uint8_t strobes_left_out_ = 0;  ///< still to be left out
+  uint16_t marked_ = 0;
   volatile bool emergency_stop_ = false;
 
   uint16_t wanted_mpsi_ = 0;
@@ -119,7 +135,9 @@ class Controller {
   Sample sample_ = {};
   bool sample_waits_ = false;
   uint16_t samples_lost_ = 0;
-  int32_t rest_[kChamberCount] = {};  ///< slow means of the raw pressures, mpsi * 2^kRestShift
+  int32_t rest_[kChamberCount] = {};   ///< slow means of the raw pressures, mpsi * 2^kRestShift
+  int16_t place_[kChamberCount] = {};  ///< where they have rested for so many samples
+  uint16_t rested_ = 0;
 
   TripLimit trip_limit_;
   DacWatch dac_;

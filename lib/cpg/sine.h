@@ -9,8 +9,8 @@ namespace bifa {
 /// between two entries of the table fits 8, which makes the interpolation a single multiplication.
 const int16_t kSineOne = 16000;
 
-const uint8_t kSineSteps = 128;  ///< of a quarter turn
-extern const uint16_t kSineTable[kSineSteps + 1];
+const uint8_t kSineSteps = 128;                    ///< of a quarter turn
+extern const uint16_t kSineTable[kSineSteps + 2];  ///< one beyond the quarter: read, and multiplied by 0, at its end
 
 /// kSineOne * sin(2 pi angle / 2^16). Greatest error 2 (1.2e-4 of 1); exactly odd.
 inline __attribute__((always_inline)) int16_t sine(uint16_t angle) {

@@ -15,8 +15,12 @@ void HostPort::poll() {
   session_.poll();
   console_.poll({frames_bad_, receiver_.lost()});
   uint8_t byte;
-  // A bounded number, so that a flood does not keep telemetry and EEPROM waiting.
-  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && receiver_.pop(byte); --budget) take(byte);
+  // A bounded number, so that a flood keeps neither telemetry nor EEPROM waiting; and one line at most, whose answer may
+  // take a twentieth of a second, so that the watchdog is not kept waiting either.
+  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && receiver_.pop(byte); --budget) {
+    take(byte);
+    if (!in_frame_ && (byte == '\n' || byte == '\r')) break;
+  }
   if (receiver_.overrun() && !receiver_.has_input()) recover();
   Sample sample;
   if (!commands_.controller().take_sample(sample)) return;
@@ -31,7 +35,6 @@ void HostPort::take(uint8_t byte) {
     if (in_frame_) {
       decoder_.feed(byte);
     } else {
-      commands_.controller().host_heard();
       console_.feed(byte);
     }
     return;

@@ -18,7 +18,7 @@ class HostPort {
   void begin(uint16_t boot_nonce, StartCause cause);
 
   /// In the receive interrupt. True: the byte asks for a stop; let the controller stop before returning.
-  bool byte_in_interrupt(uint8_t byte) { return receiver_.push(byte); }
+  bool byte_in_interrupt(uint8_t byte, bool damaged = false) { return receiver_.push(byte, damaged); }
   /// In the interrupt of the 1 kHz timer.
   void tick_in_interrupt() { receiver_.tick(); }
 

@@ -33,6 +33,7 @@ const Inward kInward[] BIFA_FLASH = {
     {0x39, 6},  // schedule_add
     {0x3A, 0},  // schedule_start
     {0x3C, 0},  // read_clock
+    {0x3D, 0},  // mark
 };
 }  // namespace
 

@@ -10,7 +10,7 @@ namespace bifa {
 
 const uint8_t kProtocolVersion = 1;
 /// Changes whenever anything changes that host and Uno must agree on.
-const uint32_t kTableHash = 0x7D108464UL;
+const uint32_t kTableHash = 0x6908B694UL;
 
 enum class MessageId : uint8_t {
   kVersion = 0x01,
@@ -36,6 +36,7 @@ enum class MessageId : uint8_t {
   kScheduleAdd = 0x39,
   kScheduleStart = 0x3A,
   kReadClock = 0x3C,
+  kMark = 0x3D,
   kHello = 0x80,
   kDone = 0x81,
   kExpected = 0x82,
@@ -77,13 +78,13 @@ struct StreamMessage {
 } __attribute__((packed));
 static_assert(sizeof(StreamMessage) == 1, "no holes");
 
-/// keep the parameters; without a name, for power-up.
+/// keep the parameters; without NAME for power-up.
 struct SaveMessage {
   char preset[12];
 } __attribute__((packed));
 static_assert(sizeof(SaveMessage) == 12, "no holes");
 
-/// take the parameters of a preset.
+/// use a preset.
 struct LoadMessage {
   char preset[12];
 } __attribute__((packed));
@@ -101,7 +102,7 @@ struct ForgetMessage {
 } __attribute__((packed));
 static_assert(sizeof(ForgetMessage) == 12, "no holes");
 
-/// take the present pressures as zero; or undo that.
+/// take the pressures as zero; or undo that.
 struct ZeroMessage {
   uint8_t factory;
 } __attribute__((packed));
@@ -181,11 +182,12 @@ struct PresetReportMessage {
 } __attribute__((packed));
 static_assert(sizeof(PresetReportMessage) == 14, "no holes");
 
-/// answer to read_clock.
+/// answer to read_clock; marked: number of the sample with the first strobe after the pause of the last mark, 0 before any.
 struct ClockReportMessage {
   uint32_t time_us;
+  uint16_t marked;
 } __attribute__((packed));
-static_assert(sizeof(ClockReportMessage) == 4, "no holes");
+static_assert(sizeof(ClockReportMessage) == 6, "no holes");
 
 /// telemetry, 100 a second; phase in turns / 65536; command: 2 bits a chamber (0 off, 1 vacuum, 2 positive).
 struct SampleMessage {

@@ -7,15 +7,20 @@ const uint8_t kDelimiter = 0x00;
 const uint8_t kOtherFrame = 0xFF;
 }  // namespace
 
-bool Receiver::push(uint8_t byte) {
+bool Receiver::push(uint8_t byte, bool damaged) {
+  if (damaged) overrun_ = true;
   if (in_frame_ && (silence_ms_ > kSilenceMs || (frame_length_ == kLongestFrame && byte != kDelimiter))) {
     in_frame_ = false;
     put(kDelimiter);
   }
   silence_ms_ = 0;
 
+  if (byte == '!' && (!in_frame_ || frame_length_ == 0)) {
+    if (in_frame_) put(kDelimiter);  // no frame begins so: the delimiter was a stray one
+    in_frame_ = false;
+    return true;
+  }
   if (!in_frame_) {
-    if (byte == '!') return true;
     if (byte == kDelimiter) {
       in_frame_ = true;
       frame_length_ = 0;

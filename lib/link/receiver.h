@@ -2,8 +2,9 @@
 // rest.
 //
 // Text and frames share the port; a frame stands between 0x00 bytes. A frame ends at its delimiter, at its greatest
-// length or after 20 ms of silence, so that a stray 0x00 cannot hide a `!` for long. In the queue every frame stands
-// between exactly one 0x00 and another, whatever came over the line.
+// length or after 20 ms of silence, so that a stray 0x00 cannot hide a `!` for long; and no frame begins with `!`, so that
+// it cannot hide one that follows at once. In the queue every frame stands between exactly one 0x00 and another, whatever
+// came over the line.
 #pragma once
 
 #include "message_table.h"
@@ -15,8 +16,9 @@ const uint8_t kLongestFrame = 1 + 1 + 2 + kLongestInward + 4;
 
 class Receiver {
  public:
-  /// Takes one byte; to be called in the receive interrupt. True: stop at once.
-  bool push(uint8_t byte);
+  /// Takes one byte; to be called in the receive interrupt. True: stop at once. `damaged`: its stop bit was missing, or
+  /// others before it were lost.
+  bool push(uint8_t byte, bool damaged = false);
 
   /// Counts the silence; call it once a millisecond.
   void tick() {
@@ -28,12 +30,12 @@ class Receiver {
 
   bool has_input() const { return head_ != tail_; }
 
-  /// Whether bytes were lost for want of room. Then nothing more is queued until the queue is empty and recover() called.
+  /// Whether bytes were lost or damaged. Then nothing more is queued until the queue is empty and recover() called.
   bool overrun() const { return overrun_; }
   /// Starts to queue again (with interrupts off); returns whether the next byte belongs to a frame.
   bool recover();
 
-  /// How many bytes were lost so far, up to 65535.
+  /// How many bytes were lost so far, at least, up to 65535.
   uint16_t lost() const { return lost_; }
 
  private:

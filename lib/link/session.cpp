@@ -100,7 +100,7 @@ bool Session::query(const Frame& frame, const LinkCounters& counters) {
       send_preset(frame.sequence, fields_of<PresetsMessage>(frame).index);
       return true;
     case MessageId::kReadClock: {
-      const ClockReportMessage message = {commands_.controller().uptime_ms() * 1000};
+      const ClockReportMessage message = {commands_.controller().uptime_ms() * 1000, commands_.controller().marked()};
       send(MessageId::kClockReport, frame.sequence, &message, sizeof message);
       return true;
     }
@@ -126,6 +126,9 @@ Result Session::execute(const Frame& frame) {
     }
     case MessageId::kStream:
       streaming_ = fields_of<StreamMessage>(frame).on != 0;
+      return Result::kOk;
+    case MessageId::kMark:
+      commands_.controller().mark_strobe();
       return Result::kOk;
     case MessageId::kSave:
       return commands_.save(name);

@@ -16,22 +16,22 @@ const char kParameterTexts[] BIFA_FLASH =
     "phase of the tail ahead of the body (psi_13)\0"
     "duty_body\0"
     "\0"
-    "part of the cycle at vacuum: contracting (d_1)\0"
+    "vacuum part of the cycle: contracts (d_1)\0"
     "duty_head\0"
     "\0"
-    "part of the cycle at vacuum: not gripping (d_2)\0"
+    "vacuum part of the cycle: lets go (d_2)\0"
     "duty_tail\0"
     "\0"
-    "part of the cycle at vacuum: not gripping (d_3)\0"
+    "vacuum part of the cycle: lets go (d_3)\0"
     "coupling_per_s\0"
     "1/s\0"
-    "how fast the oscillators pull into their phases (alpha_phi)\0"
+    "oscillators' pull into phase (alpha_phi)\0"
     "pressure_psi\0"
     "psi\0"
     "set-point of the positive supply\0"
     "host_timeout_s\0"
     "s\0"
-    "vent after such a silence of the computer; 0 = never\0";
+    "vent after such silence of the host; 0 = never\0";
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {
     {500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1},  // period_s

@@ -15,12 +15,12 @@ struct ParameterSet {
   uint32_t period_us;  ///< period_s: time of one cycle (1/f)
   uint32_t psi12_mdeg;  ///< psi12_deg: phase of the head ahead of the body (psi_12)
   uint32_t psi13_mdeg;  ///< psi13_deg: phase of the tail ahead of the body (psi_13)
-  uint16_t duty_body_e4;  ///< duty_body: part of the cycle at vacuum: contracting (d_1)
-  uint16_t duty_head_e4;  ///< duty_head: part of the cycle at vacuum: not gripping (d_2)
-  uint16_t duty_tail_e4;  ///< duty_tail: part of the cycle at vacuum: not gripping (d_3)
-  uint16_t coupling_milli_per_s;  ///< coupling_per_s: how fast the oscillators pull into their phases (alpha_phi)
+  uint16_t duty_body_e4;  ///< duty_body: vacuum part of the cycle: contracts (d_1)
+  uint16_t duty_head_e4;  ///< duty_head: vacuum part of the cycle: lets go (d_2)
+  uint16_t duty_tail_e4;  ///< duty_tail: vacuum part of the cycle: lets go (d_3)
+  uint16_t coupling_milli_per_s;  ///< coupling_per_s: oscillators' pull into phase (alpha_phi)
   uint16_t pressure_mpsi;  ///< pressure_psi: set-point of the positive supply
-  uint16_t host_timeout_ms;  ///< host_timeout_s: vent after such a silence of the computer; 0 = never
+  uint16_t host_timeout_ms;  ///< host_timeout_s: vent after such silence of the host; 0 = never
 };
 static_assert(sizeof(ParameterSet) == 24, "a set has no holes");
 

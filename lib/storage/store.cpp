@@ -162,7 +162,7 @@ void Store::next_copy() {
     marks_[slot_] &= ~kDoomed;
     return;
   }
-  finish(Result::kEeprom);
+  end(Result::kEeprom);
 }
 
 void Store::poll() {
@@ -209,20 +209,20 @@ void Store::step_void() {
         marks_[slot] &= ~kDoomed;
         continue;
       }
-      if (has(slot, kFailed)) return finish(Result::kEeprom);
+      if (has(slot, kFailed)) return end(Result::kEeprom);
       marks_[slot] |= kFailed;  // unless it reads back as void the next time
       eeprom_write(slot_address(slot), kRecordVoid);
       return;
     }
   }
-  finish(Result::kOk);
+  end(Result::kOk);
+  repair();  // the next one; a cell that cannot be written is not tried for ever
 }
 
-void Store::finish(Result result) {
+void Store::end(Result result) {
   if (busy()) result_ = result;
   job_ = Job::kNone;
   scan();
-  if (result == Result::kOk) repair();  // the next one; a cell that cannot be written is not tried for ever
 }
 
 }  // namespace bifa

@@ -61,7 +61,7 @@ class Store {
   void next_copy();
   void step_write();
   void step_void();
-  void finish(Result result);
+  void end(Result result);
 
   uint32_t sequence_ = 0;  ///< of the newest record of all
   uint8_t cursor_ = 0;     ///< where to look for the next free slot

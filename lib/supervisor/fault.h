@@ -17,6 +17,7 @@ enum class Fault : uint8_t {
   kHostSilent,     ///< value: silence, limit: host_timeout_s (both in 10 ms)
   kWatchdog,       ///< the firmware hung and was restarted
   kBrownOut,       ///< the supply of the board broke down
+  kRestart,        ///< one of the two: the bootloader hides which
 };
 
 const uint8_t kNoChannel = 3;

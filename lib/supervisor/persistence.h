@@ -1,4 +1,4 @@
-// A condition that has to last before it counts.
+// Conditions that have to last before they count.
 #pragma once
 
 #include <stdint.h>
@@ -23,6 +23,26 @@ class Persistence {
 
  private:
   uint8_t count_ = 0;
+};
+
+/// Adds up for how long a condition is met, and forgets slowly: `step` for each time that it is met, minus one for each
+/// that it is not.
+class Accumulation {
+ public:
+  /// Returns whether the sum has reached `limit` (at most 255 - `step`).
+  bool met(bool condition, uint8_t step, uint8_t limit) {
+    if (condition) {
+      if (sum_ < limit) sum_ += step;
+    } else if (sum_ > 0) {
+      --sum_;
+    }
+    return sum_ >= limit;
+  }
+
+  void reset() { sum_ = 0; }
+
+ private:
+  uint8_t sum_ = 0;
 };
 
 }  // namespace bifa

@@ -4,6 +4,10 @@
 
 namespace bifa {
 
+namespace {
+const int16_t kJump = static_cast<int32_t>(kJump_mpsi) * kOversampling * 1024 / 37500;  ///< in sums of conversions
+}
+
 void TripLimit::follow(uint16_t set_point_mpsi) {
   const uint16_t highest = kGreatestTrip_mpsi - kTripMargin_mpsi;
   const int16_t target = static_cast<int16_t>(set_point_mpsi < highest ? set_point_mpsi : highest) + kTripMargin_mpsi;
@@ -18,17 +22,25 @@ SensorWatch::Finding SensorWatch::look(uint16_t sum, int16_t pressure_mpsi, int1
   if (out_of_range_.met(!is_in_range(sum), kRangeTime_ms / kSamplePeriod_ms)) {
     return {Fault::kSensorRange, sensor_mpsi(sum < kSensorLow ? kSensorLow : kSensorHigh)};
   }
-  if (above_.met(pressure_mpsi > trip_mpsi, kTripTime_ms / kSamplePeriod_ms)) return {Fault::kOverPressure, trip_mpsi};
-
-  if (sum != last_sum_) switched_ = false;
-  if (chamber != ChamberState::kOff && chamber != last_driven_) {
-    switched_ = last_driven_ != ChamberState::kOff;
-    last_driven_ = chamber;
-    unmoved_.reset();
+  if (above_.met(pressure_mpsi > trip_mpsi, kTripStep, kTripStep * (kTripTime_ms / kSamplePeriod_ms))) {
+    return {Fault::kOverPressure, trip_mpsi};
   }
-  const bool unmoved = unmoved_.met(sum == last_sum_ && switched_, kStuckTime_ms / kSamplePeriod_ms);
-  last_sum_ = sum;
-  if (unmoved) return {Fault::kSensorStuck, static_cast<int16_t>(kStuckTime_ms)};
+
+  const int16_t moved = static_cast<int16_t>(sum) - last_sum_;
+  last_sum_ = static_cast<int16_t>(sum);
+  const int8_t jump = moved > kJump ? 1 : moved < -kJump ? -1 : 0;
+  const bool turned = jump * last_jump_ < 0;
+  last_jump_ = jump;
+  if (jumping_.met(turned, kJumpStep, kJumpLimit)) return {Fault::kSensorStuck, kJump_mpsi};
+
+  if (moved != 0) switched_ = false;
+  if (chamber != ChamberState::kOff && chamber != last_driven_) {
+    if (last_driven_ != ChamberState::kOff) switched_ = true;
+    last_driven_ = chamber;
+  }
+  if (unmoved_.met(moved == 0 && switched_, kStuckTime_ms / kSamplePeriod_ms)) {
+    return {Fault::kSensorStuck, static_cast<int16_t>(kStuckTime_ms)};
+  }
   return {Fault::kNone, 0};
 }
 
@@ -40,6 +52,7 @@ bool SensorWatch::stands(Fault fault, uint16_t sum, int16_t pressure_mpsi, int16
 
 void SensorWatch::reset() {
   above_.reset();
+  jumping_.reset();
   out_of_range_.reset();
   unmoved_.reset();
   last_driven_ = ChamberState::kOff;

@@ -7,17 +7,24 @@
 
 namespace bifa {
 
-/// Over-pressure: so far above the set-point, for so long.
+/// Over-pressure: so far above the set-point, for so long. Shorter times add up, and are forgotten in four times as long.
 const int16_t kTripMargin_mpsi = 2000;
 const uint16_t kTripTime_ms = 200;
+const uint8_t kTripStep = 4;
 /// The sensor's range ends at 15 psi: from here on it could not tell over-pressure from itself.
 const int16_t kGreatestTrip_mpsi = 14800;
 /// After the set-point is lowered the trip follows it no faster than air can leave.
 const int16_t kTripFall_mpsi_per_sample = 20;
 
 const uint16_t kRangeTime_ms = 50;
-/// A valve has switched and for so long not the least bit of the reading has moved.
+/// A valve has switched and for so long, however often it switches again, not the least bit of the reading has moved.
 const uint16_t kStuckTime_ms = 2000;
+
+/// A reading that goes up by more than this in one sample and down in the next, or down and up, follows no air: an open
+/// input. A valve may make it turn twice. Three a tenth of a second, for a second or so, are too many.
+const int16_t kJump_mpsi = 1000;
+const uint8_t kJumpStep = 3;
+const uint8_t kJumpLimit = 100;
 
 const uint8_t kSamplePeriod_ms = 10;
 
@@ -51,10 +58,12 @@ class SensorWatch {
   void reset();
 
  private:
-  Persistence above_;
+  Accumulation above_;
+  Accumulation jumping_;
   Persistence out_of_range_;
   Persistence unmoved_;
-  uint16_t last_sum_ = 0;
+  int16_t last_sum_ = 0;
+  int8_t last_jump_ = 0;  ///< 1 up, -1 down
   ChamberState last_driven_ = ChamberState::kOff;
   bool switched_ = false;  ///< since the reading last moved
 };

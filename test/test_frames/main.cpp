@@ -70,12 +70,51 @@ static void test_stops_outside_and_inside_frames() {
   TEST_ASSERT_FALSE(push(receiver, inside, sizeof inside));
   TEST_ASSERT_TRUE(receiver.push('!'));
   receiver.push(0);  // a stray delimiter
+  receiver.push(1);
   TEST_ASSERT_FALSE(receiver.push('!'));
   for (uint8_t ms = 0; ms < 21; ++ms) receiver.tick();
   TEST_ASSERT_TRUE(receiver.push('!'));
   receiver.push(0);
-  for (uint8_t i = 0; i < kLongestFrame; ++i) TEST_ASSERT_FALSE(receiver.push('!'));
+  for (uint8_t i = 0; i < kLongestFrame; ++i) TEST_ASSERT_FALSE(receiver.push(1));
   TEST_ASSERT_TRUE(receiver.push('!'));
+}
+
+static void test_no_frame_begins_with_a_stop_so_a_stray_delimiter_does_not_hide_one() {
+  Receiver receiver;
+  uint8_t out[128];
+  const uint8_t bytes[] = {'a', 0, '!', 'b', 0, 0, '!', 'c'};
+  TEST_ASSERT_TRUE(push(receiver, bytes, 3));
+  TEST_ASSERT_TRUE(push(receiver, bytes + 3, 5));
+  const uint8_t expected[] = {'a', 0, 0, 'b', 0, 0, 'c'};
+  TEST_ASSERT_EQUAL(sizeof expected, drain(receiver, out));
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(expected, out, sizeof expected);
+}
+
+// What a host sends to stop, after a frame of another message: any one byte of it all replaced, lost or doubled.
+static void test_a_stop_survives_any_single_damaged_byte() {
+  const uint8_t before[] = {0, 0, 0x02, 0x13, 0x12, 0x07, 0x44, 0x5A, 0x7E, 0x10, 0};
+  uint8_t sent[sizeof before + 2 + kStopFrameBytes + 2];
+  const uint8_t size = sizeof sent;
+  memcpy(sent, before, sizeof before);
+  sent[sizeof before] = sent[sizeof before + 1] = 0;
+  flash_copy(sent + sizeof before + 2, kStopFrame, kStopFrameBytes);
+  sent[size - 2] = 0;
+  sent[size - 1] = '!';
+  for (uint8_t place = 0; place < size; ++place) {
+    for (uint16_t value = 0; value < 0x100; ++value) {  // its own value: undamaged
+      Receiver receiver;
+      bool stop = push(receiver, sent, place);
+      stop = receiver.push(static_cast<uint8_t>(value)) || stop;
+      stop = push(receiver, sent + place + 1, size - place - 1) || stop;
+      TEST_ASSERT_TRUE(stop);
+    }
+    for (uint8_t doubled = 0; doubled < 2; ++doubled) {
+      Receiver receiver;
+      bool stop = push(receiver, sent, place + doubled);
+      stop = push(receiver, sent + place + !doubled, size - place - !doubled) || stop;
+      TEST_ASSERT_TRUE(stop);
+    }
+  }
 }
 
 static void test_in_the_queue_every_frame_stands_between_two_delimiters() {
@@ -103,11 +142,27 @@ static void test_an_overrun_is_told_and_ends() {
   TEST_ASSERT_EQUAL('y', out[0]);
 }
 
+static void test_what_the_receiver_lost_or_damaged_is_counted_and_spoils_what_came_with_it() {
+  Receiver receiver;
+  uint8_t out[128];
+  push(receiver, reinterpret_cast<const uint8_t*>("set "), 4);
+  receiver.push('5', true);
+  receiver.push('\n');
+  TEST_ASSERT_EQUAL_UINT16(2, receiver.lost());
+  TEST_ASSERT_TRUE(receiver.overrun());
+  TEST_ASSERT_EQUAL(4, drain(receiver, out));
+  receiver.recover();
+  TEST_ASSERT_TRUE(receiver.push('!', true));
+}
+
 static void run() {
   RUN_TEST(test_check_values);
   RUN_TEST(test_the_stop_frame_stops_at_its_last_byte);
   RUN_TEST(test_the_stop_frame_decodes_and_no_other_stops);
   RUN_TEST(test_stops_outside_and_inside_frames);
+  RUN_TEST(test_no_frame_begins_with_a_stop_so_a_stray_delimiter_does_not_hide_one);
+  RUN_TEST(test_a_stop_survives_any_single_damaged_byte);
+  RUN_TEST(test_what_the_receiver_lost_or_damaged_is_counted_and_spoils_what_came_with_it);
   RUN_TEST(test_in_the_queue_every_frame_stands_between_two_delimiters);
   RUN_TEST(test_an_overrun_is_told_and_ends);
 }

@@ -23,14 +23,11 @@ def console(
     With its input from a pipe it sends the lines one by one, prints the answers, and ends with status 1 if one was an
     error.
     """
-    from rich.console import Console
-
     from bifa.link import Uno
     from bifa.link.terminal import settle
-    from bifa.live.ending import end_like_ctrl_c
     from bifa.rig import open_rig
+    from bifa.screen import Console
 
-    end_like_ctrl_c()
     with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
         with Console(stderr=True).status("waiting for the Uno"):
             uno.connect()
@@ -47,6 +44,7 @@ def _pipe(uno, rig) -> bool:
     from bifa.link.terminal import type_line
 
     good = True
+    uno.session.lines.clear()  # its greeting: who reads a pipe wants answers
     for line in sys.stdin:
         lines = type_line(uno, line.rstrip("\r\n"), rig.clock)
         typer.echo("\n".join(lines))

@@ -2,7 +2,14 @@
 
 from bifa.link.clock import Clock, WallClock
 from bifa.link.clock_relation import ClockRelation, HostTime
-from bifa.link.errors import LinkError, MismatchError, NoAnswerError, RefusedError, RestartedError
+from bifa.link.errors import (
+    LinkError,
+    MismatchError,
+    NoAnswerError,
+    RefusedError,
+    RestartedError,
+    StillMovingError,
+)
 from bifa.link.session import Counters, Hello
 from bifa.link.transport import PortGoneError, Transport
 from bifa.link.units import ParameterError
@@ -23,6 +30,7 @@ __all__ = [
     "RestartedError",
     "Sample",
     "Status",
+    "StillMovingError",
     "Transport",
     "Uno",
     "WallClock",

@@ -12,6 +12,21 @@ class NoAnswerError(LinkError):
     """Nothing came back in time, in spite of repeating."""
 
 
+class AbandonedError(LinkError):
+    """The session was taken from the thread that was waiting for an answer."""
+
+
+class StillMovingError(LinkError):
+    """A stop was not confirmed, and something had been asked of the Uno that turns valves on."""
+
+    def __init__(self, reason: object) -> None:
+        """`reason` says why nobody knows."""
+        super().__init__(
+            f"{reason}\nTHE ROBOT MAY STILL BE MOVING: the stop is not confirmed. "
+            "Press the emergency stop (D2) or shut off the air"
+        )
+
+
 class RestartedError(LinkError):
     """The Uno restarted, or another host took over, in the middle of a session."""
 

@@ -80,6 +80,9 @@ def encode_name(name: str) -> bytes:
 
 
 STOP_FRAME = encode(COMMANDS["stop_now"], 0, (), OPEN_SEED)
+# A whole stop frame is acted on in whatever state the receiver is, since two delimiters lead it. So one of two acts,
+# whichever byte the line damages, loses or invents.
+STOP = (STOP_FRAME + b"!") * 2
 
 _REPORTS_BY_NUMBER = {report.number: report for report in REPORTS.values()}
 

@@ -13,9 +13,11 @@ from dataclasses import dataclass, field
 from bifa import __version__
 from bifa.link import frames
 from bifa.link.clock import Clock
-from bifa.link.errors import MismatchError, NoAnswerError, RefusedError, RestartedError
+from bifa.link.errors import AbandonedError, MismatchError, NoAnswerError, RefusedError, RestartedError
 from bifa.link.table import COMMANDS, PROTOCOL_VERSION, START_CAUSES, TABLE_HASH
 from bifa.link.transport import Transport
+from bifa.link.words import word
+from bifa.printable import printable
 
 WINDOW = 4
 RESEND_AFTER_S = 0.03
@@ -58,7 +60,7 @@ class Hello:
             report["protocol"],
             report["table_hash"],
             report["boot_nonce"],
-            START_CAUSES[report["start_cause"]],
+            word(START_CAUSES, report["start_cause"]),
             report["session_key"],
         )
 
@@ -94,6 +96,7 @@ class Session:
         self.lines: deque[str] = deque(maxlen=1000)
         self.hello: Hello | None = None
         self.on_sample: Callable[[frames.Report], None] = lambda report: None
+        self.on_renewed: Callable[[], None] = lambda: None
         self._random = random.Random(seed)
         self._splitter = frames.Splitter()
         self._key = 0
@@ -101,6 +104,20 @@ class Session:
         self._outstanding: deque[_Request] = deque()
         self._hellos: deque[Hello] = deque(maxlen=8)
         self._go_back = False
+        self._is_calling = False  # also after a call that never came to its end
+        self._is_abandoned = False
+
+    def successor(self) -> "Session":
+        """Another session on the same line, which knows nothing of what this one has under way; not yet connected."""
+        return Session(self.transport, self.clock, self._random.getrandbits(32))
+
+    def send_stop(self) -> None:
+        """The real-time stop; says nothing about its success, and may be called from any thread at any moment."""
+        self.transport.write(frames.STOP)
+
+    def abandon(self) -> None:
+        """Whatever thread waits in this session gets an AbandonedError; there is no way back."""
+        self._is_abandoned = True
 
     def connect(self, timeout_s: float = 5.0) -> Hello:
         """Wait for the Uno and open a session; anything of an earlier one is void.
@@ -123,8 +140,17 @@ class Session:
         self._key = key
         self._sequence = 0
         self._outstanding.clear()
+        self._is_calling = False
         self.hello = hello
         return hello
+
+    def _renew(self, timeout_s: float) -> None:
+        """A new session with the same Uno, so that what an interrupted call has under way is neither taken for the
+        answer to another nor carried out later."""
+        nonce = self.hello.boot_nonce if self.hello else None
+        if self.connect(timeout_s).boot_nonce != nonce:
+            raise RestartedError("the Uno restarted; connect again and repeat")
+        self.on_renewed()
 
     def _greet(self, name: str, values: tuple, deadline: float) -> Hello:
         """Send an open message again and again until a hello comes."""
@@ -143,11 +169,13 @@ class Session:
 
     def poll(self, timeout_s: float = 0.0) -> None:
         """Take in what has arrived, waiting at most `timeout_s` for something."""
+        if self._is_abandoned:
+            raise AbandonedError("the session has been ended from outside")
         data = self.transport.read(max(timeout_s, LEAST_WAIT_S) if timeout_s > 0 else 0.0)
         now = self.clock.now()
         for kind, content in self._splitter.feed(data):
             if kind == "line":
-                self.lines.append(content.decode("ascii", "replace"))
+                self.lines.append(printable(content.decode("ascii", "replace")))
                 continue
             report = frames.decode(content, frames.session_seed(self._key))
             if report is None:
@@ -181,9 +209,21 @@ class Session:
         """Carry out commands in order, several under way at once.
 
         `timeout_s` is the longest time without any progress. The first command that is refused raises RefusedError;
-        the ones after it may have been carried out.
+        the ones after it may have been carried out. After a call that was interrupted, or not answered, the next one
+        begins with a new session.
         """
-        queue = deque(commands)
+        if self._is_calling:
+            self._renew(timeout_s)
+        self._is_calling = True
+        try:
+            answers = self._carry_out(deque(commands), timeout_s)
+        except (RefusedError, RestartedError):
+            self._is_calling = False
+            raise
+        self._is_calling = False
+        return answers
+
+    def _carry_out(self, queue: deque, timeout_s: float) -> list[Answer]:
         answers: list[Answer] = []
         refused: RefusedError | None = None
         progress_s = self.clock.now()
@@ -207,7 +247,7 @@ class Session:
                 self._outstanding.clear()
                 raise NoAnswerError(
                     f"the Uno has not answered for {timeout_s:g} s ({self.counters.bad} bad frames, "
-                    f"{self.counters.resent} sent again); check the cable, then connect again"
+                    f"{self.counters.resent} sent again); check the cable, then try again"
                 )
         if refused is not None:
             raise refused

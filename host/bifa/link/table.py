@@ -27,7 +27,7 @@ class Message(NamedTuple):
 
 
 PROTOCOL_VERSION = 1
-TABLE_HASH = 0x7D108464
+TABLE_HASH = 0x6908B694
 NAME_BYTES = 12
 
 PARAMETERS = (
@@ -38,17 +38,17 @@ PARAMETERS = (
     Parameter('psi13_deg', 'deg', 3, 0, 360000, 90000,
               'phase of the tail ahead of the body (psi_13)'),
     Parameter('duty_body', '', 4, 0, 10000, 5000,
-              'part of the cycle at vacuum: contracting (d_1)'),
+              'vacuum part of the cycle: contracts (d_1)'),
     Parameter('duty_head', '', 4, 0, 10000, 5000,
-              'part of the cycle at vacuum: not gripping (d_2)'),
+              'vacuum part of the cycle: lets go (d_2)'),
     Parameter('duty_tail', '', 4, 0, 10000, 5000,
-              'part of the cycle at vacuum: not gripping (d_3)'),
+              'vacuum part of the cycle: lets go (d_3)'),
     Parameter('coupling_per_s', '1/s', 3, 0, 20000, 10000,
-              'how fast the oscillators pull into their phases (alpha_phi)'),
+              "oscillators' pull into phase (alpha_phi)"),
     Parameter('pressure_psi', 'psi', 3, 0, 14000, 8500,
               'set-point of the positive supply'),
     Parameter('host_timeout_s', 's', 3, 0, 60000, 0,
-              'vent after such a silence of the computer; 0 = never'),
+              'vent after such silence of the host; 0 = never'),
 )
 
 # struct format of a parameter set, on the wire and in EEPROM
@@ -86,6 +86,7 @@ COMMANDS = {
     'schedule_add': Message('schedule_add', 0x39, 'session', '<IBB', (('time_ms', 1), ('chamber', 1), ('state', 1))),
     'schedule_start': Message('schedule_start', 0x3A, 'session', '<', ()),
     'read_clock': Message('read_clock', 0x3C, 'session', '<', ()),
+    'mark': Message('mark', 0x3D, 'session', '<', ()),
 }
 
 # messages from the Uno
@@ -96,7 +97,7 @@ REPORTS = {
     'status_report': Message('status_report', 0x83, 'session', '<BBBhhI3h3h3hBBIHHHH', (('state', 1), ('fault', 1), ('fault_channel', 1), ('fault_value', 1), ('fault_limit', 1), ('fault_time_ms', 1), ('fault_lowest_mpsi', 3), ('fault_highest_mpsi', 3), ('pressure_mpsi', 3), ('valves', 1), ('flags', 1), ('uptime_ms', 1), ('frames_bad', 1), ('frames_repeated', 1), ('bytes_lost', 1), ('samples_lost', 1))),
     'set_report': Message('set_report', 0x84, 'session', '<B24s', (('pending', 1), ('set', 1))),
     'preset_report': Message('preset_report', 0x85, 'session', '<BB12s', (('count', 1), ('source', 1), ('preset', 1))),
-    'clock_report': Message('clock_report', 0x86, 'session', '<I', (('time_us', 1),)),
+    'clock_report': Message('clock_report', 0x86, 'session', '<IH', (('time_us', 1), ('marked', 1))),
     'sample': Message('sample', 0x90, 'stream', '<HIB3h3HBB', (('sequence', 1), ('time_us', 1), ('state', 1), ('pressure_mpsi', 3), ('phase', 3), ('command', 1), ('valves', 1))),
 }
 
@@ -110,41 +111,43 @@ RESULTS = (
     ('latched', 'stopped: type clear first'),
     ('refused', 'not in this state; type status'),
     ('no_preset', 'no such preset; type presets'),
-    ('name', "a name is 1 to 12 of a-z 0-9 _ -, not a factory preset's"),
-    ('full', 'no room left; forget a preset first'),
+    ('name', 'a name is 1 to 12 of a-z 0-9 _ -, not factory'),
+    ('full', 'no room left'),
     ('eeprom', 'the EEPROM failed'),
     ('busy', 'busy saving; try again'),
-    ('transaction', 'no begin, or a field was refused'),
+    ('transaction', 'no begin, or a part was refused'),
     ('check', 'the set arrived damaged'),
     ('fault', 'its cause is still there; type status'),
     ('order', 'times must not go backwards'),
+    ('unrest', 'pressures still move: rest 4 s first'),
+    ('offset', 'more than 0.9 psi from zero'),
 )
 
 # words for numbers in messages
 CHAMBERS = ('body', 'head', 'tail')
 CHAMBER_STATES = ('off', 'vacuum', 'positive')
 STATES = ('idle', 'running', 'holding', 'stopped', 'fault')
-FAULTS = ('none', 'over_pressure', 'sensor_range', 'sensor_stuck', 'regulator', 'supply_control', 'host_silent', 'watchdog', 'brown_out')
-START_CAUSES = ('power', 'external', 'brown_out', 'watchdog')
+FAULTS = ('none', 'over_pressure', 'sensor_range', 'sensor_stuck', 'regulator', 'supply_control', 'host_silent', 'watchdog', 'brown_out', 'restart')
+START_CAUSES = ('power', 'external', 'brown_out', 'watchdog', 'restart')
 
 # what people type: name, usage, help
 CONSOLE_COMMANDS = (
     ('help', 'help [NAME]', 'list everything, or explain one'),
-    ('version', 'version', 'versions, and why the Uno last restarted'),
+    ('version', 'version', 'versions, cause of the last start'),
     ('status', 'status', 'state, fault, pressures, valves, link'),
     ('show', 'show [NAME]', 'print one parameter or all'),
     ('set', 'set NAME VALUE', 'change a parameter, also while running'),
     ('run', 'run', 'walk'),
-    ('stop', 'stop', 'stop walking or holding; all chambers vent'),
+    ('stop', 'stop', 'stop, and vent all chambers'),
     ('hold', 'hold CHAMBER positive|vacuum|off', 'inflate, evacuate or vent body, head or tail'),
-    ('clear', 'clear', 'release a stop (!) or a fault whose cause is gone'),
+    ('clear', 'clear', 'release a stop (!) or a fault'),
     ('stream', 'stream on|off', 'telemetry: one line (>) a sample'),
     ('plot', 'plot on|off', 'telemetry for the Serial Plotter'),
-    ('save', 'save [NAME]', 'keep the parameters; without a name, for power-up'),
-    ('load', 'load PRESET', 'take the parameters of a preset'),
+    ('save', 'save [NAME]', 'keep the parameters; without NAME for power-up'),
+    ('load', 'load PRESET', 'use a preset'),
     ('presets', 'presets', 'list the presets'),
     ('forget', 'forget PRESET', 'delete a preset from EEPROM'),
     ('defaults', 'defaults confirm', 'erase all presets and settings'),
-    ('zero', 'zero confirm|factory', 'take the present pressures as zero; or undo that'),
-    ('echo', 'echo on|off', 'repeat what you type (for a bare terminal)'),
+    ('zero', 'zero confirm|factory', 'take the pressures as zero; or undo that'),
+    ('echo', 'echo on|off', 'repeat what you type (bare terminal)'),
 )

@@ -5,6 +5,7 @@ from bifa.link.uno import Uno
 
 SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
+MOVING = ("run", "hold")
 
 
 def is_answer(line: str) -> bool:
@@ -18,17 +19,24 @@ def settle(uno: Uno, clock) -> None:
     deadline = clock.now() + SETTLE_S
     while clock.now() < deadline:
         uno.session.poll(0.02)
+    _drop_answers(uno)
+
+
+def _drop_answers(uno: Uno) -> None:
+    """Drop answers to what nobody waits for any more; what the Uno said by itself stays."""
     lines = [line for line in uno.session.lines if not is_answer(line)]
     uno.session.lines.clear()
     uno.session.lines.extend(lines)
 
 
 def type_line(uno: Uno, line: str, clock) -> list[str]:
-    """Send one console line; returns the lines up to its answer, that included. Frames go on meanwhile.
+    """Send one console line; returns the lines up to its answer, that included, behind those that came unasked.
+    Frames go on meanwhile.
 
     Raises NoAnswerError, and RestartedError if the Uno restarts meanwhile.
     """
-    uno.session.lines.clear()
+    _drop_answers(uno)
+    uno.may_move = uno.may_move or line.split()[:1] in ([word] for word in MOVING)
     uno.session.transport.write(line.encode("ascii", "replace") + b"\n")
     deadline = clock.now() + LONGEST_ANSWER_S
     lines: list[str] = []

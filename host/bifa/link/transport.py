@@ -22,4 +22,4 @@ class Transport(Protocol):
         """Reset the Uno, as opening the port (DTR) does."""
 
     def close(self) -> None:
-        """Let go of the port; a second call does nothing."""
+        """Let go of the port once what was written has left, as far as it goes; a second call does nothing."""

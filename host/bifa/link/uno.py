@@ -6,19 +6,26 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from bifa.link import frames
+from bifa.link import frames, leaving
 from bifa.link.clock import Clock
 from bifa.link.clock_relation import ClockRelation
-from bifa.link.errors import LinkError
+from bifa.link.errors import LinkError, NoAnswerError, StillMovingError
+from bifa.link.leaving import CONFIRMED_WITHIN_S
 from bifa.link.session import Counters, Hello, Session
 from bifa.link.table import CHAMBER_STATES, CHAMBERS, FAULTS, STATES
 from bifa.link.transport import Transport
 from bifa.link.units import ParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
+from bifa.link.words import word
 
 EEPROM_TIMEOUT_S = 10.0
 CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
+PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means about so long after its strobe (docs/firmware.md)
+MARK_PAUSE = 10  # strobes that a mark leaves out (kMarkPause in lib/controller/controller.h)
+CONNECTIONS = ("off", "positive", "vacuum", "both")  # by the two valves of a chamber
+SCHEDULE_ENTRIES = 16  # lib/controller/schedule.h
+LATEST_HOLD_S = (2**32 - 1) / 1000
 _WRAP_US = 1 << 32
 
 
@@ -36,8 +43,8 @@ class Sample:
 
     @property
     def connected(self) -> tuple[str, str, str]:
-        """What the valves connect each chamber to: "positive", "vacuum" or "off"."""
-        return tuple({1: "positive", 2: "vacuum"}.get(self.valves >> 2 * i & 3, "off") for i in range(3))
+        """What the valves connect each chamber to: "positive", "vacuum", "off" or, which must never be, "both"."""
+        return tuple(CONNECTIONS[self.valves >> 2 * i & 3] for i in range(3))
 
 
 @dataclass(frozen=True)
@@ -65,12 +72,17 @@ class Status:
 
 
 class Uno:
-    """A session with the Uno. As a context manager it leaves the valves off, whatever happened inside."""
+    """A session with the Uno. As a context manager it leaves the robot standing, however it ends (bifa.link.leaving).
+
+    `may_move`: something has been asked of it that turns valves on, or some were on, and no stop was confirmed since.
+    """
 
     def __init__(self, transport: Transport, clock: Clock, seed: int | None = None) -> None:
         """`seed` makes the session's key repeatable (tests in virtual time)."""
         self.session = Session(transport, clock, seed)
         self.session.on_sample = self._take_sample
+        self.session.on_renewed = self._stream_again
+        self.may_move = False
         self.clock_relation = ClockRelation()
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
@@ -81,10 +93,27 @@ class Uno:
         self._exchange_every_s = CLOCK_EVERY_S
 
     def __enter__(self) -> "Uno":
+        leaving.enter(self)
         return self
 
-    def __exit__(self, *_) -> None:
-        self.make_safe()
+    @leaving.uninterrupted
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        try:
+            self._leave(error)
+        finally:
+            leaving.leave(self)
+
+    def _leave(self, error: BaseException | None) -> None:
+        """Raises StillMovingError from `error` if the robot moved and does not confirm that it stands."""
+        try:
+            if self.session.hello is None:  # nobody there: nothing was moved, and nobody will answer
+                self.send_stop()
+            else:
+                leaving.stop_in_new_session(self.session)
+                self.may_move = False
+        except (ConnectionError, LinkError) as reason:
+            if self.may_move:
+                raise StillMovingError(reason) from error
 
     # -- session ----------------------------------------------------------------------------------------------
 
@@ -104,13 +133,6 @@ class Uno:
     def counters(self) -> Counters:
         """What the link has been through on the host's side."""
         return self.session.counters
-
-    def make_safe(self) -> None:
-        """Valves off by every means; says nothing if the port is gone."""
-        try:
-            self.stop()
-        except ConnectionError:
-            return
 
     def exchange_clocks(self) -> None:
         """One more measurement for `clock_relation`."""
@@ -214,15 +236,31 @@ class Uno:
 
     def run(self) -> None:
         """Walk."""
+        self.may_move = True
         self.session.call("run")
 
     def halt(self) -> None:
         """Stop walking or holding; nothing is latched."""
         self.session.call("stop")
+        self.may_move = False
 
     def stop(self) -> None:
-        """The real-time stop: all valves off, latched until clear(). Sent as frame and as `!`; awaits no answer."""
-        self.session.transport.write(frames.STOP_FRAME + b"!")
+        """The real-time stop: all valves off, latched until clear(); repeated until the Uno says that it is so.
+
+        Raises StillMovingError if it does not within five seconds, RestartedError if it restarted (which turns all
+        valves off as well).
+        """
+        try:
+            leaving.stop_until_confirmed(
+                self.session, lambda attempt_s: self.session.call("status", timeout_s=attempt_s), CONFIRMED_WITHIN_S
+            )
+        except (ConnectionError, NoAnswerError) as reason:
+            raise StillMovingError(reason) from reason
+        self.may_move = False
+
+    def send_stop(self) -> None:
+        """The real-time stop without waiting for an answer; from any thread."""
+        self.session.send_stop()
 
     def clear(self) -> None:
         """Release a stop, or a fault whose cause is gone."""
@@ -230,15 +268,22 @@ class Uno:
 
     def hold(self, chamber: str, state: str) -> None:
         """Inflate ("positive"), evacuate ("vacuum") or vent ("off") the body, head or tail."""
-        self.session.call("hold", *_hold_fields(chamber, state))
+        fields = _hold_fields(chamber, state)
+        self.may_move = self.may_move or state != "off"
+        self.session.call("hold", *fields)
 
     def schedule(self, holds: Iterable[tuple[float, str, str]]) -> None:
         """Start timed holds (time_s, chamber, state), in order of time, executed by the Uno on its own ticks (1 ms).
 
-        Time 0 is the start. Raises RefusedError when there are more than the Uno has room for, or out of order.
+        Time 0 is the start, which is sent only when the Uno has every entry. Raises ParameterError, before anything is
+        sent, for more than SCHEDULE_ENTRIES, RefusedError for times that go backwards.
         """
-        additions = [("schedule_add", (round(time_s * 1000), *_hold_fields(c, s))) for time_s, c, s in holds]
-        self.session.call_all([("schedule_clear", ()), *additions, ("schedule_start", ())])
+        additions = [("schedule_add", (_milliseconds(time_s), *_hold_fields(c, s))) for time_s, c, s in holds]
+        if len(additions) > SCHEDULE_ENTRIES:
+            raise ParameterError(f"{len(additions)} timed holds; the Uno has room for {SCHEDULE_ENTRIES}")
+        self.session.call_all([("schedule_clear", ()), *additions])
+        self.may_move = True
+        self.session.call("schedule_start")
 
     # -- telemetry --------------------------------------------------------------------------------------------
 
@@ -247,8 +292,8 @@ class Uno:
         report = self.session.call("status")
         flags = report["flags"]
         return Status(
-            state=STATES[report["state"]],
-            fault=FAULTS[report["fault"]],
+            state=word(STATES, report["state"]),
+            fault=word(FAULTS, report["fault"]),
             fault_channel=report["fault_channel"],
             fault_value=report["fault_value"],
             fault_limit=report["fault_limit"],
@@ -274,6 +319,24 @@ class Uno:
             self._last_sequence = None
         self._streaming = on
 
+    def mark_strobe(self, timeout_s: float = 1.0) -> int:
+        """Leave out the next MARK_PAUSE strobes, while streaming, so that an instrument sees the pause; the number
+        (`Sample.sequence`) of the sample whose strobe comes first after it. No sample is left out.
+
+        Raises LinkError where no samples arrive.
+        """
+        deadline = self._clock.now() + timeout_s
+        while self._last_sequence is None:
+            if self._clock.now() > deadline:
+                raise LinkError("the Uno streams no samples: nothing to mark")
+            self.session.poll(0.02)
+        self.session.call("mark")
+        return self._unwrap_sequence(self.session.call("read_clock")["marked"])
+
+    def _stream_again(self) -> None:
+        if self._streaming:
+            self.session.call("stream", 1)
+
     def samples(self, timeout_s: float) -> list[Sample]:
         """The samples that have arrived, waiting at most `timeout_s` for the first; keeps the link alive.
 
@@ -291,26 +354,30 @@ class Uno:
 
     def _take_sample(self, report: frames.Report) -> None:
         self.counters.samples += 1
+        self.may_move = self.may_move or report["valves"] != 0
         sequence = report["sequence"]
         if self._last_sequence is not None:
-            step = (sequence - self._last_sequence) % 65536
-            if step == 0 or step > 32768:
+            sequence = self._unwrap_sequence(sequence)
+            if sequence <= self._last_sequence:
                 return  # a repeat
-            self.counters.lost += step - 1
-            sequence = self._last_sequence + step
+            self.counters.lost += sequence - self._last_sequence - 1
         self._last_sequence = sequence
         command = tuple({1: 0.0, 2: 1.0}.get(report["command"] >> 2 * i & 3, math.nan) for i in range(3))
         self._samples.append(
             Sample(
                 sequence=sequence,
                 time_us=self._unwrap(report["time_us"]),
-                state=STATES[report["state"]],
+                state=word(STATES, report["state"]),
                 pressure_psi=_psi(report["pressure_mpsi"]),
                 command=command,
                 phase_rad=tuple(phase * (2 * math.pi / 65536) for phase in report["phase"]),
                 valves=report["valves"],
             )
         )
+
+    def _unwrap_sequence(self, sequence: int) -> int:
+        """The 16 bits of a sample's number as one that goes on from the last."""
+        return self._last_sequence + (sequence - self._last_sequence + 32767) % 65536 - 32767
 
     def _unwrap(self, time_us: int) -> int:
         """The Uno's 32-bit microseconds (they wrap every 71.6 minutes) as a time that goes on."""
@@ -330,6 +397,12 @@ def _name_field(preset: str) -> bytes:
     if not preset or len(preset) > 12 or not all(c in "abcdefghijklmnopqrstuvwxyz0123456789_-" for c in preset):
         raise ParameterError(f"a preset's name is 1 to 12 of a-z, 0-9, _ and -, not {preset!r}")
     return frames.encode_name(preset)
+
+
+def _milliseconds(time_s: float) -> int:
+    if not 0 <= time_s <= LATEST_HOLD_S:
+        raise ParameterError(f"the time of a hold is 0 to {LATEST_HOLD_S:.3f} s, not {time_s!r}")
+    return round(time_s * 1000)
 
 
 def _hold_fields(chamber: str, state: str) -> tuple[int, int]:

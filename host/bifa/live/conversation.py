@@ -4,7 +4,9 @@ import contextlib
 import queue
 import threading
 
-from bifa.link import NoAnswerError, RestartedError, Uno, WallClock
+from bifa.link import NoAnswerError, RestartedError, Uno
+from bifa.link.errors import AbandonedError
+from bifa.link.leaving import uninterrupted
 from bifa.link.terminal import settle, type_line
 from bifa.live.completion import Known
 from bifa.live.latest import Latest
@@ -25,8 +27,7 @@ class Conversation:
         self.error: Exception | None = None
         self._clock = rig.clock
         self._typed: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        # A serial port can be written to while another thread reads; a simulated chip cannot.
-        self._turn = contextlib.nullcontext() if isinstance(rig.clock, WallClock) else threading.Lock()
+        self._is_stopping = False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -36,30 +37,31 @@ class Conversation:
             self._typed.put(line)
 
     def stop(self) -> None:
-        """The real-time stop, past everything that waits."""
-        with self._turn:
-            self.uno.make_safe()
+        """The real-time stop, past everything that waits; the thread sees to its confirmation."""
+        self.uno.send_stop()
+        self._is_stopping = True
 
     def leave(self) -> None:
         """Carry out what has been typed, then end."""
         self._typed.put(None)
         self._thread.join()
 
+    @uninterrupted
     def abandon(self) -> None:
-        """Stop the robot at once, forget what waits, end."""
-        self.stop()
-        with contextlib.suppress(queue.Empty):
-            while True:
-                self._typed.get_nowait()
-        self.leave()
+        """Stop the robot at once, forget what waits, end; the link is then free for others."""
+        self.uno.session.abandon()
+        with contextlib.suppress(ConnectionError):
+            self.uno.send_stop()
+        self._thread.join()
 
     def _run(self) -> None:
         pace = Pace(self._clock)
         try:
-            with self._turn:
-                self._look()
+            self._look()
             while self._round():
                 pace.wait()
+        except AbandonedError:
+            pass
         except Exception as error:
             self.error = error
         finally:
@@ -67,21 +69,22 @@ class Conversation:
 
     def _round(self) -> bool:
         """One line or a few samples; False after the last line."""
-        with self._turn:
-            try:
+        line: str | None = ""
+        try:
+            if self._is_stopping:
+                self._is_stopping = False
+                self.uno.stop()
+            with contextlib.suppress(queue.Empty):
                 line = self._typed.get_nowait()
-            except queue.Empty:
-                line = ""
-            try:
-                if line:
-                    self._carry_out(line)
-                self.latest.take(self.uno.samples(WAIT_S))
-                self._pass_on()
-            except RestartedError:
-                self.uno.connect()
-                settle(self.uno, self._clock)
-                self._look()
-                print("-- the Uno restarted, all valves off; connected again, with its start preset")
+            if line:
+                self._carry_out(line)
+            self.latest.take(self.uno.samples(WAIT_S))
+            self._pass_on()
+        except RestartedError:
+            self.uno.connect()
+            settle(self.uno, self._clock)
+            self._look()
+            print("-- the Uno restarted, all valves off; connected again, with its start preset")
         return line is not None
 
     def _carry_out(self, line: str) -> None:

@@ -75,6 +75,8 @@ def converse(uno: Uno, rig) -> None:
         except EOFError:
             conversation.leave()
         except KeyboardInterrupt:
+            pass
+        finally:
             conversation.abandon()
     if conversation.error is not None:
         raise conversation.error

@@ -2,23 +2,24 @@
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from bifa.link import Sample, Uno
+from bifa.link import Clock, Sample, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.latest import Latest
 from bifa.live.pace import Pace
+from bifa.screen import Console
 
 REFRESH_S = 0.1
 TRACE = 24
 BLOCKS = " ▁▂▃▄▅▆▇█"
-COLOURS = {"positive": "red", "vacuum": "blue", "off": ""}
+COLOURS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
 LOWEST_PSI, HIGHEST_PSI = -15.0, 15.0
 
 
@@ -74,19 +75,30 @@ class Monitor:
         return Panel(Group(head, table, link), title="bifa monitor")
 
 
-def watch(uno: Uno, rig, console: Console, duration_s: float | None) -> None:
-    """Draw until Ctrl-C or for `duration_s`; the last picture stays."""
-    uno.stream(True)
-    monitor, pace = Monitor(uno), Pace(rig.clock)
-    end_s = math.inf if duration_s is None else rig.clock.now() + duration_s
+def watch(
+    uno: Uno, clock: Clock, console: Console, duration_s: float | None, begin: Callable[[Uno], None] = lambda uno: None
+) -> None:
+    """Connect, `begin(uno)`, and draw until Ctrl-C or for `duration_s`; the last picture stays, the robot stands."""
+    monitor = Monitor(uno)
     try:
-        with Live(console=console, auto_refresh=False, screen=console.is_terminal) as live:
-            while rig.clock.now() < end_s:
-                until_s, samples = rig.clock.now() + REFRESH_S, []
-                while (left_s := until_s - rig.clock.now()) > 1e-4:
-                    samples += uno.samples(left_s)
-                monitor.take(samples)
-                live.update(monitor.draw(), refresh=True)
-                pace.wait()
+        # The robot is the innermost: it stands before anything more is drawn.
+        with Live(console=console, auto_refresh=False, screen=console.is_terminal) as live, uno:
+            live.update("waiting for the Uno", refresh=True)
+            uno.connect()
+            begin(uno)
+            uno.stream(True)
+            _follow(uno, clock, monitor, live, math.inf if duration_s is None else clock.now() + duration_s)
     finally:
-        console.print(monitor.draw())
+        if uno.counters.samples:
+            console.print(monitor.draw())
+
+
+def _follow(uno: Uno, clock: Clock, monitor: Monitor, live: Live, end_s: float) -> None:
+    pace = Pace(clock)
+    while clock.now() < end_s:
+        until_s, samples = clock.now() + REFRESH_S, []
+        while (left_s := until_s - clock.now()) > 1e-4:
+            samples += uno.samples(left_s)
+        monitor.take(samples)
+        live.update(monitor.draw(), refresh=True)
+        pace.wait()

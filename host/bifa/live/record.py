@@ -4,19 +4,22 @@ import csv
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from rich.console import Console
 from rich.progress import Progress
 
 from bifa.errors import BifaError
-from bifa.link import NoAnswerError, RestartedError, Sample, Uno
-from bifa.link.gait_file import read_gait_file
+from bifa.link import NoAnswerError, PortGoneError, RestartedError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS
+from bifa.link.uno import MARK_PAUSE
 from bifa.rig import RigError
+from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
+from bifa.screen import Console
 
 RETRY_S = 1.0
-GONE = (ConnectionError, NoAnswerError, RestartedError, RigError)  # RigError: no Uno is plugged in
+# RigError: no Uno is plugged in
+GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
 HEADER = [
     "time_s",
     "host_time_s",
@@ -25,6 +28,7 @@ HEADER = [
     *(f"command_{name}" for name in CHAMBERS),
     *(f"pressure_{name}_psi" for name in CHAMBERS),
     *(f"phase_{name}_rad" for name in CHAMBERS),
+    "strobe",
 ]
 
 
@@ -34,24 +38,27 @@ class RecordError(BifaError):
 
 def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
     """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
-    from bifa.characterisation.locomotion import record_walk
     from bifa.data import DatasetWriter, Trial
-    from bifa.robot.gait import BASELINE, load_gait
+    from bifa.data.lag import misfit_of_last
+    from bifa.measure.locomotion import record_walk
 
-    gait = load_gait(gait_file) if gait_file else BASELINE
+    steps = read_gait_file(gait_file) if gait_file else GaitFile(BASELINE)
+    gait = steps.gait
     writer = DatasetWriter(out, f"walks, {time.strftime('%Y-%m-%d')}", resume=True)
-    with Uno(rig.transport, rig.clock) as uno, Progress(console=console) as progress:
+    with Progress(console=console) as progress, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
         uno.clear()
+        if steps.others:
+            uno.upload(steps.others)
         for repeat in range(1, repeats + 1):
-            trial = Trial(f"walk_{repeat}.csv", "locomotion", {}, gait=gait.as_dict(), repeat=repeat)
+            trial = Trial(f"walk_{repeat}.csv", "locomotion", {}, repeat=repeat, **_settings(steps))
             if writer.has(trial):
                 continue
             task = progress.add_task(f"walk {repeat} of {repeats}", total=1.0)
             walk = record_walk(rig, uno, gait, cycles, lambda share, task=task: progress.update(task, completed=share))
-            writer.add(
-                Trial(trial.file, "locomotion", walk.columns, gait=trial.gait, repeat=repeat, session_order=repeat)
-            )
+            writer.add(replace(trial, columns=walk.columns, session_order=repeat, extra=walk.extra))
+            if wrong := misfit_of_last(writer.trials):
+                progress.console.print(f"[yellow]warning[/yellow] {wrong}", highlight=False)
             progress.console.print(f"walk {repeat}: {uno.counters.text()}")
     writer.finish()
     console.print(
@@ -59,11 +66,17 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
     )
 
 
+def _settings(steps: GaitFile) -> dict[str, object]:
+    """What of a gait file is a setting of the trial that it makes."""
+    beside = {key: steps.others[key] for key in ("coupling_per_s",) if key in steps.others}
+    return {"gait": {**steps.gait.as_dict(), **beside}, "pressure_psi": steps.others.get("pressure_psi")}
+
+
 def record_telemetry(
     open_rig: Callable, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
 ) -> None:
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
-    parameters = read_gait_file(gait_file) if gait_file else {}
+    parameters = read_gait_file(gait_file).parameters if gait_file else {}
     if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
         raise RecordError(f"{out} holds something else; name a new folder")
     out.mkdir(parents=True, exist_ok=True)
@@ -76,6 +89,8 @@ def record_telemetry(
             try:
                 _record_until_gone(open_rig, path, parameters, end_s, console)
             except GONE as error:
+                if isinstance(error.__cause__, KeyboardInterrupt):
+                    raise
                 if path.exists() or not is_told:
                     console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
                     is_told = True
@@ -88,26 +103,31 @@ def record_telemetry(
 def _record_until_gone(
     open_rig: Callable, path: Path, parameters: dict[str, float], end_s: float, console: Console
 ) -> None:
-    with open_rig() as rig, Uno(rig.transport, rig.clock) as uno:
-        uno.connect()
-        if parameters:
-            uno.upload(parameters)
-        uno.stream(True)
-        if parameters:
-            uno.run()
-        try:
-            with path.open("x", newline="") as file, console.status("recording") as status:
-                writer = csv.writer(file)
-                writer.writerow(HEADER)
-                while time.monotonic() < end_s:
-                    writer.writerows(_row(uno, sample) for sample in uno.samples(0.5))
-                    file.flush()
-                    status.update(f"recording  {uno.counters.text()}")
-        finally:
+    uno = None
+    try:
+        with open_rig() as rig, console.status("waiting for the Uno") as status:
+            uno = Uno(rig.transport, rig.clock)
+            with uno:
+                uno.connect()
+                if parameters:
+                    uno.upload(parameters)
+                uno.stream(True)
+                marked = uno.mark_strobe()
+                if parameters:
+                    uno.run()
+                with path.open("x", newline="") as file:
+                    writer = csv.writer(file)
+                    writer.writerow(HEADER)
+                    while time.monotonic() < end_s:
+                        writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
+                        file.flush()
+                        status.update(f"recording  {uno.counters.text()}")
+    finally:
+        if path.exists():
             console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
 
 
-def _row(uno: Uno, sample: Sample) -> list:
+def _row(uno: Uno, sample: Sample, marked: int) -> list:
     time_s = sample.time_us / 1e6
     # An empty field where a chamber is off: neither positive nor vacuum.
     commands = ["" if command != command else f"{command:g}" for command in sample.command]
@@ -119,4 +139,5 @@ def _row(uno: Uno, sample: Sample) -> list:
         *commands,
         *(f"{pressure:.3f}" for pressure in sample.pressure_psi),
         *(f"{phase:.4f}" for phase in sample.phase_rad),
+        int(not marked - MARK_PAUSE <= sample.sequence < marked),
     ]

@@ -10,11 +10,23 @@ pytestmark = pytest.mark.uno
 LIMIT_CYCLES = CLOCK_HZ // 10_000
 BYTE_CYCLES = CLOCK_HZ * 10 // 250_000
 VALVES = range(4, 10)
+TWCR, BUSY = 0xBC, 0x20 | 0x10  # a start or a stop is asked for
 
 
 def walking(bench):
     bench.say("run")
     assert len(bench.valves_on) == 3
+
+
+def walk_with_a_bus_that_cannot_end_its_transfer(bench):
+    """To the microsecond at which a transfer begins that something holds before its end."""
+    walking(bench)
+    for _ in range(200_000):
+        bench.board.run_until(bench.board.cycle + 16)
+        if bench.board.peek(TWCR)[0] & BUSY:
+            bench.board.set_bus("held")
+            return
+    raise AssertionError("no transfer began")
 
 
 def holding(bench):
@@ -126,3 +138,26 @@ def test_stop_message(bench):
     while bench.board.bytes_on_the_wire:
         bench.board.run_until(bench.board.cycle + 16)
     assert all_off_after(bench, first, bench.board.cycle - 32) <= LIMIT_CYCLES
+
+
+@pytest.mark.parametrize("stop", [b"!", frames.STOP_FRAME, frames.STOP_FRAME + b"!"], ids=["byte", "frame", "both"])
+@pytest.mark.parametrize("later_us", range(0, 500, 25))
+def test_stop_while_a_transfer_cannot_end_is_in_time_and_nothing_is_lost(bench, stop, later_us):
+    walk_with_a_bus_that_cannot_end_its_transfer(bench)
+    bench.board.run_for(later_us * 1e-6)
+    first = bench.board.event_count
+    bench.board.send(stop)
+    while bench.board.bytes_on_the_wire:
+        bench.board.run_until(bench.board.cycle + 16)
+    assert all_off_after(bench, first, bench.board.cycle - 32) <= LIMIT_CYCLES
+    assert bench.board.rx_overruns == 0
+
+
+@pytest.mark.parametrize("later_us", range(0, 500, 25))
+def test_emergency_stop_while_a_transfer_cannot_end(bench, later_us):
+    walk_with_a_bus_that_cannot_end_its_transfer(bench)
+    bench.board.run_for(later_us * 1e-6)
+    first = bench.board.event_count
+    begin = bench.board.cycle
+    bench.board.press_emergency_stop()
+    assert all_off_after(bench, first, begin) <= LIMIT_CYCLES

@@ -89,6 +89,20 @@ size_t harness_encode(uint8_t message, uint8_t sequence, const uint8_t* fields, 
   return sent.size();
 }
 
+// How often the receiver, after `before`, takes something in `data` for a stop.
+int harness_stops(const uint8_t* before, size_t before_size, const uint8_t* data, size_t size) {
+  bifa::Receiver receiver;
+  uint8_t out;
+  for (size_t i = 0; i < before_size; ++i) {
+    receiver.push(before[i]);
+    while (receiver.pop(out)) {
+    }
+  }
+  int stops = 0;
+  for (size_t i = 0; i < size; ++i) stops += receiver.push(data[i]);
+  return stops;
+}
+
 // Damages `count` copies of good frames (in `pool`, each of `stride` bytes, its size in the first) and pushes them
 // through the receiver. What comes out must be one of the two last frames sent, unless the damage left one of them
 // as it was. results: damaged, accepted as sent, accepted wrongly, stops.

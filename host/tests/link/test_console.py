@@ -4,12 +4,12 @@ import random
 import string
 
 import pytest
-from board import Board
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS
 from bifa.link.units import from_wire
+from harness.board import Board
 
 SHOWN = [f"[{p.name} {from_wire(p.name, p.default):g}" for p in PARAMETERS]
 

@@ -4,13 +4,13 @@ import contextlib
 import random
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
-from board import Board
-from link_native import HERE
-from pty_uno import STEP_S, PtyUno
 
 from bifa.link import Uno
+from harness.board import Board
+from harness.pty_uno import STEP_S, PtyUno
 
 
 class Mortal:
@@ -59,7 +59,7 @@ def test_sigkill(kills, figure):
     rng, longest_s = random.Random(kills), 0.0
     for _ in range(kills):
         uno = PtyUno()
-        command = [sys.executable, HERE / "dying_host.py", uno.device, "0.3"]
+        command = [sys.executable, Path(__file__).with_name("dying_host.py"), uno.device, "0.3"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as host:
             assert host.stdout.readline() == "walking\n"
             uno.wait(rng.random() * 0.5)

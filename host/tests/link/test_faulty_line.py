@@ -7,13 +7,13 @@ never another.
 import random
 
 import pytest
-from board import Board
-from chip import Chip
-from faulty_line import FaultyLine
 
 from bifa.link import LinkError, NoAnswerError, RestartedError, Uno
 from bifa.link.table import PARAMETERS
 from bifa.link.units import from_wire, to_wire
+from harness.board import Board
+from harness.chip import Chip
+from harness.faulty_line import FaultyLine
 
 # probability of a bad byte: probability that the Uno restarts in the middle of what is sent at once
 RESTARTS = {1e-4: 3e-3, 1e-3: 3e-3, 1e-2: 2e-3, 1e-1: 1e-4}

@@ -3,22 +3,25 @@
 import binascii
 import random
 import struct
+from collections.abc import Iterator
+from pathlib import Path
 
 import cobs.cobs
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from link_native import load
 
 from bifa.link import frames
 from bifa.link.table import COMMANDS, REPORTS
+from harness.native import load
 
 ffi, lib = load(
-    "frame_harness.cpp",
+    Path(__file__).with_name("frame_harness.cpp"),
     """
     uint16_t harness_crc(const uint8_t*, size_t, uint16_t);
     uint16_t harness_reflected(const uint8_t*, size_t, uint16_t);
     int harness_decode(const uint8_t*, size_t, uint32_t session, uint8_t* frame);
+    int harness_stops(const uint8_t* before, size_t, const uint8_t*, size_t);
     size_t harness_encode(uint8_t, uint8_t, const uint8_t*, uint8_t, uint32_t, uint8_t*);
     void harness_damage(const uint8_t* pool, size_t frames, size_t stride, uint32_t session, uint64_t seed,
                         uint64_t count, uint64_t* results);
@@ -109,6 +112,31 @@ def test_text_and_frames_are_told_apart_however_they_are_cut(pieces, step):
     splitter = frames.Splitter()
     got = [part for i in range(0, len(stream), step) for part in splitter.feed(stream[i : i + step])]
     assert got == expected
+
+
+def damaged_once(data: bytes) -> Iterator[bytes]:
+    """`data` with one byte replaced, dropped, doubled or invented: every place, every value."""
+    for at in range(len(data)):
+        yield data[:at] + data[at + 1 :]
+        yield data[: at + 1] + data[at:]
+        for value in range(256):
+            yield data[:at] + bytes([value]) + data[at + 1 :]
+            yield data[:at] + bytes([value]) + data[at:]
+
+
+def states_of_the_receiver() -> Iterator[bytes]:
+    """What may have arrived before a stop: text, a whole frame, any beginning of one and of a stop."""
+    frame = frames.encode(COMMANDS["save"], 7, (b"startup\0\0\0\0\0",), SESSION)
+    yield from (b"", b"set period_s 4", frame, b"\0" + bytes(range(1, 33)))
+    yield from (frame[:length] for length in range(1, len(frame)))
+    yield from (frames.STOP[:length] for length in range(1, len(frames.STOP_FRAME)))
+
+
+def test_a_stop_survives_any_single_damaged_byte():
+    damaged = list(damaged_once(frames.STOP))
+    for before in states_of_the_receiver():
+        deaf = [sent for sent in damaged if not lib.harness_stops(before, len(before), sent, len(sent))]
+        assert not deaf, (before, deaf[0])
 
 
 def damage(count: int, seed: int) -> list[int]:

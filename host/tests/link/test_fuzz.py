@@ -11,19 +11,20 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from link_native import BUILD, HERE, ROOT
 
 from bifa.link import frames
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS
+from harness.native import BUILD, ROOT
 
+FUZZ = Path(__file__).with_name("fuzz")
 TARGETS = ("frames", "console", "eeprom")
 FLAGS = ["-std=gnu++11", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=undefined"]
 
 
 def build(target: str) -> Path:
-    sources = [HERE / f"fuzz/{target}_fuzz.cpp", *sorted((ROOT / "lib").glob("*/*.cpp"))]
-    includes = [f"-I{folder}" for folder in [HERE / "fuzz", *sorted((ROOT / "lib").iterdir())]]
-    headers = sorted([*(ROOT / "lib").glob("*/*.h"), HERE / "fuzz/fuzz_board.h"])
+    sources = [FUZZ / f"{target}_fuzz.cpp", *sorted((ROOT / "lib").glob("*/*.cpp"))]
+    includes = [f"-I{folder}" for folder in [FUZZ, *sorted((ROOT / "lib").iterdir())]]
+    headers = sorted([*(ROOT / "lib").glob("*/*.h"), FUZZ / "fuzz_board.h"])
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *headers])).hexdigest()[:16]
     binary = BUILD / f"{target}_fuzz-{digest}"
     if binary.exists():

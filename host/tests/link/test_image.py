@@ -5,11 +5,11 @@ import math
 import random
 
 import pytest
-from chip import Chip
 
 from bifa.link import RefusedError, RestartedError, Uno
 from bifa.link.frames import STOP_FRAME, encode, session_seed
 from bifa.link.table import COMMANDS
+from harness.chip import Chip
 
 pytestmark = pytest.mark.uno
 FASTEST_S = 100e-6

@@ -10,15 +10,16 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from board import Board
-from pty_uno import PtyUno
 from rich.console import Console
-from terminal import Terminal
 
 from bifa.link import Sample, Uno
+from bifa.link.uno import MARK_PAUSE
 from bifa.live.monitor import Monitor, watch
 from bifa.live.record import record_telemetry
 from bifa.rig import RigError, SerialRig
+from harness.board import Board
+from harness.pty_uno import PtyUno
+from harness.terminal import Terminal
 
 GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
 
@@ -52,9 +53,7 @@ def test_the_monitor_says_that_the_port_is_gone(uno, tmp_path):
 
 def test_the_trace_is_as_long_as_it_says():
     board, shown = Board(), io.StringIO()
-    uno = Uno(board, board)
-    uno.connect()
-    watch(uno, SimpleNamespace(clock=board), Console(file=shown, width=80), 1.0)
+    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0)
     body = next(line for line in shown.getvalue().splitlines() if "body" in line)
     assert "last 2.4 s" in shown.getvalue()
     assert body.count("▄") == 10  # one block, at 0 psi, each tenth of a second
@@ -111,7 +110,6 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
         recorded = rows(path)
         assert len(recorded) >= 50
         assert f"{path}: samples {len(recorded)}  lost {lost(recorded)}  bad frames" in text
-    unos[1].wait(0.05)
     assert unos[1].board.state == "stopped"
     unos[1].unplug()
 
@@ -121,13 +119,14 @@ def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, tmp_path):
     path.write_text(GAIT)
     arguments = ["record", str(out), "--port", uno.device, "--gait", str(path)]
     with Terminal(tmp_path, *arguments) as terminal:
-        terminal.sees("recording  samples 1")
-        terminal.until(lambda: uno.board.valves != 0)
+        terminal.sees("recording  samples")
+        terminal.until(lambda: uno.board.valves != 0 and len(rows(out / "telemetry_1.csv")) > 2 * MARK_PAUSE)
         terminal.program.kill(signal.SIGTERM)
         terminal.exit_status()
         terminal.sees("ended", "samples")
-    uno.wait(0.05)
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
     recorded = rows(out / "telemetry_1.csv")
-    assert len(recorded) > 10
-    assert {row["state"] for row in recorded} == {"running"}
+    states = [row["state"] for row in recorded]
+    assert states == ["idle"] * states.count("idle") + ["running"] * states.count("running")
+    assert states.count("idle") < MARK_PAUSE  # the few samples before the walk
+    assert [row["strobe"] for row in recorded].count("0") in (MARK_PAUSE, MARK_PAUSE + 1)

@@ -3,14 +3,15 @@
 import binascii
 import random
 import struct
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from link_native import load
 
 from bifa.link.table import PRESETS, RESULTS
 from bifa.link.units import pack_set
+from harness.native import load
 
 SIZE, SLOT, SLOTS = 1024, 48, 21
 BLANK = b"\xff" * SIZE
@@ -18,7 +19,7 @@ OK, FULL, NAME, NO_PRESET, EEPROM = (
     [name for name, _ in RESULTS].index(name) for name in ("ok", "full", "name", "no_preset", "eeprom")
 )
 ffi, lib = load(
-    "store_harness.cpp",
+    Path(__file__).with_name("store_harness.cpp"),
     """
     typedef struct Bench Bench;
     Bench* bench_new(const uint8_t* image); void bench_free(Bench*); void bench_image(Bench*, uint8_t* image);

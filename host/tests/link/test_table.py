@@ -5,11 +5,11 @@ import subprocess
 import sys
 
 import pytest
-from link_native import ROOT
 
-from bifa.data.layout import GAIT_OPTIONAL_RANGES, GAIT_RANGES
 from bifa.link import table
 from bifa.link.units import from_wire, range_text
+from bifa.ranges import RANGES
+from harness.native import ROOT
 
 
 def test_generated_files_are_up_to_date():
@@ -35,11 +35,11 @@ def test_words_stand_for_the_enumerators_of_the_code(name):
     assert [re.sub(r"(?<!^)([A-Z])", r"_\1", e).lower() for e in enumerators] == list(words)
 
 
-def test_data_sets_know_the_ranges_of_the_uno():
+def test_files_know_the_ranges_of_the_uno():
+    assert list(RANGES) == [parameter.name for parameter in table.PARAMETERS]
     for parameter in table.PARAMETERS:
-        expected = (GAIT_RANGES | GAIT_OPTIONAL_RANGES).get(parameter.name)
-        if expected is not None:
-            assert expected == tuple(from_wire(parameter.name, b) for b in (parameter.minimum, parameter.maximum))
+        bounds = (from_wire(parameter.name, bound) for bound in (parameter.minimum, parameter.maximum))
+        assert RANGES[parameter.name] == (*bounds, parameter.unit)
 
 
 def test_docs_have_the_present_tables():
@@ -48,3 +48,10 @@ def test_docs_have_the_present_tables():
         assert f"| `{parameter.name}` | {range_text(parameter)} |" in page
     for message in [*table.COMMANDS.values(), *table.REPORTS.values()]:
         assert f"| 0x{message.number:02X} | `{message.name}` |" in page
+
+
+def test_reference_of_parameters_has_each_with_its_range_and_default():
+    page = (ROOT / "docs/parameters.md").read_text()
+    for parameter in table.PARAMETERS:
+        default = f"{from_wire(parameter.name, parameter.default):g} {parameter.unit}".rstrip()
+        assert f"| `{parameter.name}` | {range_text(parameter)} | {default} |" in page

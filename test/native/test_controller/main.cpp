@@ -32,7 +32,8 @@ struct Bench {
   RawRound round = {{kZero, kZero, kZero}, kMonitorZero};
   bool pressed = false;
   uint16_t rounds = 0;
-  bool noisy = true;  ///< the last bit of the readings moves, as that of a sensor that lives
+  bool strobed = true;  ///< the strobe rose with the last round
+  bool noisy = true;    ///< the last bit of the readings moves, as that of a sensor that lives
 
   explicit Bench(StartCause cause = StartCause::kPower, ParameterSet set = bifa::factory_preset(0)) {
     pins = 0;
@@ -44,6 +45,7 @@ struct Bench {
       const bool begins = controller.tick(pressed);
       if (!begins) continue;
       ++rounds;
+      strobed = controller.strobes();
       RawRound seen = round;
       if (noisy && rounds % 2) ++seen.sum[0], ++seen.sum[1], ++seen.sum[2];
       controller.converted_in_interrupt(seen);
@@ -55,6 +57,7 @@ struct Bench {
   void pressure(uint8_t chamber, uint16_t conversion) { round.sum[chamber] = conversion * bifa::kOversampling; }
 };
 
+void equal_u16(uint16_t expected, uint16_t actual) { TEST_ASSERT_EQUAL_UINT16(expected, actual); }
 void equal(Verdict expected, Verdict actual) {
   TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(actual));
 }
@@ -223,6 +226,25 @@ void test_a_sample_every_ten_milliseconds_stamped_with_the_strobe() {
   TEST_ASSERT_EQUAL_UINT16(0, bench.controller.status().samples_lost);
 }
 
+void test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them() {
+  for (uint8_t when_ms = 0; when_ms < 25; ++when_ms) {
+    Bench bench;
+    equal_u16(0, bench.controller.marked());
+    uint16_t left_out = 0, first_after = 0;
+    for (uint16_t ms = 0; ms < 300; ++ms) {
+      if (ms == when_ms) bench.controller.mark_strobe();
+      bench.tick();
+      Sample sample;
+      if (!bench.controller.take_sample(sample)) continue;
+      const bool strobed = bench.strobed;  // of the round that this sample came from
+      if (!strobed) ++left_out;
+      if (strobed && left_out > 0 && first_after == 0) first_after = sample.sequence;
+    }
+    equal_u16(bifa::kMarkPause, left_out);
+    equal_u16(bench.controller.marked(), first_after);
+  }
+}
+
 void test_samples_that_nobody_takes_are_counted() {
   Bench bench;
   bench.tick(1005);
@@ -247,9 +269,28 @@ void test_zero_is_measured_while_idle_and_taken_off_every_sample() {
 void test_a_chamber_under_pressure_is_not_taken_for_zero() {
   Bench bench;
   bench.pressure(1, 512 + 40);  // 1.5 psi
-  bench.tick(5000);
+  bench.tick(8000);
   Calibration zero;
-  equal(Verdict::kRefused, bench.controller.measure_zero(zero));
+  equal(Verdict::kOffset, bench.controller.measure_zero(zero));
+}
+
+// A chamber that vents through its valve: 8.5 psi at first, a time constant of 1.7 s.
+void test_zero_is_not_taken_while_a_chamber_still_vents() {
+  Bench bench;
+  double pressure_psi = 8.5;
+  Calibration zero;
+  uint16_t taken_ms = 0;
+  for (uint16_t ms = 0; ms < 30000 && taken_ms == 0; ms += 10) {
+    pressure_psi *= 1 - 0.01 / 1.7;
+    bench.round.sum[0] = static_cast<uint16_t>(kZero + pressure_psi * 1024 * bifa::kOversampling / 37.5);
+    bench.tick(10);
+    if (bench.controller.measure_zero(zero) == Verdict::kDone) taken_ms = ms;
+  }
+  TEST_ASSERT_TRUE(taken_ms > 0);
+  TEST_ASSERT_INT16_WITHIN(40, 0, zero.offset_mpsi[0]);
+  bench.round.sum[0] += 20;
+  bench.tick(1000);
+  equal(Verdict::kUnrest, bench.controller.measure_zero(zero));
 }
 
 // ---- faults ----
@@ -302,6 +343,76 @@ void test_a_stuck_sensor_is_a_fault_while_walking() {
   equal(Fault::kSensorStuck, bench.fault());
 }
 
+/// Ticks until there is a fault, at most `most`.
+uint32_t ticks_to_fault(Bench& bench, uint32_t most) {
+  uint32_t ticks = 0;
+  for (; ticks < most && bench.fault() == Fault::kNone; ++ticks) bench.tick();
+  return ticks;
+}
+
+void test_frozen_sensors_are_found_at_every_gait_of_the_box() {
+  const uint32_t periods_us[] = {500000, 2720000, 5700000, 60000000};
+  const uint16_t duties_e4[] = {500, 6600, 9500};
+  for (uint32_t period_us : periods_us) {
+    for (uint16_t duty_e4 : duties_e4) {
+      ParameterSet set = bifa::factory_preset(0);
+      set.period_us = period_us;
+      set.duty_body_e4 = set.duty_head_e4 = set.duty_tail_e4 = duty_e4;
+      Bench bench(StartCause::kPower, set);
+      bench.noisy = false;
+      bench.controller.run();
+      const uint32_t first_switch_ms = period_us / 1000;  // at the latest
+      TEST_ASSERT_TRUE(ticks_to_fault(bench, 60000 + first_switch_ms) <= first_switch_ms + 2100);
+      equal(Fault::kSensorStuck, bench.fault());
+    }
+  }
+}
+
+void test_an_open_input_is_found_within_two_seconds_whatever_the_valves_do() {
+  for (uint8_t seed = 1; seed <= 20; ++seed) {
+    Bench bench;
+    uint32_t chance = seed;
+    if (seed % 2) bench.controller.run();
+    for (uint16_t sample = 0; sample < 200; ++sample) {
+      chance = chance * 1664525UL + 1013904223UL;
+      bench.round.sum[1] = bifa::kSensorLow + (chance >> 16) % (bifa::kSensorHigh - bifa::kSensorLow);
+      bench.tick(10);
+    }
+    equal(Fault::kSensorStuck, bench.fault());
+    TEST_ASSERT_EQUAL_UINT8(1, bench.controller.status().fault.channel);
+  }
+}
+
+// The hardest that air does: full supply and full vacuum every 20 ms at a sensor by the valves, with an overshoot.
+void test_pressures_that_follow_their_valves_are_no_open_input_at_the_fastest_gait() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.period_us = 500000;
+  Bench bench(StartCause::kPower, set);
+  bench.controller.run();
+  for (uint16_t sample = 0; sample < 6000; ++sample) {
+    const bool positive = sample % 25 < 12;
+    const bool overshoot = sample % 25 == 0 || sample % 25 == 12;
+    const double pressure_psi = (positive ? 8.0 : -12.5) * (overshoot ? 1.15 : 1.0);
+    for (uint16_t& sum : bench.round.sum) {
+      sum = static_cast<uint16_t>(kZero + pressure_psi * 1024 * bifa::kOversampling / 37.5);
+    }
+    bench.tick(10);
+    equal(Fault::kNone, bench.fault());
+  }
+}
+
+void test_over_pressure_in_pieces_adds_up() {
+  Bench bench;
+  bench.controller.run();
+  for (uint8_t turn = 0; turn < 5 && bench.fault() == Fault::kNone; ++turn) {
+    bench.pressure(2, 512 + 330);
+    bench.tick(190);
+    bench.pressure(2, 512);
+    bench.tick(10);
+  }
+  equal(Fault::kOverPressure, bench.fault());
+}
+
 void test_a_silent_host_vents_when_it_was_asked_to() {
   ParameterSet set = bifa::factory_preset(0);
   set.host_timeout_ms = 500;
@@ -352,6 +463,11 @@ void test_after_a_brown_out_it_starts_in_a_fault() {
   equal(Fault::kBrownOut, bench.fault());
 }
 
+void test_after_a_restart_of_unknown_cause_it_starts_in_a_fault() {
+  Bench bench(StartCause::kRestart);
+  equal(Fault::kRestart, bench.fault());
+}
+
 void test_after_a_reset_from_outside_it_starts_idle() {
   Bench bench(StartCause::kExternal);
   equal(State::kIdle, bench.state());
@@ -386,9 +502,15 @@ void run() {
   RUN_TEST(test_a_stop_ends_timed_holds);
   RUN_TEST(test_a_schedule_has_room_for_sixteen);
   RUN_TEST(test_a_sample_every_ten_milliseconds_stamped_with_the_strobe);
+  RUN_TEST(test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them);
   RUN_TEST(test_samples_that_nobody_takes_are_counted);
   RUN_TEST(test_zero_is_measured_while_idle_and_taken_off_every_sample);
   RUN_TEST(test_a_chamber_under_pressure_is_not_taken_for_zero);
+  RUN_TEST(test_zero_is_not_taken_while_a_chamber_still_vents);
+  RUN_TEST(test_frozen_sensors_are_found_at_every_gait_of_the_box);
+  RUN_TEST(test_an_open_input_is_found_within_two_seconds_whatever_the_valves_do);
+  RUN_TEST(test_pressures_that_follow_their_valves_are_no_open_input_at_the_fastest_gait);
+  RUN_TEST(test_over_pressure_in_pieces_adds_up);
   RUN_TEST(test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands);
   RUN_TEST(test_a_spike_of_a_hundred_milliseconds_is_borne);
   RUN_TEST(test_a_broken_sensor_is_a_fault_in_any_state_even_idle);
@@ -398,6 +520,7 @@ void run() {
   RUN_TEST(test_a_dac_that_does_not_answer_is_a_fault_until_it_does);
   RUN_TEST(test_after_the_watchdog_it_starts_in_a_fault);
   RUN_TEST(test_after_a_brown_out_it_starts_in_a_fault);
+  RUN_TEST(test_after_a_restart_of_unknown_cause_it_starts_in_a_fault);
   RUN_TEST(test_after_a_reset_from_outside_it_starts_idle);
   RUN_TEST(test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read);
   RUN_TEST(test_pressures_beyond_14_psi_end_at_14_psi_even_from_a_set_that_nobody_checked);

@@ -10,7 +10,7 @@ namespace {
 double exact(uint32_t angle) { return bifa::kSineOne * sin(angle / 65536.0 * 2 * M_PI); }
 
 void test_every_entry_of_the_table_is_the_rounded_sine() {
-  for (int i = 0; i <= bifa::kSineSteps; ++i) {
+  for (int i = 0; i <= bifa::kSineSteps + 1; ++i) {
     TEST_ASSERT_EQUAL_INT(lround(bifa::kSineOne * sin(M_PI / 2 * i / bifa::kSineSteps)), bifa::kSineTable[i]);
   }
 }

@@ -6,7 +6,7 @@ import pty
 import threading
 import time
 
-from board import Board
+from harness.board import Board
 
 STEP_S = 0.002
 

@@ -4,8 +4,10 @@ from pathlib import Path
 
 from virtual_robot.uno import CLOCK_HZ, Uno
 
-FIRMWARE = Path(__file__).parents[3] / ".pio/build/uno/firmware.elf"
+FIRMWARE = Path(__file__).parents[2] / ".pio/build/uno/firmware.elf"
 AT_REST_V = 2.5  # the sensors' reading of no pressure
+A_BIT_V = 0.005  # by which it moves, as that of a sensor that lives
+ALIVE_EVERY_S = 0.5
 CYCLES_A_BYTE = 10 * CLOCK_HZ // 250_000
 VALVES = range(4, 10)
 
@@ -18,13 +20,19 @@ class Chip:
         if eeprom is not None:
             self.uno.eeprom = eeprom
             self.uno.reset("power-on")
+        self._turn = 0
+        self._live()
+
+    def _live(self) -> None:
+        self._turn += 1
         for channel in range(3):
-            self.uno.set_analog(channel, AT_REST_V)
+            self.uno.set_analog(channel, AT_REST_V + A_BIT_V * (self._turn % 2))
 
     def write(self, data: bytes) -> None:
         self.uno.send(data)
 
     def read(self, timeout_s: float) -> bytes:
+        self._live()
         end = self.uno.cycle + round(timeout_s * CLOCK_HZ)
         self.uno.run_until(end, stop_on_output=True)
         return self.uno.receive()
@@ -39,7 +47,10 @@ class Chip:
         return self.uno.time_s
 
     def sleep(self, duration_s: float) -> None:
-        self.uno.run_for(duration_s)
+        end = self.uno.cycle + round(duration_s * CLOCK_HZ)
+        while self.uno.cycle < end:
+            self._live()
+            self.uno.run_until(min(end, self.uno.cycle + round(ALIVE_EVERY_S * CLOCK_HZ)))
 
     def valves(self) -> int:
         """Levels of D4 to D9, one bit each."""

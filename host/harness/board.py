@@ -1,9 +1,11 @@
 """The Uno's own code on this computer (board_harness.cpp) as transport and clock of the link, in virtual time."""
 
-from link_native import load
+from pathlib import Path
+
+from harness.native import load
 
 ffi, lib = load(
-    "board_harness.cpp",
+    Path(__file__).with_name("board_harness.cpp"),
     """
     typedef struct Board Board;
     Board* board_new(void); void board_free(Board*); void board_reset(Board*);

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import cffi
 
-ROOT = Path(__file__).parents[3]
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[2]
 BUILD = ROOT / "build/native"
 
 
-def load(harness: str, declarations: str, parts: tuple[str, ...] = ("*/*.cpp",)) -> tuple[cffi.FFI, object]:
-    """The harness (a C++ file of this folder with C functions) linked with parts of lib/, as a cffi library."""
-    sources = [HERE / harness, *sorted(path for part in parts for path in (ROOT / "lib").glob(part))]
+def load(harness: Path, declarations: str, parts: tuple[str, ...] = ("*/*.cpp",)) -> tuple[cffi.FFI, object]:
+    """The harness (a C++ file with C functions) linked with parts of lib/, as a cffi library."""
+    sources = [harness, *sorted(path for part in parts for path in (ROOT / "lib").glob(part))]
     headers = sorted((ROOT / "lib").glob("*/*.h"))
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *headers])).hexdigest()[:16]
-    library = BUILD / f"{Path(harness).stem}-{digest}.so"
+    library = BUILD / f"{harness.stem}-{digest}.so"
     if not library.exists():
         BUILD.mkdir(parents=True, exist_ok=True)
         partial = library.with_suffix(f".{id(library)}.tmp")

@@ -1,0 +1,141 @@
+"""Leaving: however a command ends, the robot stands still before the port closes.
+
+Whoever talks to an Uno does so inside `with Uno(...)`, and that is all: its end stops the robot, repeats the stop
+until the Uno says that no valve is on, and raises StillMovingError if it does not say so. Ctrl-C, `kill` and a closed
+terminal end what is inside like any exception, wherever it is; their stop leaves before anything else is tidied up, and
+once a robot is being stopped nothing interrupts that.
+"""
+
+import contextlib
+import functools
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from bifa.link.errors import NoAnswerError, RestartedError
+from bifa.link.frames import Report
+from bifa.link.session import Session
+from bifa.link.table import STATES
+
+CONFIRMED_WITHIN_S = 5.0
+FIRST_ATTEMPT_S = 0.25  # the next one waits twice as long: the computer may be slow rather than the cable bad
+STANDING = (STATES.index("stopped"), STATES.index("fault"))
+
+
+class Robot(Protocol):
+    """What can be stopped from a signal handler."""
+
+    def send_stop(self) -> None:
+        """Send the stop, without waiting for anything."""
+
+
+_inside: list[Robot] = []
+_earlier_handlers: dict[int, Any] = {}
+_earlier_hook: list[Callable] = []
+_held: list[int] = []
+_again: list[threading.Timer] = []
+_whole: set = set()  # code of the functions that nothing interrupts
+AGAIN_AFTER_S = 0.01
+
+
+def enter(robot: Robot) -> None:
+    """From now on, until `leave`, SIGINT, SIGTERM and SIGHUP stop `robot` at once and raise KeyboardInterrupt.
+
+    What the program or `nohup` has decided otherwise is left alone, and so is everything in other threads than the main
+    one, which get no signals.
+    """
+    if not _inside and threading.current_thread() is threading.main_thread():
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)  # Windows has no SIGHUP
+            if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                _earlier_handlers[number] = signal.signal(number, _end)
+        _earlier_hook.append(sys.unraisablehook)
+        sys.unraisablehook = _end_again
+    _inside.append(robot)
+
+
+def leave(robot: Robot) -> None:
+    """`robot` has been stopped; signals mean again what they meant before."""
+    _inside.remove(robot)
+    if not _inside and threading.current_thread() is threading.main_thread():
+        while _earlier_handlers:
+            signal.signal(*_earlier_handlers.popitem())
+        sys.unraisablehook = _earlier_hook.pop()
+        while _again:
+            _again.pop().cancel()
+            _held.append(signal.SIGINT)
+
+
+def uninterrupted(function: Callable) -> Callable:
+    """Decorates what must come to its end: a signal meanwhile raises KeyboardInterrupt only after it."""
+
+    @functools.wraps(function)
+    def whole(*args, **kwargs):
+        result = function(*args, **kwargs)
+        if _held:
+            _held.clear()
+            raise KeyboardInterrupt
+        return result
+
+    _whole.add(whole.__code__)
+    return whole
+
+
+def _end(number: int, frame) -> None:
+    while frame is not None:
+        if frame.f_code in _whole:
+            _held.append(number)
+            return
+        frame = frame.f_back
+    _held.clear()
+    _again.clear()
+    # First of all: what lies between here and the end of the command may take long, or write to a pipe that is full.
+    for robot in _inside:
+        with contextlib.suppress(ConnectionError):
+            robot.send_stop()
+    raise KeyboardInterrupt
+
+
+def _end_again(lost) -> None:
+    """Python drops what is raised while it clears up (`__del__`, a generator's end): raise it once more."""
+    if lost.exc_type is KeyboardInterrupt:
+        _again.append(threading.Timer(AGAIN_AFTER_S, signal.raise_signal, [signal.SIGINT]))
+        _again[-1].start()
+    else:
+        _earlier_hook[-1](lost)
+
+
+def stop_until_confirmed(session: Session, ask: Callable[[float], Report], timeout_s: float) -> None:
+    """Send the stop until the status that `ask(timeout_s)` gets shows that no valve is on.
+
+    Raises NoAnswerError after `timeout_s`, and a ConnectionError if the port is gone.
+    """
+    deadline, attempt_s = session.clock.now() + timeout_s, FIRST_ATTEMPT_S
+    reason = NoAnswerError("the Uno answers the stop with valves that are on")
+    while True:
+        session.send_stop()
+        try:
+            status = ask(attempt_s)
+            if status["state"] in STANDING and status["valves"] == 0:
+                return
+        except NoAnswerError as error:
+            reason = error
+        attempt_s = min(2 * attempt_s, deadline - session.clock.now())
+        if attempt_s <= 0:
+            raise reason
+
+
+def stop_in_new_session(session: Session, timeout_s: float = CONFIRMED_WITHIN_S) -> None:
+    """As stop_until_confirmed(), in a session of its own: nothing of an interrupted one is waited for or sent again."""
+    new = session.successor()
+
+    def ask(attempt_s: float) -> Report:
+        try:
+            new.connect(attempt_s)
+            return new.call("status", timeout_s=attempt_s)
+        except RestartedError as error:  # it greets once more
+            raise NoAnswerError(str(error)) from None
+
+    stop_until_confirmed(new, ask, timeout_s)

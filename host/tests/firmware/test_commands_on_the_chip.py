@@ -1,0 +1,115 @@
+"""What a command may do when something in it, or before it, was wrong."""
+
+import pytest
+
+from bench.bench_uno import connected
+from bifa.link.errors import LinkError, RefusedError
+
+pytestmark = pytest.mark.uno
+
+
+def code(refused: pytest.ExceptionInfo) -> str:
+    return str(refused.value)
+
+
+def add(uno, time_ms: int, chamber: int, state: int) -> None:
+    uno.session.call("schedule_add", time_ms, chamber, state)
+
+
+def test_first_error_spoils_a_schedule_until_it_is_cleared(bench):
+    uno = connected(bench.board)
+    uno.session.call("schedule_clear")
+    add(uno, 0, 0, 2)
+    add(uno, 1000, 1, 2)
+    with pytest.raises(RefusedError, match="backwards"):
+        add(uno, 500, 0, 0)
+    with pytest.raises(RefusedError, match="a part was refused"):
+        add(uno, 2000, 0, 0)
+    with pytest.raises(RefusedError, match="a part was refused"):
+        uno.session.call("schedule_start")
+    bench.wait(1.5)
+    assert not bench.valves_on
+    uno.session.call("schedule_clear")
+    add(uno, 0, 0, 2)
+    uno.session.call("schedule_start")
+    bench.wait(0.1)
+    assert bench.valves_on
+
+
+@pytest.mark.parametrize("wrong", [(0, 3, 2), (0, 0, 3)], ids=["chamber", "state"])
+def test_entry_that_makes_no_sense_spoils_a_schedule(bench, wrong):
+    uno = connected(bench.board)
+    uno.session.call("schedule_clear")
+    add(uno, 0, 0, 2)
+    with pytest.raises(RefusedError):
+        add(uno, *wrong)
+    with pytest.raises(RefusedError):
+        uno.session.call("schedule_start")
+    bench.wait(0.1)
+    assert not bench.valves_on
+
+
+def test_schedule_of_seventeen_entries_does_not_run_without_its_last(bench):
+    uno = connected(bench.board)
+    uno.session.call("schedule_clear")
+    for entry in range(16):
+        add(uno, 100 * entry, 0, 2)
+    with pytest.raises(LinkError):
+        add(uno, 1600, 0, 0)
+    with pytest.raises(RefusedError):
+        uno.session.call("schedule_start")
+    assert not bench.valves_on
+
+
+def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench):
+    uno = connected(bench.board)
+    uno.upload({"period_s": 20.0})
+    uno.run()
+    bench.wait(1.0)
+    assert len(bench.valves_on) == 3
+    uno.upload({"duty_body": 0.0, "duty_head": 0.0, "duty_tail": 0.0}, wait=False)
+    before = bench.valves_on
+    assert "ok" in bench.say("set pressure_psi 5", 0.3)
+    assert bench.board.dac_code == 5000 * 4096 // 130_000
+    assert bench.valves_on == before, "the waiting set was taken over in mid-cycle"
+    bench.wait(20.0)
+    assert bench.valves_on == [4, 6, 8], "at the boundary all are positive for good"
+    assert "[pressure_psi 5\n" in bench.say("show pressure_psi")
+
+
+@pytest.mark.parametrize("noise", [b"\x9c", b"\n", b"x", b"nonsense\n", b"\x00\x01\x00"])
+def test_what_makes_no_sense_does_not_pass_for_a_host(bench, noise):
+    bench.say("set host_timeout_s 1.5")
+    bench.say("run")
+    for _ in range(4):
+        bench.board.send(noise)
+        bench.wait(0.5)
+    assert not bench.valves_on
+    assert "host_silent" in bench.say("status", 0.5) + bench.say("status", 0.5)
+
+
+@pytest.mark.parametrize("sense", [b"status\n", b"show period_s\n"])
+def test_a_line_that_makes_sense_does(bench, sense):
+    bench.say("set host_timeout_s 1.5")
+    bench.say("run")
+    for _ in range(8):
+        bench.board.send(sense)
+        bench.wait(0.5)
+    assert bench.valves_on
+
+
+def test_zero_is_refused_with_its_reason_and_shows_the_old_and_the_new_offset(bench):
+    bench.volts = [2.52, 2.49, 2.5]
+    bench.wait(0.8)
+    assert "error pressures still move: rest 4 s first" in bench.say("zero confirm", 0.5)
+    bench.volts[0] = 2.7  # 1.5 psi
+    bench.wait(6.0)
+    assert "error more than 0.9 psi from zero" in bench.say("zero confirm", 0.5)
+    bench.volts[0] = 2.52
+    bench.wait(6.0)
+    lines = bench.say("zero confirm", 2.0).splitlines()
+    assert lines[-1] == "ok"
+    old, new = (line.split() for line in lines[-3:-1])
+    assert old == ["[offset", "psi", "body", "0", "head", "0", "tail", "0"]
+    assert float(new[3]) == pytest.approx(0.15 + 0.02, abs=0.04)
+    assert float(new[5]) == pytest.approx(-0.075 + 0.02, abs=0.04)

@@ -1,0 +1,113 @@
+"""Wherever the program hangs the valves fall within 0.6 s, the chip restarts, and it says why it did."""
+
+import pytest
+
+from virtual_robot.uno import CLOCK_HZ
+
+pytestmark = pytest.mark.uno
+
+LIMIT_S = 0.6
+VALVES = range(4, 10)
+TICK = "__vector_11"  # TIMER1_COMPA
+IN_THE_MIDDLE = 0.3  # of the function: past what it begins with
+BOOTLOADER_S = 1.0
+
+
+def run_into(bench, function: str) -> None:
+    """Run until the program is in the middle of a function."""
+    begin, end = bench.board.span(function)
+    middle = begin + round(IN_THE_MIDDLE * (end - begin))
+    for _ in range(CLOCK_HZ // 10):
+        bench.board.run_until(bench.board.cycle + 1)
+        if middle <= bench.board.program_counter < end:
+            return
+    raise AssertionError(f"the program never came to the middle of {function}")
+
+
+def cause(bench) -> str:
+    text = bench.say("version", 0.2)
+    return text.split("started by ")[1].split()[0]
+
+
+def valves_fell_and_chip_restarted(bench, first: int, begin: int) -> None:
+    resets = [e for e in bench.events_since(first) if e.kind == "reset"]
+    falls = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in VALVES and e.value == 0]
+    assert len(resets) == 1
+    assert bench.board.last_reset_cause == "watchdog"
+    assert max(e.cycle for e in falls) - begin <= LIMIT_S * CLOCK_HZ
+    assert not bench.valves_on
+
+
+@pytest.mark.parametrize("optiboot", [False, True], ids=["no bootloader", "stock bootloader"])
+@pytest.mark.parametrize("interrupts", [True, False], ids=["interrupts on", "interrupts off"])
+@pytest.mark.parametrize("function", ["main", TICK])
+def test_program_that_hangs_vents_and_restarts_into_a_fault_that_says_so(bench, function, interrupts, optiboot):
+    bench.board.use_optiboot(optiboot)
+    bench.board.reset("external", BOOTLOADER_S if optiboot else 0)
+    bench.wait(BOOTLOADER_S + 0.2)
+    assert cause(bench) == "external"
+    bench.say("run")
+    assert bench.valves_on
+    run_into(bench, function)
+    first, begin = bench.board.event_count, bench.board.cycle
+    bench.board.hang(interrupts)
+    bench.wait(0.8)
+    valves_fell_and_chip_restarted(bench, first, begin)
+    hidden = optiboot and not interrupts  # no instruction could leave a mark, and the bootloader clears the flag
+    expected = "restart" if hidden else "watchdog"
+    assert cause(bench) == expected
+    assert f"[fault {expected}" in bench.say("status", 0.5)
+    assert "error" in bench.say("run")
+    assert bench.say("clear").endswith("ok\n")
+
+
+def test_clock_that_stops_restarts_the_chip_though_the_main_loop_goes_on(bench):
+    """With bytes coming in all the time the main loop never sleeps; the valves would stay as they are for ever."""
+    bench.say("run")
+    first, begin = bench.board.event_count, bench.board.cycle
+    no_more_ticks = b"\x00"
+    bench.board.poke(0x6F, no_more_ticks)  # TIMSK1
+    for _ in range(80):
+        bench.say("", 0.01)
+    valves_fell_and_chip_restarted(bench, first, begin)
+    assert cause(bench) == "watchdog"
+
+
+def test_main_loop_and_tick_that_only_take_long_are_no_hang(bench):
+    """The longest answers, one after the other with no pause."""
+    bench.say("echo on")
+    bench.say("run")
+    bench.board.send(b"help\r" * 20)
+    bench.wait(2.5)
+    assert bench.board.resets == 1
+    assert bench.valves_on
+
+
+CAUSES = {  # what starts the chip -> what it says without a bootloader, and with the one that Unos have
+    "power-on": ("power", "power"),
+    "external": ("external", "external"),
+    "brown-out": ("brown_out", "restart"),
+}
+
+
+@pytest.mark.parametrize("optiboot", [False, True], ids=["no bootloader", "stock bootloader"])
+@pytest.mark.parametrize("event", CAUSES)
+def test_chip_says_why_it_started(bench, event, optiboot):
+    bench.board.use_optiboot(optiboot)
+    bench.board.reset("external", BOOTLOADER_S)  # a port was opened before
+    bench.wait(BOOTLOADER_S + 0.2)
+    bench.board.reset(event, BOOTLOADER_S if optiboot and event == "external" else 0)
+    bench.wait(BOOTLOADER_S + 0.2)
+    assert cause(bench) == CAUSES[event][optiboot]
+
+
+def test_unknown_bootloader_whose_wait_was_never_seen_is_no_reason_for_a_fault(bench):
+    """It clears the flags as the stock one does, but leaves the registers alone: what can have been a button is one."""
+    bench.board.use_optiboot()
+    bench.board.reset("power-on")
+    bench.wait(0.2)
+    assert cause(bench) == "power"
+    bench.board.reset("brown-out")
+    bench.wait(0.2)
+    assert cause(bench) == "external"
+    assert "state idle" in bench.say("status", 0.3)

@@ -1,0 +1,224 @@
+"""However one leaves, the robot stands; and where nobody can know that it does, it is said."""
+
+import contextlib
+import random
+import signal
+import sys
+import time
+
+import pytest
+
+from bifa.link import PortGoneError, RefusedError, StillMovingError, Uno
+from bifa.link.frames import STOP
+from bifa.link.terminal import type_line
+from harness.board import Board
+from harness.faulty_line import FaultyLine
+
+
+class Line:
+    """A transport in front of a board whose ways can be cut: `swallow` takes what is written, `gone` ends all."""
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+        self.gone = False
+        self.swallow = lambda data: False
+
+    def write(self, data: bytes) -> None:
+        if self.gone:
+            raise PortGoneError("/dev/robot is gone")
+        if not self.swallow(data):
+            self.board.write(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        if self.gone:
+            raise PortGoneError("/dev/robot is gone")
+        return self.board.read(timeout_s)
+
+
+@pytest.fixture
+def board() -> Board:
+    return Board()
+
+
+@pytest.fixture
+def line(board) -> Line:
+    return Line(board)
+
+
+def walk(uno: Uno, board: Board) -> None:
+    uno.connect()
+    uno.run()
+    board.sleep(0.1)
+    assert board.valves != 0
+
+
+def talk(board: Board) -> None:
+    with Uno(board, board, seed=1) as uno:
+        uno.connect()
+        uno.stream(True)
+        uno.run()
+        uno.samples(0.02)
+        uno.status()
+
+
+class CtrlC:
+    """Sends SIGINT at the calls and lines of bifa.link whose numbers are given; counts them."""
+
+    def __init__(self, *moments: int) -> None:
+        self._moments, self.passed = set(moments), 0
+
+    def _trace(self, frame, event, _):
+        if "bifa/link/" not in frame.f_code.co_filename:
+            return None
+        self.passed += 1
+        if self.passed in self._moments:
+            signal.raise_signal(signal.SIGINT)
+        return self._trace
+
+    def __enter__(self) -> "CtrlC":
+        sys.settrace(self._trace)
+        return self
+
+    def __exit__(self, *_) -> None:
+        sys.settrace(None)
+
+
+def press_ctrl_c(board: Board, *moments: int) -> int:
+    """Talk, with Ctrl-C at those moments; returns how many moments there were."""
+    with CtrlC(*moments) as pressed:
+        talk(board)
+    return pressed.passed
+
+
+@pytest.mark.parametrize("presses", [120, pytest.param(3000, marks=pytest.mark.soak)])
+def test_ctrl_c_at_any_moment_leaves_the_robot_standing(presses):
+    moments, rng = press_ctrl_c(Board()), random.Random(1)
+    assert moments > 3000
+    # The last ones are those of leaving itself: half of the presses go there, and another follows soon after.
+    for number in range(presses):
+        first = rng.randrange(1, moments) if number % 2 else moments - rng.randrange(1, 800)
+        board = Board()
+        with contextlib.suppress(KeyboardInterrupt, RefusedError):  # a stopped robot refuses to walk
+            press_ctrl_c(board, first, first + rng.randrange(1, 100))
+        assert board.valves == 0, (first, moments)
+        board.sleep(0.05)
+        assert board.valves == 0, (first, moments)
+
+
+def test_ctrl_c_while_the_robot_is_being_stopped_is_not_lost(board):
+    moments = press_ctrl_c(Board())
+    with pytest.raises(KeyboardInterrupt):
+        press_ctrl_c(board, moments - 50)
+    assert (board.valves, board.state) == (0, "stopped")
+
+
+def test_signals_mean_afterwards_what_they_meant_before(board):
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    talk(board)
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == before
+
+
+def test_ctrl_c_that_python_drops_comes_again(board):
+    class Dying:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    def interrupted() -> None:
+        with Uno(board, board) as uno:
+            walk(uno, board)
+            Dying()
+            time.sleep(10)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert (board.valves, board.state) == (0, "stopped")
+
+
+def test_kill_stops_before_anything_is_tidied_up(board):
+    def interrupted() -> None:
+        with Uno(board, board) as uno:
+            walk(uno, board)
+            try:
+                signal.raise_signal(signal.SIGTERM)
+            finally:
+                board.sleep(0.002)
+                seen.append(board.valves)
+
+    seen = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert seen == [0]
+
+
+@pytest.mark.parametrize("ending", [KeyboardInterrupt, ValueError, SystemExit, None])
+def test_every_end_waits_for_the_confirmation(board, ending):
+    with contextlib.suppress(KeyboardInterrupt, ValueError, SystemExit), Uno(board, board) as uno:
+        walk(uno, board)
+        if ending:
+            raise ending
+    assert (board.valves, board.state) == (0, "stopped")  # without a moment's waiting
+
+
+@pytest.mark.parametrize("lost", [1, 3])
+def test_a_stop_that_is_lost_is_repeated(board, line, lost):
+    swallowed = []
+
+    def swallow(data: bytes) -> bool:
+        if data == STOP and len(swallowed) < lost:
+            swallowed.append(data)
+            return True
+        return False
+
+    line.swallow = swallow
+    with Uno(line, board) as uno:
+        walk(uno, board)
+        uno.stop()
+        assert (len(swallowed), board.valves, board.state) == (lost, 0, "stopped")
+        uno.clear()
+        uno.run()
+        swallowed.clear()
+    assert (len(swallowed), board.valves, board.state) == (lost, 0, "stopped")
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_bad_cable_does_not_keep_the_robot_moving(board, seed):
+    noisy = FaultyLine(board, 0.0, seed)
+    with Uno(noisy, board, seed) as uno:
+        walk(uno, board)
+        noisy.rate = 0.02
+    assert (board.valves, board.state) == (0, "stopped")
+
+
+def test_a_stop_that_nobody_confirms_is_said_aloud(board, line):
+    def cut_off() -> None:
+        with Uno(line, board) as uno:
+            walk(uno, board)
+            line.swallow = lambda data: True
+
+    with pytest.raises(StillMovingError, match=r"THE ROBOT MAY STILL BE MOVING.*emergency stop"):
+        cut_off()
+
+
+def test_a_port_that_vanishes_from_a_walking_robot_is_said_aloud(board, line):
+    def unplugged() -> None:
+        with Uno(line, board) as uno:
+            walk(uno, board)
+            line.gone = True
+            uno.status()
+
+    with pytest.raises(StillMovingError, match="is gone\nTHE ROBOT MAY STILL BE MOVING") as told:
+        unplugged()
+    assert isinstance(told.value.__cause__, PortGoneError)
+
+
+@pytest.mark.parametrize("typed", ["show", "run", "hold body vacuum"])
+def test_a_robot_that_was_never_moved_gives_no_alarm(board, line, typed):
+    def unplugged() -> None:
+        with Uno(line, board) as uno:
+            uno.connect()
+            type_line(uno, typed, board)
+            line.gone = True
+            uno.status()
+
+    with pytest.raises(PortGoneError if typed == "show" else StillMovingError):
+        unplugged()

@@ -1,0 +1,70 @@
+"""Timed holds: all of them or none, and never without their end."""
+
+import math
+import re
+
+import pytest
+
+from bifa.link import ParameterError, RefusedError, Uno
+from bifa.link.uno import LATEST_HOLD_S, SCHEDULE_ENTRIES
+from harness.board import Board
+from harness.native import ROOT
+
+
+class Counting(Board):
+    """Counts what is written."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.written = 0
+
+    def write(self, data: bytes) -> None:
+        self.written += len(data)
+        super().write(data)
+
+
+@pytest.fixture
+def board() -> Counting:
+    return Counting()
+
+
+@pytest.fixture
+def uno(board) -> Uno:
+    uno = Uno(board, board, seed=1)
+    uno.connect()
+    return uno
+
+
+def test_a_refused_schedule_does_not_start(board, uno):
+    with pytest.raises(RefusedError, match="times must not go backwards"):
+        uno.schedule([(0, "body", "positive"), (1, "head", "positive"), (0.5, "body", "off")])
+    for _ in range(50):
+        board.sleep(0.1)
+        assert (board.valves, board.state) == (0, "idle")
+    assert not uno.status().is_schedule_running
+
+
+def test_a_schedule_that_does_not_fit_is_refused_before_anything_is_sent(board, uno):
+    before = board.written
+    holds = [(i / 10, "body", "positive" if i % 2 == 0 else "off") for i in range(SCHEDULE_ENTRIES + 1)]
+    with pytest.raises(ParameterError, match="17 timed holds; the Uno has room for 16"):
+        uno.schedule(holds)
+    for time_s in (-0.001, math.nan, math.inf, LATEST_HOLD_S + 0.001):
+        with pytest.raises(ParameterError, match="time of a hold"):
+            uno.schedule([(time_s, "body", "off")])
+    assert board.written == before
+
+
+def test_the_limit_is_that_of_the_uno(board, uno):
+    capacity = re.search(r"kCapacity = (\d+);", (ROOT / "lib/controller/schedule.h").read_text())
+    assert int(capacity[1]) == SCHEDULE_ENTRIES
+    uno.schedule([(LATEST_HOLD_S, "body", "off")] * SCHEDULE_ENTRIES)
+    assert uno.status().is_schedule_running
+
+
+def test_a_schedule_runs_to_its_end(board, uno):
+    uno.schedule([(0.1, "body", "positive"), (0.3, "body", "off")])
+    board.sleep(0.25)
+    assert board.valves != 0
+    board.sleep(0.2)
+    assert (board.valves, board.state) == (0, "idle")

@@ -1,0 +1,187 @@
+"""What the host makes of an Uno that says what no table knows, and of a call that was cut off."""
+
+import struct
+from dataclasses import asdict
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.link import MismatchError, RestartedError, Uno, frames
+from bifa.link.frames import Report
+from bifa.link.session import Hello
+from bifa.link.table import REPORTS, STATES
+from bifa.live.monitor import Monitor
+from bifa.live.record import HEADER, _row
+from bifa.printable import printable
+from bifa.screen import Console
+from harness.board import Board
+from harness.pty_uno import PtyUno
+
+
+class Scripted(Board):
+    """A board whose frames pass through `alter(name, values)`; `interrupt_at` raises in so many reads from now."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.alter = lambda name, values: values
+        self.interrupt_in = -1
+        self.key = 0
+        self._splitter = frames.Splitter()
+
+    def write(self, data: bytes) -> None:
+        super().write(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        data = super().read(timeout_s)
+        self.interrupt_in -= 1
+        if self.interrupt_in == 0:
+            raise KeyboardInterrupt
+        return b"".join(self._altered(kind, content) for kind, content in self._splitter.feed(data))
+
+    def _altered(self, kind: str, content: bytes) -> bytes:
+        if kind == "line":
+            return content + b"\n"
+        body = frames.cobs_decode(content)
+        message = next(report for report in REPORTS.values() if report.number == body[0])
+        values = list(struct.unpack(message.layout, body[2:-4]))
+        seed = frames.STREAM_SEED if message.kind == "stream" else frames.OPEN_SEED
+        if message.kind == "session":
+            return b"\0\0" + content + b"\0"
+        body = body[:2] + struct.pack(message.layout, *self.alter(message.name, values))
+        return b"\0\0" + frames.cobs_encode(body + frames.checks(body, seed)) + b"\0"
+
+
+@pytest.fixture
+def board() -> Scripted:
+    return Scripted()
+
+
+def with_field(name: str, field: str, value: int):
+    """Alters one field of one message."""
+    at = [f for f, count in REPORTS[name].fields for _ in range(count)].index(field)
+
+    def alter(message: str, values: list) -> list:
+        return [*values[:at], value, *values[at + 1 :]] if message == name else values
+
+    return alter
+
+
+def test_an_unknown_start_cause_of_the_same_table_is_shown(board):
+    board.alter = with_field("hello", "start_cause", 200)
+    assert Uno(board, board).connect().start_cause == "unknown (200)"
+
+
+def test_an_unknown_start_cause_of_another_version_is_a_mismatch(board):
+    cause, table = with_field("hello", "start_cause", 200), with_field("hello", "table_hash", 0x12345678)
+    board.alter = lambda name, values: table(name, cause(name, values))
+    with pytest.raises(MismatchError, match=r"12345678.*bifa flash"):
+        Uno(board, board).connect()
+
+
+@given(st.binary(min_size=13, max_size=13))
+def test_any_hello_can_be_read(raw):
+    Hello.of(Report("hello", 0, frames._unpack(REPORTS["hello"], raw)))
+
+
+@pytest.fixture(scope="module")
+def connected() -> Uno:
+    board = Board()
+    uno = Uno(board, board)
+    uno.connect()
+    return uno
+
+
+@given(raw=st.binary(min_size=21, max_size=21))
+@settings(max_examples=30)
+def test_any_sample_can_be_shown_and_recorded(connected, raw):
+    uno = connected
+    uno._last_sequence = None
+    uno._take_sample(Report("sample", 0, frames._unpack(REPORTS["sample"], raw)))
+    (sample,) = uno.samples(0)
+    assert sample.state in STATES or sample.state == f"unknown ({raw[6]})"
+    monitor = Monitor(uno)
+    monitor.take([sample])
+    with Console(width=80).capture() as _:
+        Console(width=80).print(monitor.draw())
+    assert len(_row(uno, sample, 0)) == len(HEADER)
+
+
+@given(st.binary(min_size=43, max_size=43))
+def test_any_status_can_be_read(raw):
+    board = Board()
+    uno = Uno(board, board)
+    uno.session.call = lambda name: Report("status_report", 0, frames._unpack(REPORTS["status_report"], raw))
+    assert asdict(uno.status())["valves"] == raw[29]
+
+
+def test_two_valves_of_a_chamber_on_are_never_shown_as_off(board):
+    uno = Uno(board, board)
+    uno.connect()
+    board.alter = with_field("sample", "valves", 0b000011)
+    uno.stream(True)
+    assert uno.samples(1.0)[-1].connected == ("both", "off", "off")
+
+
+@pytest.mark.parametrize("interrupt_in", range(1, 5))
+def test_an_interrupted_call_does_not_leave_its_answer_to_the_next(board, interrupt_in):
+    uno = Uno(board, board, seed=1)
+    uno.connect()
+    uno.stream(True)
+    board.interrupt_in = interrupt_in
+    with pytest.raises(KeyboardInterrupt):
+        uno.session.call_all([("read_set", ())] * 20)
+    assert uno.status().state == "idle"
+    assert uno.parameters()["period_s"] == 5.7
+    assert uno.samples(1.0)  # telemetry goes on
+
+
+def test_an_interrupted_run_is_not_carried_out_later(board):
+    class Cut(Scripted):
+        def write(self, data: bytes) -> None:
+            if self.interrupt_in == 1:
+                raise KeyboardInterrupt  # before anything has left
+            super().write(data)
+
+    cut = Cut()
+    uno = Uno(cut, cut, seed=1)
+    uno.connect()
+    cut.interrupt_in = 1
+    with pytest.raises(KeyboardInterrupt):
+        uno.run()
+    cut.interrupt_in = -1
+    for _ in range(20):
+        assert uno.status().state == "idle"
+
+
+def test_a_restart_during_an_interruption_is_told(board):
+    uno = Uno(board, board, seed=1)
+    uno.connect()
+    board.interrupt_in = 1
+    with pytest.raises(KeyboardInterrupt):
+        uno.status()
+    board.reset()
+    with pytest.raises(RestartedError):
+        uno.status()
+
+
+@given(st.text())
+def test_what_is_shown_is_printable_and_says_what_it_was(text):
+    shown = printable(text)
+    assert shown.replace("\n", "").replace("\t", "").isprintable()
+    assert printable(shown) == shown
+    if "\\" not in text:
+        assert shown.encode("latin1", "backslashreplace").decode("unicode_escape") == text
+
+
+def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(tmp_path):
+    uno = PtyUno()
+    served = uno.board.receive
+    uno.board.receive = lambda: served().replace(b"ok\n", b"[\x1b]0;owned\x07 \x9b2J\nok\n")
+    done = CliRunner().invoke(app, ["console", "--port", uno.device], input="show period_s\n" * 3)
+    uno.unplug()
+    assert done.exit_code == 0, done.output
+    assert done.output.count("\\x1b]0;owned\\x07") == 3
+    assert done.output.replace("\n", "").isprintable()
