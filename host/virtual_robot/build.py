@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compile the two C parts beside their packages: `python -m virtual_robot.build`.
+"""Compile the C parts beside their packages: `python -m virtual_robot.build`.
 
-`uno` needs libsimavr (Debian: libsimavr-dev libelf-dev); `plant` needs only a C compiler, so data sets can be
+`uno` needs libsimavr (Debian: libsimavr-dev libelf-dev); the others need only a C compiler, so data sets can be
 generated where libsimavr is missing. Nothing is rebuilt when the objects are newer than their sources.
 """
 
@@ -21,7 +21,7 @@ HERE = Path(__file__).resolve().parent
 
 @dataclass(frozen=True)
 class Part:
-    """One C part: the header that is its whole interface, and what it is linked with."""
+    """One C part: its folder, the header that is its whole interface, and what it is linked with."""
 
     name: str
     header: str
@@ -34,7 +34,15 @@ class Part:
 
     @property
     def built(self) -> Path:
-        return HERE / self.name / f"_{self.name}{sysconfig.get_config_var('EXT_SUFFIX')}"
+        return HERE / self.name / f"_{self.leaf}{sysconfig.get_config_var('EXT_SUFFIX')}"
+
+    @property
+    def leaf(self) -> str:
+        return self.name.rpartition("/")[2]
+
+    @property
+    def module(self) -> str:
+        return f"virtual_robot.{self.name.replace('/', '.')}._{self.leaf}"
 
     def sources(self) -> list[Path]:
         return sorted(self.folder.glob("*.c"))
@@ -46,6 +54,7 @@ class Part:
 
 PARTS = (
     Part("plant", "plant.h", ("m",)),
+    Part("truths/foreign", "foreign.h", ("m",)),
     Part("uno", "uno.h", ("simavr", "elf", "util"), ("/usr/include/simavr",)),
 )
 
@@ -60,7 +69,7 @@ def compile_part(part: Part) -> None:
     ffi = FFI()
     ffi.cdef(declarations(part.folder / part.header))
     ffi.set_source(
-        f"virtual_robot.{part.name}._{part.name}",
+        part.module,
         f'#include "{part.header}"',
         sources=[str(p) for p in part.sources()],
         include_dirs=[str(part.folder), *part.include],

@@ -96,11 +96,11 @@ class _Pump:
             self._rig.uno.receive()
             self._unsent = b""
         self._is_open = is_open
-        if not is_open:
-            time.sleep(timeout_s)  # poll returns at once while nobody is there
-        elif flags & select.POLLIN:
+        if flags & select.POLLIN:  # also what was written before a hang-up: a real port sends it out
             with contextlib.suppress(BlockingIOError, OSError):
                 self._rig.uno.send(os.read(self._master, 4096))
+        elif not is_open:
+            time.sleep(timeout_s)  # poll returns at once while nobody is there
 
     def _to_host(self) -> None:
         self._unsent += self._rig.uno.receive()

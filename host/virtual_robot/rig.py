@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +26,24 @@ from virtual_robot.uno import CLOCK_HZ, Uno
 
 FIRMWARE = Path(__file__).resolve().parents[2] / ".pio" / "build" / "uno" / "firmware.elf"
 _USB_FRAME_S = 1e-3  # the USB chip hands bytes over once a millisecond
-_CLOCK_ERROR = {"ideal": 0.0, "realistic": 2.3e-3}  # ceramic resonator, +-0.5 %
-_BOOTLOADER_S = {"ideal": 0.0, "realistic": 1.0}  # optiboot waits after an external reset
-_WOBBLE = {"ideal": 0.0, "realistic": 0.01}
+_GAUGED_PSI = round(int(8.5 / 130.0 * 4096) / 4096 * 130.0, 4)  # 8.5 psi in whole counts of the converter
+
+
+@dataclass(frozen=True)
+class _BenchProfile:
+    """How far the Uno and the instruments are from perfect."""
+
+    clock_error: float = 0.0  # of the Uno's resonator
+    bootloader_s: float = 0.0
+    wobble: float = 0.0  # of the friction, from run to run
+    noise: Noise = field(default_factory=Noise)
+    clock_resolution_s: float = 0.0  # of the instruments' time stamps
+
+
+# A ceramic resonator is good to 0.5 %; optiboot waits after an external reset; amplifiers and cameras filter, so their
+# noise is correlated (0.1 to 0.3 from one sample to the next).
+_REAL = _BenchProfile(2.3e-3, 1.0, 0.01, Noise(memory_s=0.008))
+_BENCHES = {"ideal": _BenchProfile(), "realistic": _REAL, "worn": _REAL}
 
 
 class World:
@@ -36,6 +53,8 @@ class World:
         self.uno = uno
         self.clock_hz = clock_hz
         self._start_cycle = uno.cycle
+        # Two threads may use a serial port at once; this one lets them take turns at the simulated chip.
+        self.turn = threading.RLock()
 
     @property
     def cycle(self) -> int:
@@ -48,8 +67,9 @@ class World:
     def run(self, duration_s: float, stop_on_output: bool = False) -> bool:
         """Let time pass; True if it stopped early because the board sent a byte."""
         # Rounded up, so that waiting for the rest of a cycle gets there.
-        until = self.uno.cycle + max(0, math.ceil(duration_s * self.clock_hz))
-        return self.uno.run_until(until, stop_on_output)
+        with self.turn:
+            until = self.uno.cycle + max(0, math.ceil(duration_s * self.clock_hz))
+            return self.uno.run_until(until, stop_on_output)
 
 
 class VirtualTransport:
@@ -61,17 +81,19 @@ class VirtualTransport:
         self._open = True
 
     def write(self, data: bytes) -> None:
-        self._check()
-        self._world.uno.send(bytes(data))
+        with self._world.turn:
+            self._check()
+            self._world.uno.send(bytes(data))
 
     def read(self, timeout_s: float) -> bytes:
         """What has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
-        self._check()
-        if not self._world.run(timeout_s, stop_on_output=True):
-            return b""
-        if timeout_s > 0:
-            self._world.run(min(_USB_FRAME_S, timeout_s))
-        return self._world.uno.receive()
+        with self._world.turn:
+            self._check()
+            if not self._world.run(timeout_s, stop_on_output=True):
+                return b""
+            if timeout_s > 0:
+                self._world.run(min(_USB_FRAME_S, timeout_s))
+            return self._world.uno.receive()
 
     def reset(self) -> None:
         """What DTR does: an external reset; bytes still under way to the host are lost."""
@@ -132,6 +154,13 @@ class VirtualRig:
     def truth(self) -> dict[str, float]:
         return dict(self.plant.parameters)
 
+    @property
+    def known(self) -> dict[str, float]:
+        """What the lab has measured directly: the halves on its balance, and on its gauge the positive supply at the
+        Uno's preset pressure. The vacuum is what the pump makes of it, and nobody has gauged it."""
+        masses = {name: self.plant.parameters[name] for name in ("head_mass_kg", "tail_mass_kg")}
+        return {**masses, "supply_positive_psi": _GAUGED_PSI}
+
     def next_session_seed(self) -> int:
         """Another one for every session: the board takes a key that it had before for the old session."""
         return next(self._session_seeds)
@@ -175,6 +204,7 @@ def open_rig(
     seed: int = 0,
     effects: Mapping[str, Mapping[str, float]] | None = None,
     sealed: int | None = None,
+    sealed_kind: str = "single",
     eeprom: Path | str | None = None,
     parameters: Mapping[str, float] | None = None,
     keep_events: bool = True,
@@ -182,17 +212,20 @@ def open_rig(
     """A virtual bench whose board has just been powered.
 
     `firmware`: an ELF image (default: the one that `pio run -e uno` builds). `profile`: "ideal" (the paper's
-    equations and sensor noise) or "realistic". `seed`: noise, clocks and run-to-run variation. `effects`:
-    `{"hysteresis": {"force_N": 4.0}}`, several at once. `sealed`: a seed that draws a specimen and an effect
-    that nobody is told of. `eeprom`: a file that outlasts the bench. `parameters`: plant parameters to replace.
+    equations and white sensor noise), "realistic" (the same with run-to-run spread, coloured noise, clocks that
+    drift and come in steps) or "worn" (beyond the paper's equations in several ways). `seed`: noise, clocks and
+    run-to-run variation. `effects`: `{"hysteresis": {"force_N": 4.0}}`, several at once. `sealed`: a seed that
+    draws a specimen and what nobody is told of: `sealed_kind` "single" effect, "none", "pair" or "outside".
+    `eeprom`: a file that outlasts the bench. `parameters`: plant parameters to replace.
     Raises VirtualRobotError, saying what to do.
     """
     random = np.random.default_rng([seed, 0x51D])
     numbers, curves, inside = _profile(profile), None, dict(effects or {})
+    bench = _BENCHES[profile]
     if sealed is not None:
         draw = np.random.default_rng(sealed)
         own, curves = specimen(draw)
-        drawn, _ = draw_effects("single", draw)
+        drawn, _ = draw_effects(sealed_kind, draw)
         inside |= drawn
         numbers |= own
     numbers |= plant_parameters(inside) | dict(parameters or {})
@@ -203,13 +236,12 @@ def open_rig(
     # The regulator has no set-point until the firmware gives it one.
     plant = Plant(numbers | {"supply_positive_psi": 0.0}, curves)
     plant.parameters = numbers
-    clock_hz = CLOCK_HZ * (1.0 + _CLOCK_ERROR[profile])
-    noise = Noise()
-    plant.wire(uno, clock_hz, int(random.integers(2**63)), noise.pressure_psi)
+    clock_hz = CLOCK_HZ * (1.0 + bench.clock_error)
+    plant.wire(uno, clock_hz, int(random.integers(2**63)), bench.noise.pressure_psi, bench.noise.memory_s)
     world = World(uno, clock_hz)
-    instruments = Instruments(world, plant, noise, _WOBBLE[profile], random)
+    instruments = Instruments(world, plant, bench.noise, bench.wobble, random, bench.clock_resolution_s)
     instruments.mount("locomotion")
-    return VirtualRig(uno, plant, world, instruments, _BOOTLOADER_S[profile], inside, seed)
+    return VirtualRig(uno, plant, world, instruments, bench.bootloader_s, inside, seed)
 
 
 _profile = profile  # open_rig has a parameter of that name

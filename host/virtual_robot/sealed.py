@@ -6,26 +6,29 @@
 writes a data set of 45 trials into runs/seven and what is in it into runs/seven.sealed.toml, beside the folder,
 which the diagnosis never opens. Another seed is another specimen of the robot, other noise and another order of
 the day. Effect, size (0.3 to 1.5 of what the lab calls modest) and its remaining parameters are drawn as well.
+`--truth foreign` takes a robot that shares no formula with this one or with any library: 48 trials, sizes 0.3 to 1
+(virtual_robot.truths.foreign, docs/truths.md).
 """
 
 from __future__ import annotations
 
 import argparse
-import shutil
 import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 
-from virtual_robot import gait, toml
+from virtual_robot import gait
+from virtual_robot.data_folder import new_folder, write_csv, write_head
 from virtual_robot.effects import EFFECTS, LIBRARY, OUTSIDE, plant_parameters
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.plant import NOMINAL, Curve, nominal_curves
 from virtual_robot.trials import Lab, Plan
+from virtual_robot.truths import foreign
 
 KINDS = ("single", "none", "pair", "outside")
 SIZES = (0.3, 1.5)
@@ -147,7 +150,7 @@ def generate(
     lab = Lab(parameters | plant_parameters(effects), curves)
     label = Label(seed, kind, effects, sizes, parameters)
     write(out, f"sealed-{seed}", lab, random)
-    (label_file or out.with_name(out.name + ".sealed.toml")).write_text(toml.dumps(label.as_dict()))
+    (label_file or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(label.as_dict()))
     return label
 
 
@@ -155,43 +158,15 @@ def write(out: Path, name: str, lab: Lab, random: np.random.Generator) -> None:
     """Run the day's trials in a random order and write them in the contract's format."""
     day = [(plan, repeat) for plan in plans() for repeat in range(1, REPEATS + 1)]
     order = {job: place for place, job in enumerate(random.permutation(len(day)))}
-    out.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}-"))
-    try:
+    with new_folder(out) as folder:
         entries = []
         for job, (plan, repeat) in enumerate(day):
             place = order[job]
             columns = lab.run(plan, place / (len(day) - 1), random)
             file = f"{plan.name}_{repeat}.csv"
-            write_csv(scratch / file, columns)
+            write_csv(folder / file, columns)
             entries.append({"file": file, **plan.entry(), "repeat": repeat, "session_order": int(place) + 1})
-        head = {
-            "format": 1,
-            "name": name,
-            "known": {key: round(lab.parameters[key], 6) for key in _KNOWN},
-            "trial": entries,
-        }
-        (scratch / "dataset.toml").write_text(toml.dumps(head))
-        scratch.chmod(0o755)
-        scratch.rename(out)
-    except BaseException:
-        shutil.rmtree(scratch, ignore_errors=True)
-        raise
-
-
-def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
-    """One header line, then rows with the digits that the instruments give."""
-    digits = [_digits(name) for name in columns]
-    line = ",".join(f"%.{n}f" for n in digits) + "\n"
-    rows = np.column_stack(list(columns.values()))
-    text = (line * len(rows)) % tuple(rows.ravel())
-    path.write_text(",".join(columns) + "\n" + text)
-
-
-def _digits(column: str) -> int:
-    if column.startswith("command"):
-        return 0
-    return {"time_s": 4, "force_N": 3}.get(column, 4)
+        write_head(folder, name, {key: round(lab.parameters[key], 6) for key in _KNOWN}, entries)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -203,9 +178,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True, help="folder of the data set, new")
     parser.add_argument("--label", type=Path, help="the sealed file (default: OUT.sealed.toml)")
-    parser.add_argument("--effect", help=f"instead of a drawn one: {', '.join(EFFECTS)}")
+    parser.add_argument("--truth", choices=("own", "foreign"), default="own", help="whose equations (default: own)")
+    parser.add_argument("--effect", help="instead of a drawn one; an unknown name lists them")
+    parser.add_argument("--form", help="of the effect, instead of a drawn one (foreign only)")
     parser.add_argument("--size", type=float, help="factor of its modest size, instead of a drawn one")
     kind = parser.add_mutually_exclusive_group()
+    kind.add_argument("--kind", choices=("one", "none", "pair", "outside"), default="one")
     for name, text in (
         ("none", "no effect"),
         ("pair", "two effects of the library"),
@@ -213,8 +191,15 @@ def main(arguments: list[str] | None = None) -> int:
     ):
         kind.add_argument(f"--{name}", dest="kind", action="store_const", const=name, help=text)
     options = parser.parse_args(arguments)
+    seal = options.label or options.out.with_name(options.out.name + ".sealed.toml")
     try:
-        generate(options.seed, options.out, options.kind or "single", options.effect, options.size, options.label)
+        if options.truth == "foreign":
+            foreign.generate(options.seed, options.out, options.kind, options.effect, options.size, options.form, seal)
+        elif options.form is not None:
+            raise SealedError("--form is for --truth foreign: an effect of the own truth has one form")
+        else:
+            kind_of_own = {"one": "single"}.get(options.kind, options.kind)
+            generate(options.seed, options.out, kind_of_own, options.effect, options.size, seal)
     except VirtualRobotError as error:
         print(error, file=sys.stderr)
         return 2

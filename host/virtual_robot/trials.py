@@ -43,6 +43,8 @@ class Plan:
             entry["pressure_psi"] = self.pressure_psi
         if self.experiment in ("static_loading", "anchor_pull"):
             entry["rate_mm_s"] = self.rate_m_s * 1e3
+        if self.experiment == "step_response":
+            entry["extra"] = {"switch_time_s": [_STEP_UP_S, _STEP_DOWN_S]}
         if self.gait is not None:
             entry["gait"] = self.gait.as_dict()
         return entry

@@ -132,9 +132,9 @@ def test_every_effect_changes_what_is_measured(name):
 CHANNELS = {"head_m": 1e-4, "tail_m": 1e-4, "force_N": 0.15, "pressure_psi": 0.06}  # with their noise
 
 
-def test_the_realistic_profile_walks_too_and_its_air_is_compressible():
+def test_a_worn_robot_walks_too_and_its_air_is_compressible():
     slow = Gait(8.0, 270.0, 90.0, 0.5, 0.5, 0.5)
-    rows = walk(slow, 4, profile("realistic"))
+    rows = walk(slow, 4, profile("worn"))
     assert settled_speed_mm_s(rows, slow, 4) > 3.0
 
 

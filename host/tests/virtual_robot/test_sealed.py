@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bifa.data import read_dataset
-from virtual_robot import sealed, toml
+from virtual_robot import sealed
 from virtual_robot.effects import LIBRARY, OUTSIDE
 from virtual_robot.sealed import SealedError, draw_effects, generate, main
 
@@ -69,8 +69,3 @@ def test_nothing_is_overwritten_and_nothing_half_written(tmp_path, monkeypatch, 
     assert sorted(p.name for p in tmp_path.iterdir()) == ["there"]
     with pytest.raises(SealedError, match="no effect 'magic'"):
         generate(1, tmp_path / "new", effect="magic")
-
-
-def test_written_toml_is_read_back():
-    document = {"a": 1, "b": 'x "y"', "c": {"d": 0.1, "e": {"f": 1e-9}}, "t": [{"g": {"h": 2.5}}, {"i": True}]}
-    assert tomllib.loads(toml.dumps(document)) == document

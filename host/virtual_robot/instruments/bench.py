@@ -15,6 +15,7 @@ from virtual_robot.plant import Plant
 CAMERA_HZ, MACHINE_HZ = 100.0, 50.0
 _SYNC_JITTER_S = 2e-5
 _PULL_MM = 60.0
+_DAY_S = 1500.0  # what drifts over the day has come to its end: 45 trials take about so long
 _CHAMBERS = {"large": "body", "small": "head"}
 _SETTINGS: dict[str, dict[str, Any]] = {  # with their usual values; None = must be given
     "locomotion": {"inclination_deg": 0.0},
@@ -31,12 +32,21 @@ class StandError(VirtualRobotError, ValueError):
 class Instruments:
     """Instruments around one plant that is wired to a board. `world` tells the time and the board's cycle."""
 
-    def __init__(self, world: Any, plant: Plant, noise: Noise, wobble: float, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        world: Any,
+        plant: Plant,
+        noise: Noise,
+        wobble: float,
+        random: np.random.Generator,
+        clock_resolution_s: float = 0.0,
+    ) -> None:
         self._world = world
         self._plant = plant
         self._noise = noise
         self._wobble = wobble
         self._random = random
+        self._clock_resolution_s = clock_resolution_s
         self.mounted_s = 0.0
         self._clock: InstrumentClock | None = None
         self._experiment = "locomotion"
@@ -55,6 +65,7 @@ class Instruments:
             friction_factor=float(1.0 + self._wobble * self._random.standard_normal()),
             inclination_deg=self._settings.get("inclination_deg", 0.0),
             ripple_phase_rad=float(self._random.uniform(0.0, 2.0 * np.pi)),
+            session_share=min(self._world.now_s / _DAY_S, 1.0),
         )
         chamber = _CHAMBERS.get(self._settings.get("actuator", "large"), "body")
         self._plant.remount(experiment, chamber, self._world.cycle)
@@ -64,7 +75,7 @@ class Instruments:
         """Begin a record: camera at 100 Hz, machines at 50 Hz, by the instrument's own clock."""
         self._plant.advance(self._now_s)
         self._plant.take_strobes()
-        self._clock = InstrumentClock.draw(self._now_s, self._random)
+        self._clock = InstrumentClock.draw(self._now_s, self._random, resolution_s=self._clock_resolution_s)
         period_s = self._clock.true_period(1.0 / self._rate_hz)
         self._plant.watch(period_s, self._now_s + float(self._random.uniform(0.0, period_s)))
 
@@ -101,7 +112,8 @@ class Instruments:
 
     def _channels(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         def camera(name: str) -> np.ndarray:
-            return 1e3 * measured(rows[name], self._noise.camera_m, self._random)
+            correlation = self._noise.correlation(1.0 / CAMERA_HZ)
+            return 1e3 * measured(rows[name], self._noise.camera_m, self._random, correlation)
 
         if self._experiment == "locomotion":
             return {"displacement_head_mm": camera("head_m"), "displacement_tail_mm": camera("tail_m")}
@@ -109,7 +121,9 @@ class Instruments:
             return {"displacement_mm": camera("head_m")}
         return {
             "displacement_mm": 1e3 * measured(rows["crosshead_m"], self._noise.crosshead_m, self._random),
-            "force_N": measured(rows["force_N"], self._noise.force_N, self._random),
+            "force_N": measured(
+                rows["force_N"], self._noise.force_N, self._random, self._noise.correlation(1.0 / MACHINE_HZ)
+            ),
         }
 
     @property

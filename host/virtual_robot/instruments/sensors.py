@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from virtual_robot.instruments.noise import coloured
+
 ADC_COUNTS = 1023
 PSI_SPAN = 30.0
 _COUNTS_PER_PSI = 0.8 * 1024 / PSI_SPAN  # ABP: 10-90 % of the supply over +-15 psi; the ADC's step is Vcc / 1024
@@ -14,12 +16,17 @@ _COUNTS_PER_PSI = 0.8 * 1024 / PSI_SPAN  # ABP: 10-90 % of the supply over +-15 
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of white noise."""
+    """Standard deviations of the noise, and the time over which it is correlated (0 = white)."""
 
     pressure_psi: float = 0.06
     camera_m: float = 1e-4
     crosshead_m: float = 5e-6
     force_N: float = 0.15
+    memory_s: float = 0.0
+
+    def correlation(self, period_s: float) -> float:
+        """From one sample to the next."""
+        return float(np.exp(-period_s / self.memory_s)) if self.memory_s > 0 else 0.0
 
 
 def converted_psi(pressure_psi: np.ndarray, noise_psi: float, random: np.random.Generator) -> np.ndarray:
@@ -30,5 +37,6 @@ def converted_psi(pressure_psi: np.ndarray, noise_psi: float, random: np.random.
     return (counts + 0.5 - 0.1 * 1024) / _COUNTS_PER_PSI - 15.0
 
 
-def measured(values: np.ndarray, noise: float, random: np.random.Generator) -> np.ndarray:
-    return values + noise * random.standard_normal(np.shape(values))
+def measured(values: np.ndarray, noise: float, random: np.random.Generator, correlation: float = 0.0) -> np.ndarray:
+    """`values` with noise of this sd; `correlation` from one sample to the next."""
+    return values + coloured(noise, correlation, len(values), random)

@@ -125,9 +125,9 @@ class Plant:
 
     # --- wired to the Uno -------------------------------------------------------------------------------
 
-    def wire(self, uno: Any, clock_hz: float, noise_seed: int, noise_psi: float) -> None:
+    def wire(self, uno: Any, clock_hz: float, noise_seed: int, noise_psi: float, noise_memory_s: float = 0.0) -> None:
         """Connect valves, strobe, sensors and DAC to a board; from now on the board's cycles are time."""
-        lib.plant_wire(self._plant, uno.cycle, clock_hz, noise_seed, noise_psi)
+        lib.plant_wire(self._plant, uno.cycle, clock_hz, noise_seed, noise_psi, noise_memory_s)
         address = [
             int(ffi.cast("uintptr_t", pointer))
             for pointer in (

@@ -23,7 +23,7 @@ BAUD = 250_000
 EEPROM_SIZE = 1024
 _RESET_CAUSES = ("power-on", "external", "brown-out", "watchdog")
 _EVENT_KINDS = {1: "pin", 2: "uart", 3: "dac", 4: "eeprom", 5: "reset"}
-_BUS_MODES = ("dac", "absent", "stuck")
+_BUS_MODES = ("dac", "absent", "stuck", "held")
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,8 @@ class Uno:
         lib.uno_set_analog(self._uno, channel, volts)
 
     def set_bus(self, mode: str) -> None:
-        """What is on the I2C bus: "dac" (MCP4725 at 0x62), "absent", or "stuck" (no answer ever)."""
+        """What is on the I2C bus: "dac" (MCP4725 at 0x62), "absent", "stuck" (no answer ever), or "held"
+        (each byte is acknowledged, but the transfer cannot end)."""
         lib.uno_set_bus(self._uno, _BUS_MODES.index(mode))
 
     def connect(self, context: int, pin_changed: int, analog_volts: int, dac_changed: int) -> None:
@@ -134,6 +135,23 @@ class Uno:
         """
         lib.uno_reset(self._uno, _RESET_CAUSES.index(cause))
         lib.uno_hold(self._uno, round(bootloader_s * CLOCK_HZ))
+
+    def use_optiboot(self, use: bool = True) -> None:
+        """From the next reset on leave behind of it what the Uno's stock bootloader does (see chip.c)."""
+        lib.uno_use_optiboot(self._uno, use)
+
+    def hold(self, seconds: float) -> None:
+        """Let nothing be executed for so long, as with interrupts off; what is around the processor goes on."""
+        lib.uno_hold(self._uno, round(seconds * CLOCK_HZ))
+
+    def hang(self, interrupts: bool) -> None:
+        """Let the program loop for ever where it is now, with interrupts on or off, until the chip is reset."""
+        lib.uno_hang(self._uno, interrupts)
+
+    @property
+    def program_counter(self) -> int:
+        """Flash address of the next instruction."""
+        return lib.uno_program_counter(self._uno)
 
     def power_off(self) -> None:
         lib.uno_power_off(self._uno)
@@ -201,13 +219,18 @@ class Uno:
     def rx_overruns(self) -> int:
         return self._status().rx_overruns
 
-    def address(self, symbol: str) -> int:
-        """Data-space or flash address of a symbol of the image."""
+    def span(self, symbol: str) -> tuple[int, int]:
+        """Data-space or flash addresses of a symbol of the image: where it begins, where it has ended."""
         if self._symbols is None:
             self._symbols = elf.symbols(self.firmware)
         if symbol not in self._symbols:
             raise KeyError(f"{self.firmware} has no symbol {symbol!r}")
-        return self._symbols[symbol][0] & (elf.DATA_SPACE - 1)
+        value, size = self._symbols[symbol]
+        return value & (elf.DATA_SPACE - 1), (value & (elf.DATA_SPACE - 1)) + size
+
+    def address(self, symbol: str) -> int:
+        """Data-space or flash address of a symbol of the image."""
+        return self.span(symbol)[0]
 
     def peek(self, where: int | str, size: int = 1) -> bytes:
         """RAM (and registers) from an address or a symbol."""

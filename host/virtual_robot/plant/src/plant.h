@@ -55,7 +55,7 @@ typedef struct PlantParameters {
   double pump_fade_psi;
   double quadratic_damping_Ns2_m2;
   double sensor_crosstalk_share;
-  // What the realistic profile adds.
+  // What the worn profile adds.
   double iso6358_share, iso6358_critical_ratio;  // 0 = linear filling, 1 = compressible flow throughout
   double regulator_time_s;
   double valve_opening_s, valve_closing_s;
@@ -100,8 +100,9 @@ double plant_energy(const Plant *plant);  // kinetic + spring, J
 double plant_time(const Plant *plant);
 
 // --- wired to the Uno: addresses of these go into UnoWorld ---
-// `clock_hz` is what the board's 16 MHz really are.
-void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t noise_seed, double noise_psi);
+// `clock_hz` is what the board's 16 MHz really are. The sensors' noise is correlated over `noise_memory_s`; 0 = white.
+void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t noise_seed, double noise_psi,
+                double noise_memory_s);
 // Puts another experiment on the stand while the Uno goes on: time is 0 at `cycle`, the valves stay as they are.
 void plant_remount(Plant *plant, int experiment, int chamber, uint64_t cycle);
 void plant_break_sensor(Plant *plant, int channel, double volts);  // NaN = in order again

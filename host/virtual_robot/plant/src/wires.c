@@ -18,7 +18,8 @@ typedef struct Wires {
   uint64_t random;
   double spare_gauss;
   bool has_spare;
-  double noise_psi;
+  double noise_psi, noise_memory_s;
+  double noise[CHAMBERS], noise_time[CHAMBERS];  // of unit size, and when it was that
   double broken_volts[4];
   bool energised[CHAMBERS][2];  // positive, vacuum valve
   int both;
@@ -50,13 +51,15 @@ static double gauss(Wires *wires) {  // Box-Muller
   return radius * cos(angle);
 }
 
-void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t noise_seed, double noise_psi) {
+void plant_wire(Plant *plant, uint64_t start_cycle, double clock_hz, uint64_t noise_seed, double noise_psi,
+                double noise_memory_s) {
   wires_free(plant);
   Wires *wires = calloc(1, sizeof *wires);
   wires->start_cycle = start_cycle;
   wires->clock_hz = clock_hz;
   wires->random = noise_seed;
   wires->noise_psi = noise_psi;
+  wires->noise_memory_s = noise_memory_s;
   for (int i = 0; i < 4; i++) wires->broken_volts[i] = NAN;
   plant->wires = wires;
 }
@@ -109,10 +112,19 @@ static void pin_changed(void *context, uint64_t cycle, int pin, int level) {
   plant_connect(plant, fmax(time, plant->time), chamber, connected(energised));
 }
 
+// An Ornstein-Uhlenbeck process, sampled when the converter asks.
+static double sensor_noise(Wires *wires, int chamber, double time) {
+  double kept = 0;
+  if (wires->noise_memory_s > 0) kept = exp(-fabs(time - wires->noise_time[chamber]) / wires->noise_memory_s);
+  wires->noise[chamber] = kept * wires->noise[chamber] + sqrt(1.0 - kept * kept) * gauss(wires);
+  wires->noise_time[chamber] = time;
+  return wires->noise_psi * wires->noise[chamber];
+}
+
 // ABPDRRV015PDAA5: 10-90 % of the supply over +-15 psi, never beyond 2.5-97.5 %.
 static double sensor_volts(Plant *plant, int chamber) {
   Wires *wires = plant->wires;
-  double psi = reading_psi(plant, plant->time, plant->y, chamber) + wires->noise_psi * gauss(wires);
+  double psi = reading_psi(plant, plant->time, plant->y, chamber) + sensor_noise(wires, chamber, plant->time);
   double share = 0.1 + 0.8 * (psi + 15.0) / 30.0;
   return SUPPLY_VOLTS * fmin(fmax(share, 0.025), 0.975);
 }

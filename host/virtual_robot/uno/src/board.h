@@ -114,6 +114,7 @@ typedef struct Twi {
   int dac_code;
   uint64_t dac_eeprom_writes;
   bool stop_pending, start_after_stop;
+  bool held;
 } Twi;
 
 typedef struct Eeprom {
@@ -139,6 +140,10 @@ struct Uno {
   uint64_t asleep_cycles;
   bool powered, crashed, stop_on_output, stop_now;
   uint8_t mcusr;
+  bool optiboot;
+  bool hung;
+  uint16_t hung_instruction;  // what stood where it hangs
+  uint32_t hung_at;
   uint32_t resets;
   int reset_cause, last_reset_cause;
   WrappedWrite port_write[PORT_COUNT * 3];

@@ -65,6 +65,38 @@ static void never_sleep(avr_t *avr, avr_cycle_count_t how_long) {
   (void)how_long;
 }
 
+// What Optiboot 4.4, which Unos are sold with, leaves behind of a reset, read off its listing: it clears MCUSR. After an
+// external reset it waits for a program, with constants in r8 to r11 and an address in r12 and r13, then ends itself by a
+// watchdog reset, which leaves those alone; after any other one (its own included) it calls, two deep, what switches the
+// watchdog off, and jumps to the program. uno_hold() stands for the time of the wait.
+static void bootloader(Uno *uno, int cause) {
+  static const uint8_t waiting[] = {1, 0x11, 5, 3};           // r8 to r11
+  static const uint8_t returns[] = {0x3F, 0xF7, 0x3F, 0x05};  // on the stack, to its end
+  avr_t *avr = uno->avr;
+  uno->mcusr = avr->data[REG_MCUSR] = 0;
+  if (cause == UNO_RESET_EXTERNAL) memcpy(avr->data + 8, waiting, sizeof waiting);
+  memcpy(avr->data + RAM_END + 1 - sizeof returns, returns, sizeof returns);
+  avr->data[24] = avr->data[30] = avr->data[31] = 0;
+  avr->data[25] = 0x18;
+}
+
+static void put_instruction(avr_t *avr, uint32_t address, uint16_t instruction) {
+  avr->flash[address] = instruction & 0xFF;
+  avr->flash[address + 1] = instruction >> 8;
+}
+
+void uno_hang(Uno *uno, int interrupts) {
+  avr_t *avr = uno->avr;
+  if (!uno->hung) {
+    uno->hung_at = avr->pc;
+    uno->hung_instruction = avr->flash[avr->pc] | avr->flash[avr->pc + 1] << 8;
+  }
+  uno->hung = true;
+  put_instruction(avr, uno->hung_at, 0xCFFF);  // rjmp .-2
+  avr->sreg[S_I] = interrupts;
+  if (avr->state == cpu_Sleeping) avr->state = cpu_Running;
+}
+
 // libsimavr calls this last in every reset, a watchdog's included.
 static void after_reset(avr_io_t *io) {
   avr_t *avr = io->avr;
@@ -82,6 +114,9 @@ static void after_reset(avr_io_t *io) {
   uno->reset_cause = -1;
   uno->last_reset_cause = cause;
   uno->resets++;
+  if (uno->hung) put_instruction(avr, uno->hung_at, uno->hung_instruction);
+  uno->hung = false;
+  if (uno->optiboot) bootloader(uno, cause);
   events_add(uno, UNO_EVENT_RESET, cause, 0);
   compare_after_reset(uno);
   pins_after_reset(uno);
@@ -225,6 +260,8 @@ void uno_reset(Uno *uno, int cause) {
   uno->crashed = false;
   avr_reset(uno->avr);
 }
+
+void uno_use_optiboot(Uno *uno, int use) { uno->optiboot = use; }
 
 void uno_hold(Uno *uno, uint64_t cycles) { uno->held_until = uno->avr->cycle + cycles; }
 

@@ -53,7 +53,7 @@ static avr_cycle_count_t action_done(avr_t *avr, avr_cycle_count_t when, void *p
 }
 
 static void finish_after(Uno *uno, uint32_t bits, uint8_t status) {
-  if (uno->twi.mode == UNO_BUS_STUCK) return;
+  if (uno->twi.mode == UNO_BUS_STUCK || uno->twi.held) return;
   uno->twi.next_status = status;
   chip_at(uno, uno->avr->cycle + bits * clock_cycles(uno), action_done);
 }
@@ -116,7 +116,7 @@ static void transfer(Uno *uno) {
   if (twi->expects_address) {
     twi->expects_address = false;
     twi->reading = data & 1;
-    twi->addressed = twi->mode == UNO_DAC_PRESENT && data >> 1 == MCP4725_ADDRESS;
+    twi->addressed = (twi->mode == UNO_DAC_PRESENT || twi->mode == UNO_BUS_HELD) && data >> 1 == MCP4725_ADDRESS;
     twi->byte_index = 0;
     uint8_t ack = twi->reading ? STATUS_READ_ADDRESS_ACK : STATUS_WRITE_ADDRESS_ACK;
     uint8_t nack = twi->reading ? STATUS_READ_ADDRESS_NACK : STATUS_WRITE_ADDRESS_NACK;
@@ -160,7 +160,8 @@ static void twcr_write(avr_t *avr, avr_io_addr_t address, uint8_t value, void *p
     twi->start_after_stop = value & TWSTA;
     twi->owned = false;
     set_status(uno, STATUS_IDLE);
-    if (twi->mode != UNO_BUS_STUCK) chip_at(uno, avr->cycle + clock_cycles(uno), stop_done);
+    twi->held |= twi->mode == UNO_BUS_HELD;
+    if (twi->mode != UNO_BUS_STUCK && !twi->held) chip_at(uno, avr->cycle + clock_cycles(uno), stop_done);
   } else if (value & TWSTA) {
     if (twi->stop_pending) {
       twi->start_after_stop = true;
@@ -193,4 +194,7 @@ void twi_after_reset(Uno *uno) {
   set_status(uno, STATUS_IDLE);
 }
 
-void uno_set_bus(Uno *uno, int mode) { uno->twi.mode = mode; }
+void uno_set_bus(Uno *uno, int mode) {
+  uno->twi.mode = mode;
+  uno->twi.held = false;
+}

@@ -24,7 +24,8 @@ typedef struct UnoEvent {
 
 enum { UNO_EVENT_PIN = 1, UNO_EVENT_UART_OUT, UNO_EVENT_DAC, UNO_EVENT_EEPROM, UNO_EVENT_RESET };
 enum { UNO_RESET_POWER_ON = 0, UNO_RESET_EXTERNAL, UNO_RESET_BROWN_OUT, UNO_RESET_WATCHDOG };
-enum { UNO_DAC_PRESENT = 0, UNO_DAC_ABSENT, UNO_BUS_STUCK };
+// Stuck: nothing is answered. Held: what is sent is acknowledged, but the bus is held before it can be let go.
+enum { UNO_DAC_PRESENT = 0, UNO_DAC_ABSENT, UNO_BUS_STUCK, UNO_BUS_HELD };
 enum { UNO_RUNNING = 0, UNO_OUTPUT_READY, UNO_POWERED_OFF, UNO_CRASHED };
 
 typedef struct UnoStatus {
@@ -51,9 +52,14 @@ int uno_run(Uno *uno, uint64_t until_cycle, int stop_on_output);
 void uno_status(const Uno *uno, UnoStatus *status);
 
 void uno_reset(Uno *uno, int cause);
-// As a bootloader does after an external reset: no program runs for so long, and what is sent meanwhile is lost.
+// No program runs for so long; what is around the processor does. So it is with a bootloader after an external reset,
+// where what is sent meanwhile meets a receiver that is off.
 void uno_hold(Uno *uno, uint64_t cycles);
 void uno_power_off(Uno *uno);
+// As on a Uno with its stock bootloader (Optiboot 4.4) from the next reset on: see bootloader() in chip.c.
+void uno_use_optiboot(Uno *uno, int use);
+// The program loops for ever at the instruction that comes next, with interrupts on or off; a reset mends it.
+void uno_hang(Uno *uno, int interrupts);
 
 int uno_uart_send(Uno *uno, const uint8_t *bytes, int size, double baud);
 int uno_uart_receive(Uno *uno, uint8_t *bytes, uint64_t *cycles, int capacity);

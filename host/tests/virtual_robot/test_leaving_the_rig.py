@@ -1,0 +1,171 @@
+"""However a command of ours ends, the robot on the rig stands afterwards: the real firmware behind a real pty."""
+
+import contextlib
+import fcntl
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from virtual_robot.rig import FIRMWARE, open_rig
+
+pytestmark = pytest.mark.uno
+
+PATIENCE_S = 60  # other tests may keep the computer busy
+SETTLED_S = 0.3  # of the rig's time: what was under way has arrived
+GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
+RAISING = """
+import sys
+from bifa.link import Uno
+from bifa.rig import SerialRig
+with SerialRig(sys.argv[1]) as rig, Uno(rig.transport, rig.clock) as uno:
+    uno.connect(20.0)
+    uno.run()
+    uno.session.poll(0.3)
+    raise ValueError("something else went wrong")
+"""
+
+
+class Bench:
+    """The virtual robot on a pty in a thread of its own, watched from outside."""
+
+    def __init__(self, folder: Path) -> None:
+        self.port, self.folder = str(folder / "uno"), folder
+        (folder / "gait.toml").write_text(GAIT)
+        self._rig = open_rig(keep_events=False)
+        self._now: dict = {}
+        ready, self._end = threading.Event(), threading.Event()
+        arguments = (lambda path: ready.set(), self._take, Path(self.port), self._end.is_set)
+        self._server = threading.Thread(target=self._rig.serve_pty, args=arguments)
+        self._server.start()
+        assert ready.wait(PATIENCE_S)
+
+    def _take(self, status: dict) -> None:
+        self._now = status
+
+    def close(self) -> None:
+        self._end.set()
+        self._server.join(PATIENCE_S)
+        self._rig.close()
+
+    def start(self, *arguments: str, **options) -> subprocess.Popen:
+        command = [sys.executable, "-m", "bifa", *arguments, "--port", self.port]
+        quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        return subprocess.Popen(command, text=True, **(quiet | options))
+
+    @property
+    def moves(self) -> bool:
+        return bool(self._now) and any(self._now["connected"])
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+    def until_it_walks(self) -> None:
+        self.until(lambda: self.moves and self._now["open"])
+
+    def stands(self, program: subprocess.Popen) -> bool:
+        """Whether no valve is on once the program has ended and the port is closed."""
+        _, errors = program.communicate(timeout=PATIENCE_S)
+        assert "MAY STILL BE MOVING" not in (errors or "")
+        ended_s = self._now["time_s"]
+        self.until(lambda: not self._now["open"] and self._now["time_s"] > ended_s + SETTLED_S)
+        return not self.moves
+
+
+@pytest.fixture
+def bench(tmp_path) -> Iterator[Bench]:
+    if not FIRMWARE.is_file():
+        pytest.fail(f"{FIRMWARE} is missing: run `make test`, or `pio run -e uno` first")
+    bench = Bench(tmp_path)
+    yield bench
+    bench.close()
+
+
+def by_itself(bench: Bench, rng: random.Random) -> subprocess.Popen:
+    return bench.start("monitor", "--run", "--seconds", f"{rng.uniform(0.3, 1.5):.3f}")
+
+
+def end_of_piped_input(bench: Bench, rng: random.Random) -> subprocess.Popen:
+    program = bench.start("console", stdin=subprocess.PIPE)
+    with contextlib.suppress(BrokenPipeError):
+        program.stdin.write("run\n" + "show\n" * rng.randrange(3))
+    return program
+
+
+def exception(bench: Bench, rng: random.Random) -> subprocess.Popen:
+    program = subprocess.Popen([sys.executable, "-c", RAISING, bench.port], stderr=subprocess.PIPE, text=True)
+    bench.until_it_walks()
+    return program
+
+
+def output_that_nobody_reads_any_more(bench: Bench, rng: random.Random) -> subprocess.Popen:
+    """As `| head -1` leaves it."""
+    program = bench.start("console", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    program.stdin.write("run\n")
+    program.stdin.flush()
+    bench.until_it_walks()
+    program.stdout.close()
+    program.stdout = None
+    program.stdin.write("help\n" * 3)
+    program.stdin.flush()
+    return program
+
+
+def full_pipe(bench: Bench, rng: random.Random) -> subprocess.Popen:
+    """Nobody reads, until the command cannot write any more; then `kill`."""
+    program = bench.start("console", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    fcntl.fcntl(program.stdout, fcntl.F_SETPIPE_SZ, 4096)
+    program.stdin.write("run\n" + "help\n" * 40)
+    program.stdin.flush()
+    bench.until_it_walks()
+    time.sleep(1 + rng.random())
+    program.send_signal(signal.SIGTERM)
+    return program
+
+
+def signalled(number: int, command: str) -> Callable[[Bench, random.Random], subprocess.Popen]:
+    """A signal at any moment, from before the program has begun to after it has walked for a while."""
+
+    def leave(bench: Bench, rng: random.Random) -> subprocess.Popen:
+        recording = ["record", str(bench.folder / f"out{time.monotonic_ns()}"), "--gait"]
+        arguments = {"monitor": ["monitor", "--run"], "record": recording, "upload": ["upload", "--run"]}[command]
+        program = bench.start(*arguments, *([str(bench.folder / "gait.toml")] if command != "monitor" else []))
+        if rng.random() < 0.5:
+            bench.until_it_walks()
+            time.sleep(rng.random())
+        else:
+            time.sleep(rng.uniform(0.0, 4.0))
+        program.send_signal(number)
+        return program
+
+    return leave
+
+
+WAYS_OUT = {
+    "by itself, after --seconds": by_itself,
+    "end of piped input": end_of_piped_input,
+    "exception": exception,
+    "output that nobody reads any more": output_that_nobody_reads_any_more,
+    "full pipe, then SIGTERM": full_pipe,
+    "SIGINT, monitor": signalled(signal.SIGINT, "monitor"),
+    "SIGINT, record": signalled(signal.SIGINT, "record"),
+    "SIGTERM, upload --run": signalled(signal.SIGTERM, "upload"),
+    "SIGHUP, monitor": signalled(signal.SIGHUP, "monitor"),
+}
+
+
+@pytest.mark.parametrize("times", [1, pytest.param(50, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("leave", WAYS_OUT.values(), ids=WAYS_OUT)
+def test_every_way_out_leaves_the_robot_standing(bench, leave, times):
+    rng = random.Random(times)
+    walked_on = [number for number in range(times) if not bench.stands(leave(bench, rng))]
+    assert walked_on == []

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writing a data set in the contract's format: complete or not at all, with the digits that the instruments give."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+
+@contextmanager
+def new_folder(out: Path) -> Iterator[Path]:
+    """A scratch folder beside `out` that takes its name when all is in it, and goes away if anything fails."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}-"))
+    try:
+        yield scratch
+        scratch.chmod(0o755)
+        scratch.rename(out)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+
+
+def write_head(folder: Path, name: str, known: Mapping[str, float], entries: Iterable[Mapping[str, Any]]) -> None:
+    head = {"format": 1, "name": name, "known": dict(known), "trial": list(entries)}
+    (folder / "dataset.toml").write_text(tomli_w.dumps(head))
+
+
+def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """One header line, then rows."""
+    digits = [_digits(name) for name in columns]
+    line = ",".join(f"%.{n}f" for n in digits) + "\n"
+    rows = np.column_stack(list(columns.values()))
+    text = (line * len(rows)) % tuple(rows.ravel())
+    path.write_text(",".join(columns) + "\n" + text)
+
+
+def _digits(column: str) -> int:
+    if column.startswith("command"):
+        return 0
+    return {"time_s": 4, "force_N": 3}.get(column, 4)
