@@ -1,6 +1,6 @@
 """The robot of the paper: parameters, stiffness, model files, gaits and the CPG (sections III and V.A)."""
 
-from bifa.robot.gait import BASELINE, Gait, GaitError, load_gait, save_gait
+from bifa.robot.gait import BASELINE, Gait, GaitError, GaitFile, load_gait, read_gait_file, save_gait
 from bifa.robot.model import Covariance, Model
 from bifa.robot.model_file import ModelFileError, load_model, nominal, save_model, strong_push
 from bifa.robot.parameters import BASE_PARAMETERS, Parameter, ParameterError
@@ -12,6 +12,7 @@ __all__ = [
     "Covariance",
     "Gait",
     "GaitError",
+    "GaitFile",
     "Model",
     "ModelFileError",
     "Parameter",
@@ -20,6 +21,7 @@ __all__ = [
     "load_gait",
     "load_model",
     "nominal",
+    "read_gait_file",
     "save_gait",
     "save_model",
     "strong_push",

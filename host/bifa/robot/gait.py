@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 import tomli_w
 
 from bifa.errors import BifaError
+from bifa.ranges import RANGES
 from bifa.robot.parameters import ParameterError, check_bounds
+from bifa.toml import parse_toml
 
-# The ranges of the robot's own parameters of the same names.
-GAIT_RANGES: dict[str, tuple[float, float, str]] = {
-    "period_s": (0.5, 60.0, "s"),
-    "psi12_deg": (0.0, 360.0, "degrees"),
-    "psi13_deg": (0.0, 360.0, "degrees"),
-    "duty_body": (0.0, 1.0, ""),
-    "duty_head": (0.0, 1.0, ""),
-    "duty_tail": (0.0, 1.0, ""),
-}
 FORMAT = 1
 
 
 class GaitError(BifaError):
     """A gait or its file is not usable; the text names the value and the range."""
+
+
+def _checked(name: str, value: float) -> float:
+    try:
+        check_bounds(name, value, *RANGES[name])
+    except ParameterError as error:
+        raise GaitError(f"gait: {error}") from None
+    return float(value)
 
 
 @dataclass(frozen=True)
@@ -39,17 +41,15 @@ class Gait:
     duty_tail: float
 
     def __post_init__(self):
-        for name, (lower, upper, unit) in GAIT_RANGES.items():
-            try:
-                check_bounds(name, getattr(self, name), lower, upper, unit)
-            except ParameterError as error:
-                raise GaitError(f"gait: {error}") from None
-            object.__setattr__(self, name, float(getattr(self, name)))
+        for name in GAIT_NAMES:
+            object.__setattr__(self, name, _checked(name, getattr(self, name)))
 
     def as_dict(self) -> dict[str, float]:
         """The six values by name, as in a data set's `gait` and on the robot's console."""
         return asdict(self)
 
+
+GAIT_NAMES = tuple(item.name for item in fields(Gait))
 
 # The paper's baseline (section V.B): the body switches only when head or tail fully anchors.
 BASELINE = Gait(5.7, 270.0, 90.0, 0.5, 0.5, 0.5)
@@ -63,22 +63,39 @@ def save_gait(path: str | Path, gait: Gait, provenance: dict | None = None) -> N
     Path(path).write_bytes(tomli_w.dumps(document).encode())
 
 
-def load_gait(path: str | Path) -> Gait:
-    """Read a gait file strictly: GaitError names what is unknown, missing or out of range."""
+@dataclass(frozen=True)
+class GaitFile:
+    """What a gait file holds: the gait, and other parameters of the Uno that go with it (`coupling_per_s` ...)."""
+
+    gait: Gait
+    others: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Everything that an upload sends, by name."""
+        return {**self.gait.as_dict(), **self.others}
+
+
+def read_gait_file(path: str | Path) -> GaitFile:
+    """Read a gait file strictly: GaitError names the file, and the key that is unknown, missing or out of range."""
     try:
-        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        document = parse_toml(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise GaitError(f"cannot read the gait {path}: {error}") from None
-    if document.pop("format", None) != FORMAT:
-        raise GaitError(f"{path} is not a gait file of format {FORMAT}")
+    if (version := document.pop("format", FORMAT)) != FORMAT:
+        raise GaitError(f"{path}: format = {version!r}, but this program reads gait files of format {FORMAT}")
     document.pop("provenance", None)
-    names = [field.name for field in fields(Gait)]
-    unknown = [name for name in document if name not in names]
-    missing = [name for name in names if name not in document]
-    if unknown or missing:
-        problem = f"does not know {', '.join(unknown)}" if unknown else f"lacks {', '.join(missing)}"
-        raise GaitError(f"{path}: a gait {problem}; it has {', '.join(names)}")
+    if unknown := [name for name in document if name not in RANGES]:
+        raise GaitError(f"{path}: unknown key {', '.join(unknown)}; a gait file may hold {', '.join(RANGES)}")
+    if missing := [name for name in GAIT_NAMES if name not in document]:
+        raise GaitError(f"{path}: {', '.join(missing)} is missing; a gait is {', '.join(GAIT_NAMES)}")
     try:
-        return Gait(**document)
+        others = {name: _checked(name, value) for name, value in document.items() if name not in GAIT_NAMES}
+        return GaitFile(Gait(**{name: document[name] for name in GAIT_NAMES}), others)
     except GaitError as error:
         raise GaitError(f"{path}: {error}") from None
+
+
+def load_gait(path: str | Path) -> Gait:
+    """The gait of a file, for where nothing else in it matters; GaitError as `read_gait_file`."""
+    return read_gait_file(path).gait

@@ -14,6 +14,7 @@ from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Covariance, Model
 from bifa.robot.parameters import BASE_PARAMETERS
 from bifa.robot.stiffness import StiffnessCurve
+from bifa.toml import parse_toml
 
 FORMAT = 1
 
@@ -75,7 +76,7 @@ def _curve(curve: StiffnessCurve) -> dict:
 
 def _parse(text: str, where: str) -> Model:
     try:
-        document = tomllib.loads(text)
+        document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise ModelFileError(f"{where} is not TOML: {error}") from None
     if document.get("format") != FORMAT:

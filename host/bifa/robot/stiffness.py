@@ -17,6 +17,7 @@ import numpy as np
 from bifa.robot.parameters import ParameterError
 
 DEGREE = 15
+NOT_BISTABLE = "the stiffness curve is not bistable: it needs a stable, an unstable and a stable point"
 _SCAN_POINTS = 4001
 _NEWTON_STEPS = 8
 
@@ -67,9 +68,7 @@ class StiffnessCurve:
         falling = roots[force[crossings] >= 0].tolist()
         between = [root for root in falling if rising and rising[0] < root < rising[-1]]
         if len(rising) < 2 or not between:
-            raise ParameterError(
-                "the stiffness curve is not bistable: it needs a stable, an unstable and a stable point"
-            )
+            raise ParameterError(NOT_BISTABLE)
         return rising[0], between[len(between) // 2], rising[-1]
 
     @property

@@ -5,9 +5,19 @@
 >>> record["displacement_head_mm"]
 """
 
-from bifa.simulate.gaits import Progress, cores, gait_rows, speed, speeds
+from bifa.simulate.gaits import Progress, cores, full_lanes, gait_rows, speed, speeds
 from bifa.simulate.plant import Plant, plant
-from bifa.simulate.records import Record, anchor_pull, static_loading, step_response, walk
+from bifa.simulate.records import (
+    Record,
+    anchor_pull,
+    anchor_pulls,
+    static_loading,
+    static_loadings,
+    step_response,
+    step_responses,
+    walk,
+    walks,
+)
 from bifa.simulate.rigs import SimulationError
 from bifa.simulate.terrain import Obstacle, Supports, arcs, obstacles, passed_at_m, subtunnels, terrain, tunnel
 from bifa.simulate.timeline import (
@@ -31,8 +41,10 @@ __all__ = [
     "Timeline",
     "TimelineError",
     "anchor_pull",
+    "anchor_pulls",
     "arcs",
     "cores",
+    "full_lanes",
     "gait_rows",
     "obstacles",
     "of_gait",
@@ -45,10 +57,13 @@ __all__ = [
     "speed",
     "speeds",
     "static_loading",
+    "static_loadings",
     "step_response",
+    "step_responses",
     "subtunnels",
     "terrain",
     "timeline",
     "tunnel",
     "walk",
+    "walks",
 ]

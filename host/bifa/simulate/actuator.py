@@ -19,27 +19,38 @@ _ALPHA_N = layout.ALPHA_N
 
 
 @merged
+def reach(curve):
+    """Lower and upper end of a table, and 1 / width of its intervals."""
+    return curve[0, 0], curve[0, 1], curve[0, 2]
+
+
+@merged
+def cubic(curve, row):
+    """A row of a table."""
+    return curve[row, 0], curve[row, 1], curve[row, 2], curve[row, 3]
+
+
+@merged
 def stiffness(curve, x):
     """K(x) and its slope, straight outside the table."""
-    place = (min(max(x, curve[0, 0]), curve[0, 1]) - curve[0, 0]) * curve[0, 2]
+    lower, upper, per_width = reach(curve)
+    place = (min(max(x, lower), upper) - lower) * per_width
     i = min(int(place), curve.shape[0] - 2)
     s = place - i
-    c0, c1, c2, c3 = curve[i + 1, 0], curve[i + 1, 1], curve[i + 1, 2], curve[i + 1, 3]
-    slope = (c1 + s * (2.0 * c2 + 3.0 * s * c3)) * curve[0, 2]
+    c0, c1, c2, c3 = cubic(curve, i + 1)
+    slope = (c1 + s * (2.0 * c2 + 3.0 * s * c3)) * per_width
     force = c0 + s * (c1 + s * (c2 + s * c3))
-    if x < curve[0, 0]:
-        force += slope * (x - curve[0, 0])
-    elif x > curve[0, 1]:
-        force += slope * (x - curve[0, 1])
+    if x < lower:
+        force += slope * (x - lower)
+    elif x > upper:
+        force += slope * (x - upper)
     return force, slope
 
 
 @merged
 def convergence(q, block, x, inlet):
     """alpha of eq. (3)."""
-    if x > q[block + _THRESHOLD] and inlet < 0.0:
-        return q[block + _ALPHA_S]
-    return q[block + _ALPHA_N]
+    return q[block + _ALPHA_S] if x > q[block + _THRESHOLD] and inlet < 0.0 else q[block + _ALPHA_N]
 
 
 @merged

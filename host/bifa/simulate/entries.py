@@ -15,11 +15,10 @@ from bifa.simulate import generated, hooks
 
 _ENTRIES = {
     "walk_record": "locomotion",
-    "gait_batch": "locomotion",
+    "progress_record": "locomotion",
     "step_record": "stand",
     "static_record": "stand",
     "anchor_record": "stand",
-    "gait_switches": "timeline",
 }
 
 
@@ -33,6 +32,7 @@ _PLAIN = {
     "passing.py",
     "records.py",
     "rigs.py",
+    "tables.py",
     "terrain.py",
 }
 

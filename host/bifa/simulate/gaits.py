@@ -12,12 +12,13 @@ import numpy as np
 
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
-from bifa.simulate import layout, rigs
-from bifa.simulate.entries import entries
+from bifa.simulate import lanes, layout, rigs
 from bifa.simulate.plant import Plant, plant
+from bifa.simulate.timeline import gait_switches
 
 FAST_TOLERANCE_M = 1e-5
 _PIECES_PER_WORKER = 8
+_LANES_FULL = 4  # times over, for a piece: lanes stand idle at its end
 
 
 @dataclass(frozen=True)
@@ -68,28 +69,36 @@ def speeds(
     """
     gaits = np.ascontiguousarray(gaits, dtype=float).reshape(-1, 6)
     n = gaits.shape[0]
+    flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
+    ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
+    ends = gaits[:, :1] * np.arange(1, cycles + 1)
+    switches = [(t.time_s, t.chamber, t.command) for t in gait_switches(gaits, ends[:, -1])]
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
-    size = layout.state_size()
-    if isinstance(model, (Model, Plant)):
-        flat = plant(model)
-        rig = rigs.pipe(flat, inclination_deg, terrain)
-        count = workers or cores()
-        pieces = [piece for piece in np.array_split(np.arange(n), min(n, _PIECES_PER_WORKER * count)) if piece.size]
-        jobs = [(flat, rig, slice(piece[0], piece[-1] + 1)) for piece in pieces]
-    else:
-        flats = [plant(one) for one in model]
-        jobs = [(flat, rigs.pipe(flat, inclination_deg, terrain), slice(k, k + 1)) for k, flat in enumerate(flats)]
 
-    def run(job):
-        flat, rig, rows = job
-        entries.gait_batch(flat, rig, size, gaits[rows], cycles, tolerance_m, advance[rows], slip[rows])
+    def run(piece: np.ndarray) -> None:
+        first, last = piece[0], piece[-1] + 1
+        what = lanes.Experiment(
+            lanes.PROGRESS, ways[first:last], switches[first:last], list(ends[first:last]), tolerance_m
+        )
+        for k, rows in zip(piece, lanes.march(flats[first:last], what, together=False), strict=True):
+            start = flats[k].q[layout.BODY + layout.CONTRACTED]
+            advance[k] = np.diff(rows[0], prepend=start)
+            slip[k] = np.diff(rows[1], prepend=0.0)
 
-    if len(jobs) == 1 or workers == 1:
-        for job in jobs:
-            run(job)
+    count = workers or cores()
+    pieces = min(_PIECES_PER_WORKER * count, -(-n // full_lanes())) if count > 1 else 1
+    shares = [piece for piece in np.array_split(np.arange(n), max(1, pieces)) if piece.size]
+    if len(shares) <= 1:
+        for piece in shares:
+            run(piece)
     else:
-        list(_pool(workers or cores()).map(run, jobs))
+        list(_pool(count).map(run, shares))
     return Progress(advance, slip, gaits[:, 0])
+
+
+def full_lanes() -> int:
+    """Walks that are worth a call: fewer leave lanes idle at its end for much of the time."""
+    return _LANES_FULL * lanes.width() if lanes.width() > 1 else 1
 
 
 def cores() -> int:

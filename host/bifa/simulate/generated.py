@@ -51,7 +51,7 @@ def load(stem: str, source: str) -> ModuleType:
     path = folder() / f"{name}.py"
     if not path.exists():
         _write(path, source)
-        _forget_old(path.parent)
+        forget_old(path.parent)
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
@@ -66,9 +66,10 @@ def _write(path: Path, source: str) -> None:
     os.replace(temporary, path)
 
 
-def _forget_old(cache: Path) -> None:
+def forget_old(cache: Path) -> None:
+    """Remove what has not been read for a month."""
     limit = time.time() - _KEEP_S
-    for old in (*cache.glob("bifa_*.py"), *cache.glob("__pycache__/bifa_*")):
+    for old in (*cache.glob("bifa_*.py"), *cache.glob("bifa_*.so"), *cache.glob("__pycache__/bifa_*")):
         with contextlib.suppress(OSError):
             if old.stat().st_atime < limit:
                 old.unlink()

@@ -25,6 +25,7 @@ the active effects in alphabetical order; an effect costs one test of a bit whil
 | `sensed` | pressure where the sensor sits | `pressure_psi`, `source_psi` |
 | `sensor` | new `state`, which is then read | `before_psi`, `after_psi`, `step_s` |
 | `reading` | what the sensor says | `pressure_psi` |
+| `stamp` | s by which displacements are recorded late | |
 | `initial` | first `state` (0 without this hook) | `position_m`, `pressure_psi` |
 """
 
@@ -58,6 +59,7 @@ _HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "sensed": (("pressure_psi", "source_psi"), "replace"),
     "sensor": ((*_STATEFUL, "before_psi", "after_psi", "step_s"), "follow"),
     "reading": (("pressure_psi",), "replace"),
+    "stamp": ((), "sum"),
     "initial": ((*_STATEFUL, "position_m", "pressure_psi"), "first"),
 }
 _HIDDEN = {"z", "z_new", "actuator"}

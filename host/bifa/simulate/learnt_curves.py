@@ -6,6 +6,7 @@ import numpy as np
 
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import learnt
+from bifa.simulate.tables import sealed
 
 _POINTS = 513  # of a row of `Plant.learnt`: fine enough for the lips of a pipe's joints
 _TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
@@ -33,13 +34,13 @@ def with_curve(plant, name: str, curve: LearntCurve):
 
 
 def _added(rows: np.ndarray, curve: LearntCurve) -> np.ndarray:
-    """A stiffness table (`bifa.simulate.plant.table`) plus a curve."""
+    """A stiffness table (`bifa.simulate.tables`) plus a curve."""
     nodes = np.linspace(rows[0, 0], rows[0, 1], rows.shape[0])
     added = np.interp(nodes, _grid(curve), curve.values[0])
     total = rows.copy()
     total[1:, 0] += added[:-1]
     total[1:, 1] += np.diff(added)
-    return total
+    return sealed(total)
 
 
 def _grid(curve: LearntCurve) -> np.ndarray:

@@ -1,20 +1,23 @@
-"""Walks: marching through a timeline of switches, sampled or a cycle at a time."""
+"""Walks: marching through a timeline of switches."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bifa.simulate import layout
-from bifa.simulate.compiled import kernel
+from bifa.simulate.compiled import kernel, merged
 from bifa.simulate.march import march, new_run, shown, start_effects
 from bifa.simulate.stepper import (
     STATES,
+    V_HEAD,
+    V_TAIL,
     X_HEAD,
     X_SMALL_HEAD,
     X_SMALL_TAIL,
+    X_TAIL,
     grip,
 )
-from bifa.simulate.timeline import delayed, gait_switches
+from bifa.simulate.timeline import delayed
 
 # Columns of a record: the state y, then what the sensors say, then the normal forces (7).
 READ_BODY = STATES
@@ -26,10 +29,16 @@ COLUMNS = STATES + 5
 def rest(plant, rig, states_of_effects):
     """A robot at rest, vented and contracted, its tail's end at 0."""
     run = new_run(states_of_effects)
+    contracted(plant, rig, run)
+    return run
+
+
+@merged
+def contracted(plant, rig, run):
+    """Put a new run where a walk starts."""
     run.y[X_HEAD] = plant.q[layout.BODY + layout.CONTRACTED]
     run.y[X_SMALL_HEAD] = run.y[X_SMALL_TAIL] = plant.q[layout.SMALL + layout.CONTRACTED]
     start_effects(plant, rig, run)
-    return run
 
 
 @kernel
@@ -44,6 +53,32 @@ def _through(plant, rig, run, until, tolerance, late, order, chamber, command, i
     return i
 
 
+@merged
+def walk_row(plant, rig, run, row):
+    """What a record of a walk says of this moment, into (COLUMNS,)."""
+    for i in range(STATES):
+        row[i] = run.y[i]
+    for actuator in range(3):
+        row[READ_BODY + actuator] = shown(plant, run, actuator)
+    row[NORMAL_HEAD] = grip(plant, rig, run.gravity, 0, run.y)
+    row[NORMAL_HEAD + 1] = grip(plant, rig, run.gravity, 1, run.y)
+
+
+@merged
+def seen_row(plant, rig, run, row):
+    """What instruments see of a walk: head's and tail's place in m, each with its velocity, and the three readings in
+    psi, into (7,)."""
+    row[0], row[1], row[2], row[3] = run.y[X_HEAD], run.y[V_HEAD], run.y[X_TAIL], run.y[V_TAIL]
+    for actuator in range(3):
+        row[4 + actuator] = shown(plant, run, actuator)
+
+
+@merged
+def progress_row(plant, rig, run, row):
+    """How far a walk has come: the head's place, and how far both ends have slid at once, in m, into (2,)."""
+    row[0], row[1] = run.y[X_HEAD], run.slip[0]
+
+
 @kernel
 def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
     """(n, COLUMNS) at `sample_times` (rising, from 0), of a walk that starts at rest at time 0."""
@@ -53,30 +88,18 @@ def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_t
     i = 0
     for k in range(sample_times.size):
         i = _through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
-        out[k, :STATES] = run.y
-        for actuator in range(3):
-            out[k, READ_BODY + actuator] = shown(plant, run, actuator)
-        out[k, NORMAL_HEAD] = grip(plant, rig, run.gravity, 0, run.y)
-        out[k, NORMAL_HEAD + 1] = grip(plant, rig, run.gravity, 1, run.y)
+        walk_row(plant, rig, run, out[k])
     return out
 
 
 @kernel
-def cycles_of_gait(plant, rig, states_of_effects, gait, cycles, tolerance, advance, slip):
-    """Head's advance in m and slip in m of each cycle of a settled gait, from rest, into (cycles,) arrays."""
+def progress_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
+    """(n, 2) of the same walk: `progress_row` at `sample_times`."""
     run = rest(plant, rig, states_of_effects)
-    times, chamber, command = gait_switches(gait, cycles * gait[0], 0.0)
     late, order = delayed(plant, times, command)
+    out = np.empty((sample_times.size, 2))
     i = 0
-    for cycle in range(cycles):
-        before, slid = run.y[X_HEAD], run.slip[0]
-        i = _through(plant, rig, run, (cycle + 1) * gait[0], tolerance, late, order, chamber, command, i)
-        advance[cycle] = run.y[X_HEAD] - before
-        slip[cycle] = run.slip[0] - slid
-
-
-@kernel
-def gait_batch(plant, rig, states_of_effects, gaits, cycles, tolerance, advance, slip):
-    """`cycles_of_gait` for rows of `gaits`."""
-    for k in range(gaits.shape[0]):
-        cycles_of_gait(plant, rig, states_of_effects, gaits[k], cycles, tolerance, advance[k], slip[k])
+    for k in range(sample_times.size):
+        i = _through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
+        progress_row(plant, rig, run, out[k])
+    return out

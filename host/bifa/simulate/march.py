@@ -30,17 +30,19 @@ from bifa.simulate.stepper import (
     sources,
     step,
 )
+from bifa.simulate.together import anyone, least, worst
 
 LONGEST_S = 0.1
 SHORTEST_S = 1e-5
-_FIRST_S = 1e-3
+FIRST_S = 1e-3
+ARRIVED_S = 1e-12
 _HOPELESS_S = 1e-6  # where even shorter steps are asked for there is no solution: the run goes on as NaN
 # In a run until now, for a tolerance of 1 um: ten times what walking takes, and some to begin with. Beyond: NaN
 _MOST_STEPS, _MOST_STEPS_PER_S = 40_000.0, 20_000.0
 _ABRUPT = 0.1  # share of the tolerance for steps in which something changes: there the halves are of first order only
 _POSITION, _VELOCITY, _PRESSURE, _SMALL_POSITION, _SMALL_VELOCITY = 1.0, 300.0, 300.0, 2.0, 600.0
-# Tolerance of each state over that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
-_WEIGHTS = np.array(
+# Over the tolerance of each state, that of a position in m: a velocity error of 1e-3 m/s reads as 0.015 psi.
+_SHARES = 1.0 / np.array(
     [_POSITION, _VELOCITY, _POSITION, _VELOCITY, _PRESSURE, *(2 * (_SMALL_POSITION, _SMALL_VELOCITY, _PRESSURE))]
 )
 
@@ -72,7 +74,7 @@ def new_run(states_of_effects):
     return Run(
         np.zeros(STATES),
         np.zeros(n),
-        np.array([0.0, _FIRST_S, 0.0]),
+        np.array([0.0, FIRST_S, 0.0]),
         np.zeros(1),
         np.full(3, 2),
         np.zeros(2),
@@ -123,59 +125,62 @@ def shown(plant, run, actuator):
 @inner
 def march(plant, rig, run, until, tolerance):
     """Advance `run` to `until`. `tolerance`: of a position in m, a step."""
+    while until - run.clock[0] > ARRIVED_S and math.isfinite(run.y[0]):
+        attempt(plant, rig, run, until, tolerance)
+    run.clock[0] = until
+    arrive(plant, run)
+
+
+@merged
+def arrive(plant, run):
+    """What is read where a march ends."""
+    if not plant.active & chains.SENSOR and math.isfinite(run.y[0]):
+        pressures(plant, run)
+
+
+@merged
+def attempt(plant, rig, run, until, tolerance):
+    """Try a step towards `until`; a run that has no solution becomes NaN."""
     clock = run.clock
     y, z = run.y, run.z
     whole, first, halves = run.whole, run.first, run.halves
-    if not math.isfinite(y[0]):
-        clock[0] = until
-        return
+    left = until - clock[0]
+    h = min(clock[1], LONGEST_S)
+    if h > 0.5 * left:
+        h = left if h >= left else 0.5 * left
+    h = least(run, h)
+    sources(plant, rig, run.command, y, clock[0] + h, run.source)
+    kind = step(plant, rig, run.gravity, run.source, y, z, h, whole, run.z_whole)
+    sources(plant, rig, run.command, y, clock[0] + 0.5 * h, run.source)
+    kind_first = step(plant, rig, run.gravity, run.source, y, z, 0.5 * h, first, run.z_first)
+    sources(plant, rig, run.command, first, clock[0] + h, run.source)
+    kind_second = step(plant, rig, run.gravity, run.source, first, run.z_first, 0.5 * h, halves, run.z_halves)
+    too_long = kind == TOO_LONG or kind_first == TOO_LONG or kind_second == TOO_LONG
+    clock[2] += 1.0
     patience = max(1.0, math.sqrt(1e-6 / tolerance))
-    while until - clock[0] > 1e-12:
-        left = until - clock[0]
-        clock[2] += 1.0
-        if clock[2] > patience * (_MOST_STEPS + _MOST_STEPS_PER_S * max(clock[0], 0.0)):
-            y[:] = np.nan
-            break
-        h = min(clock[1], LONGEST_S)
-        if h > 0.5 * left:
-            h = left if h >= left else 0.5 * left
-        sources(plant, rig, run.command, y, clock[0] + h, run.source)
-        kind = step(plant, rig, run.gravity, run.source, y, z, h, whole, run.z_whole)
-        if kind == TOO_LONG:
-            clock[1] = 0.3 * h
-            if h < _HOPELESS_S:
-                y[:] = np.nan
-                break
-            continue
-        sources(plant, rig, run.command, y, clock[0] + 0.5 * h, run.source)
-        kind_first = step(plant, rig, run.gravity, run.source, y, z, 0.5 * h, first, run.z_first)
-        sources(plant, rig, run.command, first, clock[0] + h, run.source)
-        kind_second = step(plant, rig, run.gravity, run.source, first, run.z_first, 0.5 * h, halves, run.z_halves)
-        if kind_first == TOO_LONG or kind_second == TOO_LONG:
-            clock[1] = 0.3 * h
-            if h < _HOPELESS_S:
-                y[:] = np.nan
-                break
-            continue
-        error = 0.0
-        for i in range(STATES):
-            error = max(error, abs(halves[i] - whole[i]) / _WEIGHTS[i])
-        error = max(error, _cut_short(y, first, h))
-        smooth = kind == kind_first and kind == kind_second
-        error /= tolerance if smooth else _ABRUPT * tolerance
-        if error > 1.0 and h > SHORTEST_S:
-            clock[1] = h * max(0.2, 0.9 / math.sqrt(error))
-            continue
-        run.slip[0] += _both_slide(y, first) + _both_slide(first, halves)
-        _accept(plant, run, smooth)
-        clock[0] += h
-        if plant.active & chains.SENSOR:
-            _sense(plant, run, h)
-        grown = min(3.0, 0.9 / math.sqrt(max(error, 1e-6)))
-        clock[1] = max(clock[1], h * grown) if h < 0.5 * clock[1] else h * grown
-    clock[0] = until
-    if not plant.active & chains.SENSOR and math.isfinite(y[0]):
-        pressures(plant, run)
+    tired = clock[2] > patience * (_MOST_STEPS + _MOST_STEPS_PER_S * max(clock[0], 0.0))
+    if tired or (too_long and h < _HOPELESS_S):
+        y[:] = np.nan
+        return
+    if anyone(run, too_long):
+        clock[1] = 0.3 * h
+        return
+    error = 0.0
+    for i in range(STATES):
+        error = max(error, abs(halves[i] - whole[i]) * _SHARES[i])
+    error = max(error, _cut_short(y, first, h))
+    smooth = kind == kind_first and kind == kind_second
+    error = worst(run, error / (tolerance if smooth else _ABRUPT * tolerance))
+    if error > 1.0 and h > SHORTEST_S:
+        clock[1] = h * max(0.2, 0.9 / math.sqrt(error))
+        return
+    run.slip[0] += _both_slide(y, first) + _both_slide(first, halves)
+    _accept(plant, run, smooth)
+    clock[0] += h
+    if plant.active & chains.SENSOR:
+        _sense(plant, run, h)
+    grown = min(3.0, 0.9 / math.sqrt(max(error, 1e-6)))
+    clock[1] = max(clock[1], h * grown) if h < 0.5 * clock[1] else h * grown
 
 
 @merged

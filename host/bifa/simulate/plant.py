@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from bifa import effects
 from bifa.robot.model import Model
-from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate import layout
 from bifa.simulate.learnt_curves import with_curve
+from bifa.simulate.tables import Tabulated, tabulated
 
-_INTERVALS = 256
 _NOTHING = np.zeros((0, 4))
 
 
 class Plant(NamedTuple):
-    """`q`: numbers as `layout` has them; `active`: a bit an effect; the curves: rows of cubic coefficients;
+    """`q`: numbers as `layout` has them; `active`: a bit an effect; the curves: `bifa.simulate.tables`;
     `learnt`: see `bifa.simulate.learnt`."""
 
     q: np.ndarray
@@ -33,15 +31,21 @@ def plant(model: Model | Plant) -> Plant:
     """The flat form of a model. Effects whose sizes are all 0 are inactive: exactly the base model."""
     if isinstance(model, Plant):
         return model
-    body, small = model.body_stiffness, model.small_stiffness
-    flat = Plant(numbers(model.values, body, small), mask(model.effects), table(body), table(small))
+    body, small = tabulated(model.body_stiffness), tabulated(model.small_stiffness)
+    flat = of_values(model.values, model.effects, body, small)
     for name, curve in model.learnt.items():
         flat = with_curve(flat, name, curve)
     return flat
 
 
-def numbers(values: Mapping[str, float], body: StiffnessCurve, small: StiffnessCurve) -> np.ndarray:
-    """`q` from values by name."""
+def of_values(
+    values: Mapping[str, float], active: Mapping[str, Mapping[str, float]], body: Tabulated, small: Tabulated
+) -> Plant:
+    """From values by name (those of effects too), the active effects' own, and the two curves."""
+    return Plant(_numbers(values, body, small), mask(active), body.rows, small.rows)
+
+
+def _numbers(values: Mapping[str, float], body: Tabulated, small: Tabulated) -> np.ndarray:
     q = np.zeros(layout.size())
     for name, value in values.items():
         q[layout.index(name)] = value
@@ -64,27 +68,7 @@ def mask(active: Mapping[str, Mapping[str, float]]) -> int:
     return bits
 
 
-def _shape(q: np.ndarray, block: int, curve: StiffnessCurve) -> None:
+def _shape(q: np.ndarray, block: int, curve: Tabulated) -> None:
     q[block + layout.THRESHOLD] = curve.unstable_m
     q[block + layout.CONTRACTED] = curve.contracted_m
     q[block + layout.STROKE] = curve.stroke_m
-
-
-@lru_cache(maxsize=64)
-def table(curve: StiffnessCurve) -> np.ndarray:
-    """(n + 1, 4): row 0 is lower end, upper end, 1 / width of an interval; then cubic coefficients of each interval.
-
-    Cubic Hermite through force and slope: within 1e-6 N of the polynomial on the nominal curves.
-    """
-    nodes = np.linspace(curve.lower_m, curve.upper_m, _INTERVALS + 1)
-    width = nodes[1] - nodes[0]
-    force, slope = curve.force(nodes), curve.slope(nodes) * width
-    rise = np.diff(force)
-    rows = np.empty((_INTERVALS + 1, 4))
-    rows[0] = curve.lower_m, curve.upper_m, 1.0 / width, 0.0
-    rows[1:, 0] = force[:-1]
-    rows[1:, 1] = slope[:-1]
-    rows[1:, 2] = 3.0 * rise - 2.0 * slope[:-1] - slope[1:]
-    rows[1:, 3] = slope[:-1] + slope[1:] - 2.0 * rise
-    rows.setflags(write=False)
-    return rows

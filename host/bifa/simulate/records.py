@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
-from bifa.simulate import layout, rigs
-from bifa.simulate.entries import entries
-from bifa.simulate.locomotion import NORMAL_HEAD, READ_BODY
+from bifa.simulate import lanes, layout, rigs
+from bifa.simulate.hooks import chains
+from bifa.simulate.locomotion import NORMAL_HEAD
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.rigs import SimulationError
 from bifa.simulate.stepper import (
@@ -25,7 +26,7 @@ from bifa.simulate.stepper import (
     X_SMALL_TAIL,
     X_TAIL,
 )
-from bifa.simulate.timeline import Timeline, of_gait, timeline
+from bifa.simulate.timeline import NO_COMMANDS, Timeline, of_gait, timeline
 
 TOLERANCE_M = 1e-6
 LOAD_CELL_N_M = 5000.0
@@ -70,35 +71,62 @@ def walk(
         if gait is None:
             raise SimulationError("a walk needs a gait or commands")
         commands = of_gait(gait, float(time_s[-1]) + gait.period_s)
-    flat = plant(model)
-    rig = rigs.pipe(flat, inclination_deg, terrain)
-    rows = entries.walk_record(flat, rig, layout.state_size(), *_switches(commands), time_s, _tolerance(tolerance_m))
+    place = {"inclination_deg": inclination_deg, "terrain": terrain}
+    return walks([model], [commands], time_s, **place, tolerance_m=tolerance_m)[0]
+
+
+def walks(
+    models: Sequence[Model | Plant],
+    commands: Sequence[Timeline],
+    time_s: np.ndarray,
+    *,
+    inclination_deg: float = 0.0,
+    terrain: np.ndarray = rigs.CLEAR,
+    tolerance_m: float = TOLERANCE_M,
+    together: bool = False,
+    states: bool = True,
+) -> list[Record]:
+    """`walk` for each robot and its commands. `together`: they differ little and are to be compared with the first
+    (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
+    time_s = _times(time_s)
+    flats = [plant(model) for model in models]
+    mounted = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
+    kind = lanes.WALK if states else lanes.SEEN
+    rows = _marched(kind, flats, mounted, commands, time_s, tolerance_m, together)
+    walked = _walked if states else _seen
+    return [Record("locomotion", *walked(*one, time_s)) for one in zip(flats, commands, rows, strict=True)]
+
+
+def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
     start = flat.q[layout.BODY + layout.CONTRACTED]
-    shown = commands.at(time_s).astype(float)
-    shown[shown == OFF] = np.nan
+    head_m, tail_m = (_as_stamped(flat, time_s, *rows[at : at + 2]) for at in (0, 2))
     columns = {
         "time_s": time_s,
-        "command_body": shown[:, 0],
-        "command_head": shown[:, 1],
-        "command_tail": shown[:, 2],
-        "displacement_head_mm": (rows[:, X_HEAD] - start) * _MM,
-        "displacement_tail_mm": rows[:, X_TAIL] * _MM,
-        "pressure_body_psi": rows[:, READ_BODY],
-        "pressure_head_psi": rows[:, READ_BODY + 1],
-        "pressure_tail_psi": rows[:, READ_BODY + 2],
+        "displacement_head_mm": (head_m - start) * _MM,
+        "displacement_tail_mm": tail_m * _MM,
+        "pressure_body_psi": rows[4],
+        "pressure_head_psi": rows[5],
+        "pressure_tail_psi": rows[6],
     }
-    states = {
-        "velocity_head_m_s": rows[:, V_HEAD],
-        "velocity_tail_m_s": rows[:, V_TAIL],
-        "body_m": rows[:, X_HEAD] - rows[:, X_TAIL],
-        "small_head_m": rows[:, X_SMALL_HEAD],
-        "small_tail_m": rows[:, X_SMALL_TAIL],
-        "small_head_velocity_m_s": rows[:, V_SMALL_HEAD],
-        "small_tail_velocity_m_s": rows[:, V_SMALL_TAIL],
-        "normal_head_N": rows[:, NORMAL_HEAD],
-        "normal_tail_N": rows[:, NORMAL_HEAD + 1],
+    return (columns,)
+
+
+def _walked(flat: Plant, commands: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
+    (columns,) = _seen(flat, commands, rows[lanes.SEEN_OF_WALK], time_s)
+    shown = commands.at(time_s).astype(float)
+    shown[shown == OFF] = np.nan
+    columns |= {"command_body": shown[:, 0], "command_head": shown[:, 1], "command_tail": shown[:, 2]}
+    return columns, {
+        "velocity_head_m_s": rows[V_HEAD],
+        "velocity_tail_m_s": rows[V_TAIL],
+        "body_m": rows[X_HEAD] - rows[X_TAIL],
+        "small_head_m": rows[X_SMALL_HEAD],
+        "small_tail_m": rows[X_SMALL_TAIL],
+        "small_head_velocity_m_s": rows[V_SMALL_HEAD],
+        "small_tail_velocity_m_s": rows[V_SMALL_TAIL],
+        "normal_head_N": rows[NORMAL_HEAD],
+        "normal_tail_N": rows[NORMAL_HEAD + 1],
     }
-    return Record("locomotion", columns, states)
 
 
 def step_response(
@@ -115,7 +143,6 @@ def step_response(
     timeline of chamber 0. Left out: positive after 0.5 s, vacuum after 6 s, 12 s in all. `pressure_psi`: the
     positive supply, the model's own if left out; the negative one is the model's.
     """
-    flat = plant(model)
     if time_s is None:
         time_s = np.arange(int(12.0 * _STEP_HZ) + 1) / _STEP_HZ
         command = timeline([(0.5, 0, 1), (6.0, 0, 0)])
@@ -124,20 +151,40 @@ def step_response(
         raise SimulationError("a step response at given times needs its commands")
     if not isinstance(command, Timeline):
         command = _timeline_of(time_s, np.asarray(command, dtype=float))
-    supply = flat.q[layout.SUPPLY_POSITIVE] if pressure_psi is None else pressure_psi
-    rig = rigs.stand(flat, actuator, supply)
-    times, _, commands = _switches(command)
-    rows = entries.step_record(flat, rig, layout.state_size(), times, commands, time_s, _tolerance(tolerance_m))
+    record = step_responses([model], actuator, time_s, [command], pressure_psi, tolerance_m)[0]
+    return replace(record, columns={**record.columns, "command": _shown(command, time_s)})
+
+
+def step_responses(
+    models: Sequence[Model | Plant],
+    actuator: str,
+    time_s: np.ndarray,
+    commands: Sequence[Timeline],
+    pressure_psi: float | None = None,
+    tolerance_m: float = TOLERANCE_M,
+    together: bool = False,
+) -> list[Record]:
+    """`step_response` for each robot and its commands, which are not among the columns; `together` as in `walks`."""
+    time_s = _times(time_s)
+    flats = [plant(model) for model in models]
+    supplies = [flat.q[layout.SUPPLY_POSITIVE] if pressure_psi is None else pressure_psi for flat in flats]
+    mounted = [rigs.stand(flat, actuator, supply) for flat, supply in zip(flats, supplies, strict=True)]
+    found = _marched(lanes.STEP, flats, mounted, commands, time_s, tolerance_m, together)
+    return [_stepped(flat, rows, time_s) for flat, rows in zip(flats, found, strict=True)]
+
+
+def _stepped(flat: Plant, rows: np.ndarray, time_s: np.ndarray) -> Record:
+    displacement_m = _as_stamped(flat, time_s, rows[0], rows[1])
+    columns = {"time_s": time_s, "displacement_mm": displacement_m * _MM, "pressure_psi": rows[2]}
+    return Record("step_response", columns, {"velocity_m_s": rows[1]})
+
+
+def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
+    """A stand's command at times; before the first it is at vacuum."""
     shown = command.at(time_s)[:, 0].astype(float)
-    shown[time_s < times[0] if times.size else np.ones(time_s.size, bool)] = 0.0
+    shown[time_s < command.time_s[0] if command.time_s.size else np.ones(time_s.size, bool)] = 0.0
     shown[shown == OFF] = np.nan
-    columns = {
-        "time_s": time_s,
-        "command": shown,
-        "displacement_mm": rows[:, 0] * _MM,
-        "pressure_psi": rows[:, 2],
-    }
-    return Record("step_response", columns, {"velocity_m_s": rows[:, 1]})
+    return shown
 
 
 def static_loading(
@@ -147,18 +194,32 @@ def static_loading(
 
     Quasi-static: K(x) - a p. Give the cross-head's path, not its noisy reading, or hysteresis sees the noise.
     """
-    flat = plant(model)
+    return static_loadings([model], actuator, time_s, [displacement_mm], pressure_psi)[0]
+
+
+def static_loadings(
+    models: Sequence[Model | Plant],
+    actuator: str,
+    time_s: np.ndarray,
+    displacements_mm: Sequence[np.ndarray],
+    pressure_psi: float,
+) -> list[Record]:
+    """`static_loading` for each robot and its path."""
     time_s = _times(time_s)
-    path = np.ascontiguousarray(displacement_mm, dtype=float) / _MM
-    if path.shape != time_s.shape or not np.all(np.isfinite(path)):
+    paths = [np.ascontiguousarray(path, dtype=float) / _MM for path in displacements_mm]
+    if any(path.shape != time_s.shape or not np.all(np.isfinite(path)) for path in paths):
         raise SimulationError("a static loading needs one finite displacement for each time")
-    rig = rigs.stand(flat, actuator, pressure_psi)
-    rows = entries.static_record(flat, rig, layout.state_size(), path, time_s)
+    flats = [plant(model) for model in models]
+    found = lanes.load(flats, [rigs.stand(flat, actuator, pressure_psi) for flat in flats], paths, time_s)
+    return [_loaded(path, rows, time_s) for path, rows in zip(paths, found, strict=True)]
+
+
+def _loaded(path: np.ndarray, rows: np.ndarray, time_s: np.ndarray) -> Record:
     columns = {
         "time_s": time_s,
         "displacement_mm": path * _MM,
-        "force_N": rows[:, 0],
-        "pressure_psi": rows[:, 1],
+        "force_N": rows[0],
+        "pressure_psi": rows[1],
     }
     return Record("static_loading", columns)
 
@@ -175,21 +236,57 @@ def anchor_pull(
 
     Quasi-static. The head was extended first; `displacement_mm` is that of the pulling end.
     """
-    flat = plant(model)
+    return anchor_pulls([model], time_s, rate_mm_s, pressure_psi, load_cell_N_m, tolerance_m)[0]
+
+
+def anchor_pulls(
+    models: Sequence[Model | Plant],
+    time_s: np.ndarray,
+    rate_mm_s: float,
+    pressure_psi: float,
+    load_cell_N_m: float = LOAD_CELL_N_M,
+    tolerance_m: float = TOLERANCE_M,
+    together: bool = False,
+) -> list[Record]:
+    """`anchor_pull` for each robot; `together` as in `walks`."""
     time_s = _times(time_s)
     if not np.isfinite(rate_mm_s) or rate_mm_s == 0.0 or not load_cell_N_m > 0.0:
         raise SimulationError("an anchor pull needs a rate other than 0 and a load cell stiffer than 0 N/m")
-    rig = rigs.anchor(flat, pressure_psi)
-    rows = entries.anchor_record(
-        flat, rig, layout.state_size(), rate_mm_s / _MM, float(load_cell_N_m), time_s, _tolerance(tolerance_m)
-    )
+    flats = [plant(model) for model in models]
+    mounted = [rigs.anchor(flat, pressure_psi) for flat in flats]
+    still = [NO_COMMANDS] * len(flats)
+    pull = {"rate_m_s": rate_mm_s / _MM, "load_cell_N_m": float(load_cell_N_m)}
+    found = _marched(lanes.ANCHOR, flats, mounted, still, time_s, tolerance_m, together, **pull)
+    return [_pulled(rate_mm_s, rows, time_s) for rows in found]
+
+
+def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> Record:
     columns = {
         "time_s": time_s,
         "displacement_mm": abs(rate_mm_s) * time_s,
-        "force_N": rows[:, 0],
-        "pressure_psi": rows[:, 1],
+        "force_N": rows[0],
+        "pressure_psi": rows[1],
     }
-    return Record("anchor_pull", columns, {"wound_N": rows[:, 2], "holding_N": rows[:, 3], "kinetic_N": rows[:, 4]})
+    return Record("anchor_pull", columns, {"wound_N": rows[2], "holding_N": rows[3], "kinetic_N": rows[4]})
+
+
+def _marched(kind, flats, mounted, commands, time_s, tolerance_m, together, **pull) -> list[np.ndarray]:
+    switches = [_switches(one) for one in commands]
+    what = lanes.Experiment(kind, mounted, switches, [time_s] * len(flats), _tolerance(tolerance_m), **pull)
+    return lanes.march(flats, what, together)
+
+
+def _as_stamped(flat: Plant, time_s: np.ndarray, position_m: np.ndarray, velocity_m_s: np.ndarray) -> np.ndarray:
+    """Positions (n,) as an instrument stamps them whose clock the effects shift: what was there at other times."""
+    late_s = chains.stamp(flat.active, flat.q) if flat.active & chains.STAMP else 0.0
+    if late_s == 0.0 or not (np.isfinite(position_m).all() and np.isfinite(velocity_m_s).all()):
+        return position_m  # a run that was given up is NaN whenever it is stamped
+    then_s = time_s - late_s
+    inside_s = np.clip(then_s, time_s[0], time_s[-1])
+    rising_s, first = np.unique(time_s, return_index=True)
+    path = CubicHermiteSpline(rising_s, position_m[first], velocity_m_s[first])
+    beyond_m = np.where(then_s > inside_s, velocity_m_s[-1] * (then_s - inside_s), 0.0)
+    return path(inside_s) + beyond_m
 
 
 def _times(time_s) -> np.ndarray:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.actuator import area_at, pressure_after, remember, resistance
-from bifa.simulate.compiled import kernel
+from bifa.simulate.compiled import kernel, merged
 from bifa.simulate.hooks import chains
 from bifa.simulate.march import march, new_run, pressures, shown, start_effects
 from bifa.simulate.stepper import (
@@ -21,13 +23,14 @@ from bifa.simulate.stepper import (
     sources,
 )
 from bifa.simulate.timeline import delayed
+from bifa.simulate.together import anywhere
 
-_SETTLE_S = 30.0  # of a step response's vacuum, many times every time constant
-_HOLD_S = 20.0  # of the pressure before a static loading or a pull
+SETTLE_S = 30.0  # of a step response's vacuum, many times every time constant
+HOLD_S = 20.0  # of the pressure before a static loading or a pull
 _SUBSTEP_S = 0.005
 
 
-@kernel
+@merged
 def _places(rig):
     """Actuator, block, and places of position and pressure in y of a stand's only actuator."""
     if rig.parts & HAS_BODY:
@@ -39,21 +42,49 @@ def _places(rig):
 def _settled(plant, rig, states_of_effects, start, command, seconds, tolerance):
     """A run that has held `command` until time 0, from rest and vented at `start`."""
     run = new_run(states_of_effects)
+    held(plant, rig, run, start, command, seconds)
+    march(plant, rig, run, 0.0, tolerance)
+    return run
+
+
+@merged
+def held(plant, rig, run, start, command, seconds):
+    """Put a new run at `start`, at rest and vented, where `command` is given `seconds` before time 0."""
     actuator, _, x, _ = _places(rig)
     run.y[x] = start
     run.clock[0] = -seconds
     run.command[actuator] = command
     start_effects(plant, rig, run)
-    march(plant, rig, run, 0.0, tolerance)
-    return run
+
+
+@merged
+def under_vacuum(plant, rig, run):
+    """Put a new run where a step response starts."""
+    _, block, _, _ = _places(rig)
+    held(plant, rig, run, plant.q[block + layout.CONTRACTED], VACUUM, SETTLE_S)
+
+
+@merged
+def anchored(plant, rig, run):
+    """Put a new run where an anchor pull starts."""
+    held(plant, rig, run, plant.q[layout.WALL_OFFSET], POSITIVE, HOLD_S)
+
+
+@merged
+def step_row(plant, rig, run, row):
+    """Displacement from contracted in m, velocity, reading in psi, into (3,)."""
+    actuator, block, x, _ = _places(rig)
+    row[0] = run.y[x] - plant.q[block + layout.CONTRACTED]
+    row[1] = run.y[x + 1]
+    row[2] = shown(plant, run, actuator)
 
 
 @kernel
 def step_record(plant, rig, states_of_effects, times, command, sample_times, tolerance):
     """(n, 3): displacement from contracted in m, velocity, reading in psi; at rest under vacuum at time 0."""
-    actuator, block, x, _ = _places(rig)
+    actuator, block, _, _ = _places(rig)
     contracted = plant.q[block + layout.CONTRACTED]
-    run = _settled(plant, rig, states_of_effects, contracted, VACUUM, _SETTLE_S, tolerance)
+    run = _settled(plant, rig, states_of_effects, contracted, VACUUM, SETTLE_S, tolerance)
     late, order = delayed(plant, times, command)
     out = np.empty((sample_times.size, 3))
     i = 0
@@ -63,16 +94,8 @@ def step_record(plant, rig, states_of_effects, times, command, sample_times, tol
             run.command[actuator] = command[order[i]]
             i += 1
         march(plant, rig, run, sample_times[k], tolerance)
-        out[k, 0] = run.y[x] - contracted
-        out[k, 1] = run.y[x + 1]
-        out[k, 2] = shown(plant, run, actuator)
+        step_row(plant, rig, run, out[k])
     return out
-
-
-@kernel
-def _steady(plant):
-    """Nothing changes the pressure of a chamber that is held at one command."""
-    return not plant.active & chains.SUPPLY
 
 
 @kernel
@@ -82,22 +105,29 @@ def static_record(plant, rig, states_of_effects, displacement, sample_times):
     Quasi-static: K(x) - a p without the damper; the air, and what the effects remember, run in time. The pressure
     has been held for a while when the record begins.
     """
-    actuator, block, x, p = _places(rig)
-    curve = plant.body_curve if actuator == 0 else plant.small_curve
-    contracted = plant.q[block + layout.CONTRACTED]
+    out = np.empty((sample_times.size, 2))
     run = new_run(states_of_effects)
+    static_rows(plant, rig, run, displacement, sample_times, out)
+    return out
+
+
+@merged
+def static_rows(plant, rig, run, displacement, sample_times, out):
+    """`static_record` with a new run, into `out`."""
+    actuator, block, x, p = _places(rig)
+    contracted = plant.q[block + layout.CONTRACTED]
     y, z = run.y, run.z
     y[x] = contracted + displacement[0]
     run.command[actuator] = POSITIVE
     start_effects(plant, rig, run)
-    out = np.empty((sample_times.size, 2))
-    now = sample_times[0] - _HOLD_S
+    wavering = anywhere(plant.active & chains.SUPPLY)  # else nothing changes the pressure that a chamber is given
+    now = sample_times[0] - HOLD_S
     before = y[x]
     for k in range(sample_times.size):
         span = sample_times[k] - now
         target = contracted + displacement[k]
-        steps = 1 if _steady(plant) and k > 0 else max(1, int(np.ceil(span / _SUBSTEP_S - 1e-9)))
-        if steps > 0 and span > 0.0:
+        steps = max(1, math.ceil(span / _SUBSTEP_S - 1e-9)) if wavering or k == 0 else 1
+        if span > 0.0:
             h = span / steps
             for s in range(steps):
                 reached = before + (target - before) * (s + 1) / steps
@@ -111,10 +141,13 @@ def static_record(plant, rig, states_of_effects, displacement, sample_times):
                     chains.sensor(plant.active, plant.q, z, actuator, old, run.read[actuator], h)
         now, before = sample_times[k], target
         pressures(plant, run)
-        spring, _ = resistance(plant, curve, block, actuator, z, y[x], 0.0, 0.0)
+        spring = 0.0
+        if actuator == 0:
+            spring, _ = resistance(plant, plant.body_curve, block, actuator, z, y[x], 0.0, 0.0)
+        else:
+            spring, _ = resistance(plant, plant.small_curve, block, actuator, z, y[x], 0.0, 0.0)
         out[k, 0] = spring - area_at(plant, block, y[x]) * y[p]
         out[k, 1] = shown(plant, run, actuator)
-    return out
 
 
 @kernel
@@ -125,21 +158,26 @@ def anchor_record(plant, rig, states_of_effects, rate, load_cell, sample_times, 
     The head has been extended by pressure and then held at `rig.positive_psi`. Quasi-static: the load cell's spring
     takes up force until static friction gives, then kinetic friction at the speed of pulling remains.
     """
-    q = plant.q
-    run = _settled(plant, rig, states_of_effects, q[layout.WALL_OFFSET], POSITIVE, _HOLD_S, tolerance)
-    direction = 1.0 if rate > 0.0 else -1.0
-    slack = chains.slack(plant.active, q)
-    sliding = False
+    run = _settled(plant, rig, states_of_effects, plant.q[layout.WALL_OFFSET], POSITIVE, HOLD_S, tolerance)
     out = np.empty((sample_times.size, 5))
     for k in range(sample_times.size):
         if sample_times[k] > run.clock[0]:
             march(plant, rig, run, sample_times[k], tolerance)
-        normal = grip(plant, rig, run.gravity, 0, run.y)
-        pull = load_cell * max(abs(rate) * sample_times[k] - slack, 0.0)
-        holding = coefficient(plant, direction, 0.0) * normal
-        kinetic = coefficient(plant, direction, abs(rate)) * normal
-        sliding = sliding or pull >= holding
-        out[k, 0] = kinetic if sliding else pull
-        out[k, 1] = shown(plant, run, 1)
-        out[k, 2], out[k, 3], out[k, 4] = pull, holding, kinetic
+        anchor_row(plant, rig, run, rate, load_cell, out[k])
     return out
+
+
+@merged
+def anchor_row(plant, rig, run, rate, load_cell, row):
+    """A row of `anchor_record` now; `run.slip` is 1 once the head slides."""
+    direction = 1.0 if rate > 0.0 else -1.0
+    slack = chains.slack(plant.active, plant.q)
+    normal = grip(plant, rig, run.gravity, 0, run.y)
+    pull = load_cell * max(abs(rate) * run.clock[0] - slack, 0.0)
+    holding = coefficient(plant, direction, 0.0) * normal
+    kinetic = coefficient(plant, direction, abs(rate)) * normal
+    if pull >= holding:
+        run.slip[0] = 1.0
+    row[0] = kinetic if run.slip[0] > 0.0 else pull
+    row[1] = shown(plant, run, 1)
+    row[2], row[3], row[4] = pull, holding, kinetic

@@ -101,29 +101,30 @@ def step(plant, rig, gravity, source, y, z, h, y_new, z_new):
     if plant.active:
         for i in range(z.size):
             z_new[i] = z[i]
+    stable = True
     if rig.parts & HAS_HEAD:
         mode = _small(plant, rig, 1, source[1], y, z, h, y_new, z_new, squeeze(rig.terrain, 5, y[X_HEAD]))
-        if mode < 0:
-            return TOO_LONG
+        stable = stable and mode != TOO_LONG
         kind = 8 * kind + mode
     if rig.parts & HAS_TAIL:
         mode = _small(plant, rig, 2, source[2], y, z, h, y_new, z_new, squeeze(rig.terrain, 6, y[X_TAIL]))
-        if mode < 0:
-            return TOO_LONG
+        stable = stable and mode != TOO_LONG
         kind = 8 * kind + mode
     if rig.parts & HAS_BODY:
         mode = _body(plant, rig, gravity, source[0], y, z, h, y_new, z_new)
-        if mode < 0:
-            return TOO_LONG
+        stable = stable and mode != TOO_LONG
         kind = 64 * kind + mode
-    return kind
+    return kind if stable else TOO_LONG
 
 
 @merged
 def squeeze(terrain, row, position):
     """Value of a terrain's row at a position, 0 in a clear pipe."""
-    if terrain.shape[0] == 0:
-        return 0.0
+    return 0.0 if terrain.shape[0] == 0 else _squeezed(terrain, row, position)
+
+
+@merged
+def _squeezed(terrain, row, position):
     last = terrain.shape[1] - 1
     place = (position - terrain[0, 0]) * terrain[0, 1]
     if place <= 0.0:
@@ -151,8 +152,6 @@ def _small(plant, rig, actuator, source, y, z, h, y_new, z_new, narrower):
     x, v, pressure = y[at], y[at + 1], y[at + 2]
     p_new = pressure_after(plant, layout.SMALL, actuator, z, z_new, x, pressure, source, h)
     force, growth = resistance(plant, plant.small_curve, layout.SMALL, actuator, z, x, v, h)
-    if growth < _LEAST_GROWTH * q[layout.SMALL + layout.DAMPING]:
-        return TOO_LONG
     inertia = q[layout.SMALL + layout.MASS] / h
     drive = inertia * v - force + area_at(plant, layout.SMALL, x) * p_new
     v_new = drive / (inertia + growth)
@@ -169,7 +168,8 @@ def _small(plant, rig, actuator, source, y, z, h, y_new, z_new, narrower):
     remember(plant, actuator, z, z_new, y_new[at], h * v_new, h)
     slow = 2 if x > q[layout.SMALL + layout.THRESHOLD] else 0
     forward = 4 if v_new > 0.0 else 0
-    return touches + slow + (forward if plant.active & chains.SPRING else 0)
+    kind = touches + slow + (forward if plant.active & chains.SPRING else 0)
+    return kind if growth >= _LEAST_GROWTH * q[layout.SMALL + layout.DAMPING] else TOO_LONG
 
 
 @merged
@@ -223,8 +223,6 @@ def _body(plant, rig, gravity, source, y, z, h, y_new, z_new):
     v_h, v_t = y[V_HEAD], y[V_TAIL]
     p_new = pressure_after(plant, layout.BODY, 0, z, z_new, x, y[P_BODY], source, h)
     force, growth = resistance(plant, plant.body_curve, layout.BODY, 0, z, x, v_h - v_t, h)
-    if growth < _LEAST_GROWTH * q[layout.BODY + layout.DAMPING]:
-        return TOO_LONG
     tension = force - area_at(plant, layout.BODY, x) * p_new
     if rig.free:
         inertia = q[layout.BODY + layout.MASS] / h
@@ -237,7 +235,8 @@ def _body(plant, rig, gravity, source, y, z, h, y_new, z_new):
     remember(plant, 0, z, z_new, y_new[X_HEAD] - y_new[X_TAIL], h * (w_h - w_t), h)
     slow = 9 if x > q[layout.BODY + layout.THRESHOLD] else 0
     forward = 18 if w_h > w_t else 0
-    return moving + slow + (forward if plant.active & chains.SPRING else 0)
+    kind = moving + slow + (forward if plant.active & chains.SPRING else 0)
+    return kind if growth >= _LEAST_GROWTH * q[layout.BODY + layout.DAMPING] else TOO_LONG
 
 
 @merged

@@ -59,10 +59,8 @@ def timeline(switches) -> Timeline:
 
 def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Timeline:
     """Settled switching: phases a constant psi apart from time 0 on, the body at `first_phase_rad`."""
-    from bifa.simulate.entries import entries  # compiled from this file, too
-
-    row = np.array([*gait.as_dict().values()])
-    return Timeline(*entries.gait_switches(row, float(duration_s), float(first_phase_rad)))
+    row = np.array([[*gait.as_dict().values()]])
+    return gait_switches(row, np.array([duration_s], dtype=float), float(first_phase_rad))[0]
 
 
 def of_phases(gait: Gait, duration_s: float, initial_rad, coupling_per_s: float = cpg.COUPLING_PER_S) -> Timeline:
@@ -129,34 +127,32 @@ def recorded_commands(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.array([columns[f"command_{chamber}"] for chamber in cpg.CHAMBERS], dtype=float)
 
 
-@kernel
-def gait_switches(gait, duration, first_phase):
-    """Switches of a settled gait (period, psi12, psi13 in degrees, three duties) as three arrays."""
-    period = gait[0]
-    cycles = int(duration / period) + 2
-    times = np.empty(3 + 6 * (cycles + 1))
-    chamber = np.empty(times.size, np.int64)
-    command = np.empty(times.size, np.int64)
-    n = 0
-    for i in range(3):
-        phase = first_phase / (2.0 * math.pi)
-        if i > 0:
-            phase += gait[i] / 360.0
-        phase -= math.floor(phase)
-        duty = gait[3 + i]
-        times[n], chamber[n], command[n] = 0.0, i, 1 if phase > duty else 0
-        n += 1
-        if duty >= 1.0 or duty <= 0.0:
-            command[n - 1] = 1 if duty <= 0.0 else 0
-            continue
-        for cycle in range(cycles + 1):
-            for to_positive in range(2):
-                time = (cycle + (duty if to_positive else 0.0) - phase) * period
-                if 0.0 < time < duration:
-                    times[n], chamber[n], command[n] = time, i, to_positive
-                    n += 1
-    order = np.argsort(times[:n], kind="mergesort")
-    return times[:n][order], chamber[:n][order], command[:n][order]
+def gait_switches(gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: float = 0.0) -> list[Timeline]:
+    """The timelines of settled gaits, rows (period, psi12, psi13 in degrees, three duties), for as long each."""
+    period, duty = gaits[:, :1], gaits[:, 3:]
+    phase = first_phase_rad / _TWO_PI + np.pad(gaits[:, 1:3], ((0, 0), (1, 0))) / 360.0
+    phase = phase - np.floor(phase)
+    always, never = duty <= 0.0, duty >= 1.0
+    first = np.where(always | never, always, phase > duty)  # (n, 3): positive to begin with
+    cycles = int(np.max(duration_s / gaits[:, 0])) + 3
+    edge = np.stack([np.zeros_like(duty), duty], axis=-1)[:, :, None, :]
+    time = (np.arange(cycles)[None, None, :, None] + edge - phase[:, :, None, None]) * period[:, :, None, None]
+    real = (time > 0.0) & (time < duration_s[:, None, None, None]) & ~(always | never)[:, :, None, None]
+    shape = time.shape[1:]
+    chamber = np.broadcast_to(np.arange(3)[:, None, None], shape).reshape(-1)
+    command = np.broadcast_to(np.array([VACUUM, POSITIVE]), shape).reshape(-1)
+    found = []
+    for one, real_one, begins in zip(time.reshape(len(gaits), -1), real.reshape(len(gaits), -1), first, strict=True):
+        kept = np.flatnonzero(real_one)
+        kept = kept[np.argsort(one[kept], kind="stable")]
+        found.append(
+            Timeline(
+                np.concatenate([np.zeros(3), one[kept]]),
+                np.concatenate([np.arange(3), chamber[kept]]),
+                np.concatenate([begins.astype(np.int64), command[kept]]),
+            )
+        )
+    return found
 
 
 @kernel
@@ -170,3 +166,4 @@ def delayed(plant, times, command):
 
 
 COMMANDS = {"positive": POSITIVE, "vacuum": VACUUM, "off": OFF}
+NO_COMMANDS = Timeline(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))

@@ -1,0 +1,121 @@
+"""What a simulation costs in lanes, beside the same one alone in numba: processor seconds, so that what else runs on
+the machine counts for neither. Same robots, same times, same tolerance."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bifa import robot, simulate
+from bifa.robot import Model
+from bifa.simulate import lanes, rigs
+from bifa.simulate.lanes import build, kernel
+
+TOLERANCE_M = 1e-6
+_NEAR, _FAR = 1e-4, 0.02  # relative, of each parameter: as for derivatives, and robots of a robust search
+_ROBOTS = 32
+_TRIES = 40  # short ones, of which some are not interrupted
+
+
+def run() -> dict[str, float]:
+    """Print milliseconds a simulation; keys `lanes_<experiment>_speedup` and companions."""
+    found = kernel.kernels()
+    if found is None:
+        return {}
+    many, one = found
+    print(f"{many.lanes} lanes; ms of the processor a simulation (best of {_TRIES})")
+    print(f"{'':18s}   numba   C alone   together (times numba)   own steps (times numba)")
+    figures: dict[str, float] = {"lanes_width": many.lanes, "lanes_compile_cpu_seconds": _compiled()}
+    near, far = _robots(_NEAR, 1 + 2 * (many.lanes - 1)), _robots(_FAR, _ROBOTS)
+    for name in ("walk", "step", "pull"):
+        what = _experiment(name, near)
+        numba = _best(lambda what=what: lanes._in_numba(what, 0, near[0]))
+        single = _best(lambda what=what: one.march(near[:1], _first(what, 1), False))
+        together = _best(lambda what=what: lanes.march(near, what, True)) / len(near)
+        own = _best(lambda name=name: many.march(far, _experiment(name, far), False)) / len(far)
+        numba_far = _mean_in_numba(_experiment(name, far), far)
+        print(
+            f"{name:18s} {1e3 * numba:7.3f}  {1e3 * single:7.3f}  {1e3 * together:10.3f} ({numba / together:.1f})"
+            f"            {1e3 * own:7.3f} ({numba_far / own:.1f})"
+        )
+        figures[f"lanes_{name}_speedup_together"] = numba / together
+        figures[f"lanes_{name}_speedup_own_steps"] = numba_far / own
+        figures[f"lanes_{name}_speedup_one_lane"] = numba / single
+    print(f"compiled in {figures['lanes_compile_cpu_seconds']:.1f} s of the processor, both kernels")
+    return figures
+
+
+def _compiled() -> float:
+    """Seconds that both compilations take a processor, the compiler's own included."""
+    with tempfile.TemporaryDirectory() as scratch:
+        before = _used()
+        for chosen in (build.target(), build.single()):
+            build.compile_to(Path(scratch) / f"{chosen.lanes}.so", chosen)
+        return _used() - before
+
+
+def _used() -> float:
+    import resource
+
+    return sum(
+        usage.ru_utime + usage.ru_stime
+        for usage in (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    )
+
+
+def _robots(spread: float, count: int) -> list[simulate.Plant]:
+    rng, nominal = np.random.default_rng(1), robot.nominal()
+
+    def drawn() -> Model:
+        scaled = {n: p.value * (1.0 + spread * rng.standard_normal()) for n, p in nominal.parameters.items()}
+        limits = nominal.parameters
+        return nominal.with_values({n: float(np.clip(v, limits[n].lower, limits[n].upper)) for n, v in scaled.items()})
+
+    return [simulate.plant(nominal), *(simulate.plant(drawn()) for _ in range(count - 1))]
+
+
+def _experiment(name: str, plants: list[simulate.Plant]) -> lanes.Experiment:
+    n = len(plants)
+    if name == "walk":
+        commands = simulate.of_gait(robot.BASELINE, 6.0)
+        times = np.arange(0.0, 2.85, 0.01)
+        kind, mounted = lanes.SEEN, [rigs.pipe(p) for p in plants]
+    elif name == "step":
+        commands = simulate.timeline([(0.5, 0, 1), (6.0, 0, 0)])
+        times = np.arange(0.0, 12.0, 0.01)
+        kind, mounted = lanes.STEP, [rigs.stand(p, "large", 8.5) for p in plants]
+    else:
+        what = [kernel.NO_SWITCHES] * n
+        times, mounted = np.arange(0.0, 3.0, 0.02), [rigs.anchor(p, 8.5) for p in plants]
+        return lanes.Experiment(lanes.ANCHOR, mounted, what, [times] * n, TOLERANCE_M, 0.02, 5000.0)
+    switches = (commands.time_s, commands.chamber, commands.command)
+    return lanes.Experiment(kind, mounted, [switches] * n, [times] * n, TOLERANCE_M)
+
+
+def _first(what: lanes.Experiment, count: int) -> lanes.Experiment:
+    return lanes.Experiment(
+        what.kind,
+        what.rigs[:count],
+        what.switches[:count],
+        what.sample_s[:count],
+        what.tolerance_m,
+        what.rate_m_s,
+        what.load_cell_N_m,
+    )
+
+
+def _mean_in_numba(what: lanes.Experiment, plants: list[simulate.Plant]) -> float:
+    return float(np.mean([_best(lambda k=k: lanes._in_numba(what, k, plants[k]), 5) for k in range(len(plants))]))
+
+
+def _best(job, tries: int = _TRIES) -> float:
+    job()
+    best = np.inf
+    for _ in range(tries):
+        begun = time.thread_time()
+        job()
+        best = min(best, time.thread_time() - begun)
+    return best

@@ -1,0 +1,23 @@
+"""Instrument shift: the camera's record is late or early against the Uno's."""
+
+from bifa.effects.effect import Effect, EffectParameter
+
+EFFECT = Effect(
+    name="instrument_shift",
+    summary="displacements are recorded late (negative: early) against the pressures; the motion is as the model says",
+    equation="x_recorded(t) = x(t - share late_s)",
+    source="two clocks lined up wrongly, by a whole sample where periodic edges pair one off; a camera's exposure and "
+    "transfer time",
+    enters="the displacement channels only",
+    experiments=("step_response", "locomotion"),
+    confusable_with=("sensor_lag", "valve_latency"),
+    parameters=(
+        EffectParameter("late_s", "s", -0.04, 0.04, 0.01, "time by which displacements are late", size=True),
+        EffectParameter("share", "", 0.0, 1.0, 1.0, "of that time, in this trial", own=True),
+    ),
+)
+
+
+def stamp(late_s, share):
+    """Seconds by which a displacement is late."""
+    return late_s * share

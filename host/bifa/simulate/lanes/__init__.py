@@ -1,0 +1,119 @@
+"""Many simulations of one kind at once: a lane each of the processor's vectors, in C (docs/model.md).
+
+What is done here has one form in lanes and one in numba; where no compiler is at hand, numba's serves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bifa.simulate import layout
+from bifa.simulate.entries import entries
+from bifa.simulate.lanes.kernel import ANCHOR, PROGRESS, SEEN, STEP, WALK, Experiment, Kernel, Switches, kernels
+from bifa.simulate.locomotion import READ_BODY
+from bifa.simulate.plant import Plant
+from bifa.simulate.stepper import V_HEAD, V_TAIL, X_HEAD, X_TAIL, Rig
+from bifa.simulate.tables import sealed
+
+__all__ = [
+    "ANCHOR",
+    "PROGRESS",
+    "SEEN",
+    "SEEN_OF_WALK",
+    "STEP",
+    "WALK",
+    "Experiment",
+    "Switches",
+    "load",
+    "march",
+    "width",
+]
+
+
+SEEN_OF_WALK = [X_HEAD, V_HEAD, X_TAIL, V_TAIL, READ_BODY, READ_BODY + 1, READ_BODY + 2]
+
+
+def width() -> int:
+    """Simulations that run side by side."""
+    found = kernels()
+    return found[0].lanes if found else 1
+
+
+def _kernels_for(plants: Sequence[Plant]) -> tuple[Kernel, Kernel] | None:
+    found = kernels()
+    return found if found and not any(plant.active & found[0].refused for plant in plants) else None
+
+
+def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.ndarray]:
+    """Rows (columns, samples) of each robot's experiment.
+
+    `together`: for robots that differ little, as for derivatives. They march with the same steps, so that what the
+    integrator does wrong is alike and drops out of the differences from the first robot.
+    """
+    found = _kernels_for(plants)
+    if found is None:
+        return [_in_numba(what, k, plant) for k, plant in enumerate(plants)]
+    many, one = found
+    if len(plants) == 1:
+        return one.march(plants, what, False)
+    if together:
+        return _around_the_first(many, plants, what)
+    return many.march(plants, what, False)
+
+
+def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment) -> list[np.ndarray]:
+    """The first robot leads each pack: what its runs differ by is taken from the others of their packs."""
+    others = kernel.lanes - 1
+    packs = [[0, *range(k, min(k + others, len(plants)))] for k in range(1, len(plants), others)]
+    order = [k for pack in packs for k in pack]
+    chosen = replace(
+        what,
+        rigs=[what.rigs[k] for k in order],
+        switches=[what.switches[k] for k in order],
+        sample_s=[what.sample_s[k] for k in order],
+    )
+    rows = iter(kernel.march([plants[k] for k in order], chosen, True))
+    found: list[np.ndarray] = []
+    for pack in packs:
+        mine = [next(rows) for _ in pack]
+        if found:
+            correction = found[0] - mine[0]
+            found += [row + correction for row in mine[1:]]
+        else:
+            found = mine
+    return found
+
+
+def load(plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray):
+    """Rows (2, samples) of each robot's static loading: force in N, reading in psi."""
+    found = _kernels_for(plants)
+    if found is None:
+        size = layout.state_size()
+        return [
+            entries.static_record(_sealed(plant), rig, size, path, sample_s).T
+            for plant, rig, path in zip(plants, rigs, paths_m, strict=True)
+        ]
+    return found[len(plants) == 1].load(plants, rigs, paths_m, sample_s)
+
+
+def _sealed(plant: Plant) -> Plant:
+    """The same with tables that are read-only, as they are no longer after a journey between processes: numba would
+    compile everything once more for those that can be written."""
+    return plant._replace(body_curve=sealed(plant.body_curve.view()), small_curve=sealed(plant.small_curve.view()))
+
+
+def _in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
+    times, chamber, command = what.switches[k]
+    place = (_sealed(plant), what.rigs[k], layout.state_size())
+    end = (what.sample_s[k], what.tolerance_m)
+    if what.kind == STEP:
+        return entries.step_record(*place, times, command, *end).T
+    if what.kind == ANCHOR:
+        return entries.anchor_record(*place, what.rate_m_s, what.load_cell_N_m, *end).T
+    if what.kind == PROGRESS:
+        return entries.progress_record(*place, times, chamber, command, *end).T
+    rows = entries.walk_record(*place, times, chamber, command, *end).T
+    return rows if what.kind == WALK else rows[SEEN_OF_WALK]

@@ -1,0 +1,91 @@
+"""Compiles the kernel into the user's cache, once for each change of its sources, in a few seconds."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from bifa.simulate import entries, generated
+
+_FLAGS = (
+    "-O2", "-std=gnu11", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast", "-w",
+)  # fmt: skip
+_HERE = Path(__file__).parent
+_OWN = ("translate.py", "program.py", "vectors.h", "tables.h", "drive.c")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A kind of processor: lanes of its vectors, what the compiler is told, and what the processor must have."""
+
+    lanes: int
+    flags: tuple[str, ...]
+    needs: tuple[str, ...]
+
+
+_TARGETS = (
+    Target(8, ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx2", "-mfma"), ("avx512f", "avx512dq", "avx512vl")),
+    Target(4, ("-mavx2", "-mfma"), ("avx2", "fma")),
+    Target(2, (), ()),
+)
+
+
+class NoCompilerError(Exception):
+    """The kernel cannot be compiled here; the text says why."""
+
+
+@cache
+def target() -> Target:
+    """Of this processor."""
+    from llvmlite import binding
+
+    has = binding.get_host_cpu_features()
+    return next(one for one in _TARGETS if all(has.get(feature) for feature in one.needs))
+
+
+def single() -> Target:
+    """One lane, for this processor."""
+    return Target(1, target().flags if target().lanes > 2 else (), ())
+
+
+def compiler() -> str:
+    """The C compiler: CC, else cc, gcc or clang; NoCompilerError if there is none."""
+    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
+        if name and (found := shutil.which(name.split()[0])):
+            return found
+    raise NoCompilerError("no C compiler (Debian: gcc)")
+
+
+def library(chosen: Target) -> Path:
+    """The compiled kernel, made now if it is missing. NoCompilerError where it is missing and cannot be made."""
+    texts = [(_HERE / name).read_text("utf-8") for name in _OWN]
+    name = f"bifa_lanes_{generated.digest(*entries._sources(), *texts, *_FLAGS, *chosen.flags)}_{chosen.lanes}.so"
+    path = generated.folder() / name
+    if not path.exists():
+        compiler()
+        print(f"bifa: compiling the simulator for {chosen.lanes} at once, this once", file=sys.stderr, flush=True)
+        compile_to(path, chosen)
+        generated.forget_old(path.parent)
+    return path
+
+
+def compile_to(path: Path, chosen: Target) -> None:
+    """Make a kernel; NoCompilerError where that fails."""
+    from bifa.simulate.lanes import program
+
+    command = [compiler(), *_FLAGS, *chosen.flags, f"-DLANES={chosen.lanes}"]
+    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
+        source, built = Path(scratch) / "lanes.c", Path(scratch) / "lanes.so"
+        source.write_text(program.source(), "utf-8")
+        try:
+            subprocess.run([*command, str(source), "-o", str(built), "-lm"], check=True, capture_output=True, text=True)
+        except (OSError, subprocess.CalledProcessError) as e:
+            told = (getattr(e, "stderr", None) or str(e)).strip().splitlines()
+            raise NoCompilerError(f"{command[0]} failed: {told[0] if told else e}") from e
+        os.replace(built, path)

@@ -1,0 +1,156 @@
+"""The compiled kernel as Python calls it: jobs in, rows out."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from bifa.simulate import locomotion
+from bifa.simulate.lanes import build
+from bifa.simulate.plant import Plant
+from bifa.simulate.stepper import Rig
+
+WALK, SEEN, PROGRESS, STEP, ANCHOR = range(5)
+COLUMNS = (locomotion.COLUMNS, 7, 2, 3, 5)
+_JOB = np.dtype(
+    [
+        *((name, "i8") for name in ("q", "active", "body_curve", "small_curve", "learnt")),
+        *((name, "f8") for name in ("incline_rad", "positive_psi", "negative_psi")),
+        ("share", "f8", 3),
+        *(
+            (name, "i8")
+            for name in ("switch_s", "chamber", "command", "switches", "sample_s", "path", "samples", "rows")
+        ),
+    ]
+)
+
+
+class _Setting(ctypes.Structure):
+    _fields_ = [
+        *(
+            (name, ctypes.c_int64)
+            for name in (
+                *("parts", "free", "wall", "terrain_columns", "curve_rows", "learnt_terms", "learnt_columns"),
+                *("experiment", "together"),
+            )
+        ),
+        ("terrain", ctypes.c_void_p),
+        *((name, ctypes.c_double) for name in ("rate_m_s", "load_cell_N_m", "tolerance_m")),
+    ]
+
+
+Switches = tuple[np.ndarray, np.ndarray, np.ndarray]  # times in s, chambers, commands; float, int64, int64
+NO_SWITCHES: Switches = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is done to each robot, `Switches` and sample times of each; and what is the same for all."""
+
+    kind: int
+    rigs: Sequence[Rig]
+    switches: Sequence[Switches]
+    sample_s: Sequence[np.ndarray]
+    tolerance_m: float
+    rate_m_s: float = 0.0
+    load_cell_N_m: float = 0.0
+
+
+class Kernel:
+    """A compiled kernel of so many `lanes`. Its calls release the GIL."""
+
+    def __init__(self, path):
+        library = ctypes.CDLL(str(path))
+        self.lanes = library.lanes_of_kernel()
+        library.refused_effects.restype, library.refusals.restype = ctypes.c_int64, ctypes.c_char_p
+        self.refused, self.refusals = library.refused_effects(), library.refusals().decode()
+        self._march, self._load = library.march_jobs, library.load_jobs
+        for function in (self._march, self._load):
+            function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
+            function.restype = ctypes.c_int
+
+    def march(self, plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.ndarray]:
+        """Rows, (columns, samples) for each robot. `together`: packs of `lanes` share their steps; else each lane
+        has its own, and takes up the next robot when it has finished one."""
+        jobs, setting, kept = _jobs(plants, what.rigs)
+        setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
+        setting.rate_m_s, setting.load_cell_N_m = what.rate_m_s, what.load_cell_N_m
+        rows = [np.empty((COLUMNS[what.kind], times.size)) for times in what.sample_s]
+        for name, k in (("switch_s", 0), ("chamber", 1), ("command", 2)):
+            jobs[name] = _addresses([one[k] for one in what.switches])
+        jobs["switches"] = [one[0].size for one in what.switches]
+        jobs["sample_s"], jobs["samples"] = _addresses(what.sample_s), [times.size for times in what.sample_s]
+        jobs["rows"] = _addresses(rows)
+        self._call(self._march, setting, jobs)
+        del kept
+        return rows
+
+    def load(self, plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray):
+        """Rows (2, samples) of a static loading for each robot, force in N and reading in psi."""
+        jobs, setting, kept = _jobs(plants, rigs)
+        rows = np.empty((len(plants), 2, sample_s.size))
+        jobs["path"], jobs["rows"] = _addresses(paths_m), _addresses(rows)
+        jobs["sample_s"], jobs["samples"] = _address(sample_s), sample_s.size
+        self._call(self._load, setting, jobs)
+        del kept
+        return rows
+
+    @staticmethod
+    def _call(function, setting, jobs) -> None:
+        if function(ctypes.addressof(setting), _address(jobs), len(jobs)):
+            raise MemoryError("no memory for a simulation")
+
+
+def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]):
+    """The jobs' robots and mountings, the setting, and what must live as long as they do."""
+    jobs = np.zeros(len(plants), _JOB)
+    learnt = [plant.learnt for plant in plants]
+    curved = next((table for table in learnt if len(table)), None)
+    if curved is not None:
+        level = np.zeros_like(curved)
+        learnt = [table if len(table) else level for table in learnt]
+        jobs["learnt"] = _addresses(learnt)
+    for name, tables in (("q", [p.q for p in plants]), ("body_curve", [p.body_curve for p in plants]),
+                         ("small_curve", [p.small_curve for p in plants])):  # fmt: skip
+        jobs[name] = _addresses(tables)
+    jobs["active"] = [plant.active for plant in plants]
+    for name in ("incline_rad", "positive_psi", "negative_psi", "share"):
+        jobs[name] = [getattr(rig, name) for rig in rigs]
+    rig, terrain = rigs[0], np.ascontiguousarray(rigs[0].terrain)
+    setting = _Setting(
+        parts=rig.parts,
+        free=rig.free,
+        wall=rig.wall,
+        terrain=_address(terrain) if len(terrain) else None,
+        terrain_columns=terrain.shape[1],
+        curve_rows=len(plants[0].body_curve),
+        learnt_terms=0 if curved is None else curved.shape[0],
+        learnt_columns=0 if curved is None else curved.shape[1],
+    )
+    return jobs, setting, (learnt, terrain)
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
+    return [array.__array_interface__["data"][0] for array in arrays]
+
+
+@cache
+def kernels() -> tuple[Kernel, Kernel] | None:
+    """One with this processor's lanes and one with a single lane; None where no compiler is at hand, said once."""
+    try:
+        found = Kernel(build.library(build.target())), Kernel(build.library(build.single()))
+    except build.NoCompilerError as e:
+        print(f"bifa: simulations run one at a time, in numba: {e}", file=sys.stderr)
+        return None
+    if found[0].refused:
+        print(f"bifa: what has no form in lanes runs one at a time, in numba: {found[0].refusals}", file=sys.stderr)
+    return found

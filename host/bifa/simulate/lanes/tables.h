@@ -1,0 +1,148 @@
+// What a kernel works on, a vector of lanes where the numba code has a number (bifa.simulate: Plant, Rig, Run).
+// NUMBERS, MEMORY and the constants of the layout are defined before.
+
+typedef struct {
+    const double *at;
+    long size;
+} Series;
+
+// Rows of results, `columns` vectors each.
+typedef struct {
+    V *at;
+    long columns;
+} Rows;
+
+// A stiffness table a lane, as bifa.simulate.tables has it.
+typedef struct {
+    const double *rows[LANES];
+    V lower, upper, per_width;
+    long count;
+} Curve;
+
+// Learnt curves a lane (bifa.simulate.learnt); no terms: nothing was learnt.
+typedef struct {
+    const double *rows[LANES];
+    long terms, columns;
+} Learnt;
+
+// bifa.simulate.terrain, the same in all lanes.
+typedef struct {
+    const double *rows;
+    long height, columns;
+} Terrain;
+
+typedef struct {
+    V q[NUMBERS];
+    long active[LANES], any; // bits of effects of each lane, and of all together
+    int same;                // in all lanes
+    Curve body_curve, small_curve;
+    Learnt learnt;
+} Plant;
+
+typedef struct {
+    long parts, free, wall;
+    V incline_rad, positive_psi, negative_psi, share[3];
+    Terrain terrain;
+} Rig;
+
+typedef struct {
+    V y[STATES], z[MEMORY], clock[3], slip[1], command[3], gravity[2], source[3];
+    V whole[STATES], first[STATES], halves[STATES], z_whole[MEMORY], z_first[MEMORY], z_halves[MEMORY], read[3];
+    Mask live;    // the others have nothing to do, and go nowhere
+    int together; // the lanes share their steps
+} Run;
+
+MERGED Mask having(const Plant *plant, long bits) {
+    if (__builtin_expect(!(plant->any & bits), 1)) return no_lanes();
+    if (plant->same) return all_lanes();
+    Mask found = no_lanes();
+    for (int i = 0; i < LANES; i++)
+        if (plant->active[i] & bits) found = or_(found, lane(i));
+    return found;
+}
+
+typedef struct {
+    V r0, r1, r2;
+} Three;
+typedef struct {
+    V r0, r1, r2, r3;
+} Four;
+
+// In the place of what could not be translated; nobody asks for it.
+MERGED V nothing(void) { return splat(NAN); }
+typedef struct {
+    V r0, r1;
+} Two;
+MERGED Two nothing_twice(void) { return (Two){splat(NAN), splat(NAN)}; }
+
+MERGED Three reach_of(const Curve *curve) { return (Three){curve->lower, curve->upper, curve->per_width}; }
+
+// Four coefficients of each lane's own row.
+MERGED Four row_of(const Curve *curve, V row) {
+    const V place = v_min(v_max(splat(1.0), row), splat((double)(curve->count - 1)));
+#if LANES == 8 && defined(__AVX512F__)
+    int64_t at[8] __attribute__((aligned(64)));
+    _mm512_store_si512(at, _mm512_slli_epi64(_mm512_cvttpd_epi64(place), 2));
+#define PAIR(i, j)                                                                         \
+    _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(curve->rows[i] + at[i])),    \
+                       _mm256_loadu_pd(curve->rows[j] + at[j]), 1)
+    const V a = PAIR(0, 4), b = PAIR(1, 5), c = PAIR(2, 6), d = PAIR(3, 7);
+#undef PAIR
+    const V even_ab = _mm512_unpacklo_pd(a, b), odd_ab = _mm512_unpackhi_pd(a, b);
+    const V even_cd = _mm512_unpacklo_pd(c, d), odd_cd = _mm512_unpackhi_pd(c, d);
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+    return (Four){_mm512_permutex2var_pd(even_ab, low, even_cd), _mm512_permutex2var_pd(odd_ab, low, odd_cd),
+                  _mm512_permutex2var_pd(even_ab, high, even_cd), _mm512_permutex2var_pd(odd_ab, high, odd_cd)};
+#elif LANES == 4 && defined(__AVX2__)
+    int at[4] __attribute__((aligned(16)));
+    _mm_store_si128((__m128i *)at, _mm_slli_epi32(_mm256_cvttpd_epi32(place), 2));
+#define ROW(i) _mm256_loadu_pd(curve->rows[i] + at[i])
+    const V a = ROW(0), b = ROW(1), c = ROW(2), d = ROW(3);
+#undef ROW
+    const V even_ab = _mm256_unpacklo_pd(a, b), odd_ab = _mm256_unpackhi_pd(a, b);
+    const V even_cd = _mm256_unpacklo_pd(c, d), odd_cd = _mm256_unpackhi_pd(c, d);
+    return (Four){_mm256_permute2f128_pd(even_ab, even_cd, 0x20), _mm256_permute2f128_pd(odd_ab, odd_cd, 0x20),
+                  _mm256_permute2f128_pd(even_ab, even_cd, 0x31), _mm256_permute2f128_pd(odd_ab, odd_cd, 0x31)};
+#else
+    Four found = {splat(0.0), splat(0.0), splat(0.0), splat(0.0)};
+    for (int i = 0; i < LANES; i++) {
+        const double *entry = curve->rows[i] + 4 * (long)at_lane(place, i);
+        set_lane(&found.r0, i, entry[0]);
+        set_lane(&found.r1, i, entry[1]);
+        set_lane(&found.r2, i, entry[2]);
+        set_lane(&found.r3, i, entry[3]);
+    }
+    return found;
+#endif
+}
+
+MERGED V learnt_entry(const Learnt *table, V row, V column) {
+    const V term = v_min(v_max(splat(0.0), row), splat((double)(table->terms - 1)));
+    const V place = v_min(v_max(splat(0.0), column), splat((double)(table->columns - 1)));
+    V found = splat(0.0);
+    for (int i = 0; i < LANES; i++)
+        set_lane(&found, i, table->rows[i][(long)at_lane(term, i) * table->columns + (long)at_lane(place, i)]);
+    return found;
+}
+
+MERGED V terrain_entry(const Terrain *table, V row, V column) {
+    const V place = v_min(v_max(splat(0.0), column), splat((double)(table->columns - 1)));
+    V found = splat(0.0);
+    for (int i = 0; i < LANES; i++)
+        set_lane(&found, i, table->rows[(long)at_lane(row, i) * table->columns + (long)at_lane(place, i)]);
+    return found;
+}
+
+MERGED V worst(Mask m, const Run *run, V value) {
+    if (LANES == 1 || !run->together) return value;
+    const V own = sel(and_(and_(m, run->live), ge(value, value)), value, splat(-INFINITY));
+    double found = at_lane(own, 0);
+    for (int i = 1; i < LANES; i++) found = max_f(found, at_lane(own, i));
+    return splat(found);
+}
+
+MERGED V least(Mask m, const Run *run, V value) { return -worst(m, run, -value); }
+
+MERGED Mask anyone(Mask m, const Run *run, Mask condition) {
+    return LANES == 1 || !run->together ? condition : lanes_if(any(and_(and_(m, run->live), condition)));
+}

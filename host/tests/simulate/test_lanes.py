@@ -1,0 +1,343 @@
+"""The kernel in lanes against numba, which runs the same functions one at a time, and against tighter tolerances."""
+
+import ctypes
+import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bifa import effects, robot, simulate
+from bifa.robot.learnt import LearntCurve
+from bifa.simulate import lanes, layout, rigs
+from bifa.simulate.entries import entries
+from bifa.simulate.lanes import build, kernel
+from bifa.simulate.lanes.translate import Intrinsic, Shapes, Translator, UntranslatableError
+from bifa.simulate.paper import FAST
+
+ROBOTS = 11  # more than there are lanes, so that some take up a second one
+TIME_S = np.arange(0.0, 6.0, 0.02)
+TOLERANCE_M = 1e-6
+ROUNDED = ("backlash", "hysteresis")
+
+
+@pytest.fixture(scope="module")
+def found():
+    both = kernel.kernels()
+    assert both is not None, "the tests need a C compiler"
+    return both
+
+
+def _robots(effect, count=ROBOTS, spread=0.05):
+    rng = np.random.default_rng(len(effect or ""))
+    plants = []
+    for _ in range(count):
+        model = robot.nominal()
+        scaled = {
+            name: float(np.clip(p.value * rng.normal(1.0, spread), p.lower, p.upper))
+            for name, p in model.parameters.items()
+        }
+        model = model.with_values(scaled)
+        if effect:
+            sizes = {
+                p.name: float(np.clip(p.typical * rng.uniform(0.3, 1.5), p.lower, p.upper))
+                for p in effects.library()[effect].parameters
+            }
+            model = model.with_effects({effect: sizes})
+        plants.append(simulate.plant(model))
+    return plants
+
+
+def _switches(timeline):
+    return timeline.time_s, timeline.chamber, timeline.command
+
+
+def _experiments(plants):
+    walk = _switches(simulate.of_gait(FAST, 10.0))
+    step = _switches(simulate.timeline([(0.5, 0, 1), (3.5, 0, 0)]))
+    n = len(plants)
+
+    def one(kind, mounted, switches, **pull):
+        return lanes.Experiment(kind, mounted, [switches] * n, [TIME_S] * n, TOLERANCE_M, **pull)
+
+    return {
+        "walk": one(lanes.WALK, [rigs.pipe(p, 5.0) for p in plants], walk),
+        "large step": one(lanes.STEP, [rigs.stand(p, "large", 8.5) for p in plants], step),
+        "small step": one(lanes.STEP, [rigs.stand(p, "small", 8.5) for p in plants], step),
+        "pull": one(
+            lanes.ANCHOR,
+            [rigs.anchor(p, 8.5) for p in plants],
+            kernel.NO_SWITCHES,
+            rate_m_s=0.02,
+            load_cell_N_m=5000.0,
+        ),
+    }
+
+
+def _size(rows):
+    return np.abs(rows).max(axis=-1, keepdims=True) + 1e-9
+
+
+@pytest.mark.parametrize("effect", [None, *effects.library()])
+def test_lanes_and_numba_tell_the_same(effect, found):
+    plants = _robots(effect)
+    for name, what in _experiments(plants).items():
+        expected = [lanes._in_numba(what, k, plant) for k, plant in enumerate(plants)]
+        for got in (found[0].march(plants, what, False), found[1].march(plants, what, False)):
+            errors = [np.abs((a - b) / _size(b)).max() for a, b in zip(got, expected, strict=True)]
+            # Both take the same steps, but where a rounding decides whether a step is good enough: at rest both springs
+            # of ROUNDED divide one small difference by another.
+            assert effect in ROUNDED or np.median(errors) < 1e-9, (name, errors)
+            assert max(errors) < 5e-3, (name, errors)
+
+
+@pytest.mark.parametrize("effect", [None, *effects.library()])
+@pytest.mark.parametrize("actuator", ["large", "small"])
+def test_static_loadings_are_those_of_numba(effect, actuator, found):
+    plants = _robots(effect)
+    paths = [np.interp(TIME_S, [0.0, 3.0, 6.0], [0.0, 0.02 + 0.001 * k, 0.0]) for k in range(len(plants))]
+    mounted = [rigs.stand(p, actuator, 4.0) for p in plants]
+    got = found[0].load(plants, mounted, paths, TIME_S)
+    for plant, rig, path, rows in zip(plants, mounted, paths, got, strict=True):
+        expected = entries.static_record(lanes._sealed(plant), rig, layout.state_size(), path, TIME_S).T
+        np.testing.assert_allclose(rows, expected, atol=1e-9)
+
+
+def test_every_effect_and_every_learnt_curve_at_once(found):
+    model = robot.nominal().with_effects({name: {} for name in effects.library()})
+    at = np.linspace(0.0, 1.0, 9)
+    learnt = {
+        "filling": LearntCurve(-13.0, 9.0, 0.3 * np.array([np.sin(3 * at), np.cos(3 * at)])),
+        "friction_speed": LearntCurve(0.0, 0.1, np.array([at, 1.0 - at])),
+        "friction_place": LearntCurve(0.0, 0.3, np.array([0.5 * at])),
+        "body_damper": LearntCurve(-0.1, 0.1, np.array([2.0 * at - 1.0])),
+        "grip_speed": LearntCurve(0.0, 0.1, 0.1 * np.array([at, -at])),
+        "grip_place": LearntCurve(0.0, 0.3, 0.1 * np.array([np.sin(9 * at)])),
+        "area_stroke": LearntCurve(0.0, 1.0, 0.05 * np.array([np.sin(5 * at)])),
+        "body_spring": LearntCurve(-0.01, 0.06, np.array([np.sin(5 * at)])),
+    }
+    both = [simulate.plant(model), simulate.plant(replace(model, learnt=learnt))]
+    what = _experiments(both)["walk"]
+    ground = simulate.terrain(simulate.tunnel(0.02))
+    what = replace(what, rigs=[rig._replace(terrain=ground) for rig in what.rigs])
+    expected = [lanes._in_numba(what, k, plant) for k, plant in enumerate(both)]
+    assert np.abs(expected[0] - expected[1]).max() > 1e-3
+    for got in (found[0].march(both, what, False), [found[1].march([p], replace(
+        what, rigs=[r], switches=[s], sample_s=[t]), False)[0]
+        for p, r, s, t in zip(both, what.rigs, what.switches, what.sample_s, strict=True)]):  # fmt: skip
+        for a, b in zip(got, expected, strict=True):
+            assert np.abs((a - b) / _size(b)).max() < 5e-3
+            assert np.abs(a[0] - b[0]).max() < 1e-7
+
+
+def test_a_robot_that_has_no_solution_leaves_the_others_alone(found):
+    plants = _robots(None, 3)
+    broken = plants[1].q.copy()
+    broken[layout.HEAD_MASS] = np.nan
+    what = _experiments(plants)["walk"]
+    for together in (False, True):
+        whole = found[0].march(plants, what, together)
+        rows = found[0].march([plants[0], plants[1]._replace(q=broken), plants[2]], what, together)
+        assert np.isnan(rows[1][:, 1:]).any()
+        for k in (0, 2):
+            assert np.all(np.isfinite(rows[k]))
+            if not together:
+                np.testing.assert_array_equal(rows[k], whole[k])
+
+
+def test_lanes_with_switches_and_samples_of_their_own(found):
+    plants = _robots(None)
+    gaits = [replace(FAST, period_s=FAST.period_s + 0.1 * k) for k in range(ROBOTS)]
+    what = lanes.Experiment(
+        lanes.PROGRESS,
+        [rigs.pipe(p) for p in plants],
+        [_switches(simulate.of_gait(gait, 12.0)) for gait in gaits],
+        [gait.period_s * np.arange(1, 3 + k % 2) for k, gait in enumerate(gaits)],
+        TOLERANCE_M,
+    )
+    got = found[0].march(plants, what, False)
+    for k, rows in enumerate(got):
+        np.testing.assert_allclose(rows, lanes._in_numba(what, k, plants[k]), atol=1e-7)
+
+
+@pytest.mark.parametrize("lanes_of", [1, 2, 4, 8])
+def test_every_width_that_this_processor_has(lanes_of, found):
+    if lanes_of > build.target().lanes:
+        pytest.skip("not on this processor")
+    chosen = next(t for t in (*build._TARGETS, build.single()) if t.lanes == lanes_of)
+    one = kernel.Kernel(build.library(chosen))
+    plants = _robots("hysteresis")
+    what = _experiments(plants)["walk"]
+    for a, b in zip(one.march(plants, what, False), found[1].march(plants, what, False), strict=True):
+        assert np.abs(a[0] - b[0]).max() < 1e-7
+
+
+# -- marching together ---------------------------------------------------------------------------------------------
+
+STEPS = {
+    "body_damping_Ns_m": 0.4, "body_area_N_psi": 0.01, "body_alpha_n_per_s": 0.01, "small_area_N_psi": 0.003,
+    "wall_offset_m": 2e-5, "mu_s": 2e-3, "mu_k": 1e-3, "hysteresis.force_N": 0.02, "valve_latency.delay_s": 2e-4,
+    "supply_positive_psi": 0.01,
+}  # fmt: skip
+
+
+def _columns(tolerance_m, together, gait):
+    model = robot.nominal().with_effects({"hysteresis": {}, "valve_latency": {}})
+    moved = [model.with_values({name: model[name] + step}) for name, step in STEPS.items()]
+    robots = [model, *moved]
+    commands = [simulate.of_gait(gait, 3.0 * gait.period_s)] * len(robots)
+    time_s = np.arange(0.0, 2.5 * gait.period_s, 0.01)
+    how = {"tolerance_m": tolerance_m, "together": together, "states": False}
+    first, *others = (r["displacement_head_mm"] for r in simulate.walks(robots, commands, time_s, **how))
+    return np.array([other - first for other in others])
+
+
+@pytest.mark.parametrize("gait", [robot.BASELINE, FAST], ids=["baseline", "fastest"])
+def test_derivatives_together_are_those_of_a_tight_tolerance(gait):
+    exact = _columns(1e-10, False, gait)
+    np.testing.assert_allclose(_columns(1e-10, True, gait), exact, atol=2e-4)
+    sizes = np.sqrt(np.mean(exact**2, axis=1))
+    errors = {
+        together: np.sqrt(np.mean((_columns(1e-6, together, gait) - exact) ** 2, axis=1)) for together in (True, False)
+    }
+    assert np.median(errors[True] / sizes) < 0.1
+    assert np.all(errors[True] < 0.3 * sizes + 2e-3), dict(zip(STEPS, errors[True] / sizes, strict=True))
+    assert np.sum(errors[True] ** 2) < np.sum(errors[False] ** 2)
+
+
+def test_the_first_robot_leads_every_pack():
+    """Equal robots in different packs differ by nothing from the first."""
+    plants = _robots(None, 1) * 20
+    commands = [simulate.of_gait(FAST, 5.0)] * 20
+    records = simulate.walks(plants, commands, np.arange(0.0, 4.0, 0.01), together=True)
+    for record in records[1:]:
+        np.testing.assert_array_equal(record["displacement_head_mm"], records[0]["displacement_head_mm"])
+
+
+# -- without a compiler ----------------------------------------------------------------------------------------------
+
+_WITHOUT = """
+from bifa import robot, simulate
+print(simulate.speed(robot.nominal(), robot.BASELINE, 3).advance_m[-1], simulate.lanes.width())
+"""
+
+
+def test_without_a_compiler_numba_does_it_and_one_line_says_so(tmp_path):
+    cache = tmp_path / "cache"
+    cache.mkdir()
+    for old in build.generated.folder().glob("*.py"):  # what numba has compiled serves; the kernels do not
+        (cache / old.name).symlink_to(old)
+    (cache / "__pycache__").symlink_to(build.generated.folder() / "__pycache__")
+    nowhere = {"PATH": str(tmp_path), "BIFA_CACHE_DIR": str(cache)}
+    kept = {k: v for k, v in os.environ.items() if k not in ("CC", "PATH")}
+    ended = subprocess.run([sys.executable, "-c", _WITHOUT], env=kept | nowhere, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    advance, width = ended.stdout.split()
+    assert float(advance) == pytest.approx(simulate.speed(robot.nominal(), robot.BASELINE, 3).advance_m[-1], abs=1e-8)
+    assert width == "1"
+    assert ended.stderr.count("\n") == 1
+    assert "no C compiler" in ended.stderr
+
+
+# -- the translator --------------------------------------------------------------------------------------------------
+
+
+def returns_early(x, y):
+    if x > 1.0:
+        if y > 0.0:
+            return x * y
+        x = 1.0
+    elif y > 0.5:
+        return -y
+    return x + y
+
+
+def leaves_loops(x, y):
+    total = 0.0
+    for i in range(7):
+        if i > 2 and x < 0.0:
+            break
+        if y < 0.0:
+            y += 0.3
+            continue
+        total += x + i
+        if total > 4.0:
+            return total
+    return total - y
+
+
+def chooses(x, y):
+    a, b = (x, y) if x > y else (y, x)
+    low = y > 0.0 and not x > 0.5
+    kind = 2 if low else 0
+    for side in (-1.0, 1.0):
+        if side * x > 0.2:
+            kind += 1
+    return a - b + kind + (min(x, y, 0.1) if 0.0 < x < 1.0 else max(x, -0.5))
+
+
+def calculates(x, y):
+    return math.exp(20.0 * x) * math.sin(3.0 * y) + abs(x) ** 1.7 + math.sqrt(abs(y)) + int(10.0 * x) + math.tanh(y)
+
+
+def _swap(x, y):
+    return y, x
+
+
+def calls(x, y):
+    if x > 0.0:
+        x, y = _swap(x, y)
+        return leaves_loops(x, y)
+    return _swap(x, returns_early(y, x))[0]
+
+
+@pytest.mark.parametrize("width", [1, 2, 4, 8])
+@pytest.mark.parametrize("function", [returns_early, leaves_loops, chooses, calculates, calls])
+def test_a_translated_function_does_in_each_lane_what_python_does(function, width, tmp_path):
+    target = build.target()
+    if width > max(4, target.lanes):
+        pytest.skip("not on this processor")
+    translator = Translator(Shapes({}, {}, {}), {})
+    name = translator.function(function, ("F", "F")).name
+    source = (
+        f"{(build._HERE / 'vectors.h').read_text()}\n" + "\n".join(translator.texts) + "\nvoid run(const double *x, "
+        "const double *y, double *out) { V a = splat(0.0), b = a; for (int i = 0; i < LANES; i++) { "
+        f"set_lane(&a, i, x[i]); set_lane(&b, i, y[i]); }} const V c = {name}(a, b); "
+        "for (int i = 0; i < LANES; i++) out[i] = at_lane(c, i); }"
+    )
+    (tmp_path / "f.c").write_text("typedef struct { const double *at; long size; } Series;\n" + source)
+    flags = next((t.flags for t in build._TARGETS if t.lanes == width), ())
+    command = [build.compiler(), *build._FLAGS, *flags, f"-DLANES={width}", tmp_path / "f.c", "-o", tmp_path / "f.so"]
+    subprocess.run([*map(str, command), "-lm"], check=True)
+    run = ctypes.CDLL(str(tmp_path / "f.so")).run
+    run.argtypes = [np.ctypeslib.ndpointer(float)] * 3
+    rng = np.random.default_rng(1)
+    for x, y in rng.normal(0.0, 1.0, (200, 2, width)):
+        x, y, out = np.ascontiguousarray(x), np.ascontiguousarray(y), np.zeros(width)
+        run(x, y, out)
+        np.testing.assert_allclose(out, [function(a, b) for a, b in zip(x, y, strict=True)], rtol=3e-14, atol=1e-14)
+
+
+def _asks_for_the_moon(x):
+    return math.gamma(x)
+
+
+def _uses_it(x):
+    return 1.0 + _asks_for_the_moon(x)
+
+
+def test_what_has_no_form_in_lanes_is_refused_by_name_or_replaced():
+    with pytest.raises(UntranslatableError, match=r"_asks_for_the_moon: line 2 calls math.gamma"):
+        Translator(Shapes({}, {}, {}), {}).function(_uses_it, ("F",))
+    told = []
+
+    def without(function, refusal):
+        told.append(str(refusal))
+        return Intrinsic("splat(NAN)", "F") if function is _asks_for_the_moon else None
+
+    replaced = Translator(Shapes({}, {}, {}), {}, instead=without).function(_uses_it, ("F",))
+    assert "splat(NAN)" in replaced.text
+    assert "math.gamma" in told[0]
