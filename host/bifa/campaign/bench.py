@@ -8,11 +8,15 @@ from bifa.rig import open_rig
 
 @dataclass(frozen=True)
 class Bench:
-    """`port` as for `--port`; `options` go to a virtual rig. Every stage draws its own noise."""
+    """`port` as for `--port`; `options` go to a virtual rig. Every stage draws its own noise.
+
+    `known`: what the person has measured directly, in place of what the rig declares (`bifa.measure.known`).
+    """
 
     port: str | None = "virtual"
     seed: int = 0
     options: Mapping[str, object] = field(default_factory=dict)
+    known: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def is_virtual(self) -> bool:

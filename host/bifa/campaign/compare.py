@@ -77,6 +77,7 @@ def _run(inputs: Path, outputs: Path) -> None:
         "gaits": [asdict(result) for result in results],
         "verdict": diagnosis["verdict"],
         "effects": diagnosis["effects"],
+        "remainder": diagnosis["remainder"],
         "error": diagnosis["error"],
         "prediction_error": json.loads((inputs / "errors.json").read_text()),
         "robustness": _robustness(completed, trials),

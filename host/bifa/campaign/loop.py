@@ -9,30 +9,27 @@ from bifa.campaign.bench import Bench
 from bifa.campaign.compare import compare
 from bifa.campaign.prediction_error import prediction_errors
 from bifa.campaign.residuals import residuals
+from bifa.campaign.resolve import resolve
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
-from bifa.characterisation import plan
-from bifa.characterisation.completed import completed_model
-from bifa.characterisation.identification import identify
-from bifa.characterisation.resolve import resolve
-from bifa.characterisation.session import run_session
-from bifa.characterisation.system import prepare
 from bifa.data import Dataset, read_dataset, write_dataset
-from bifa.discrepancy.diagnosis import Diagnosis, diagnose
-from bifa.discrepancy.record import as_record
 from bifa.gait import Settings, optimise, simulations
 from bifa.gait.library import provenance
 from bifa.gait.uncertainty import SPREAD
-from bifa.link.units import set_point_psi
+from bifa.identify.completed import completed_model
+from bifa.identify.identification import identify
+from bifa.identify.start import prepare
+from bifa.measure import plan
+from bifa.measure.known import known_of
+from bifa.measure.session import run_session
 from bifa.robot import load_model, save_model
 from bifa.robot.gait import BASELINE, load_gait, save_gait
+from lacuna.diagnosis.diagnose import Diagnosis, diagnose
+from lacuna.diagnosis.record import as_record
 
 Part = Callable[[str, float], None]
 
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects
-
-# What a lab measures directly; the vacuum is what the pump makes of it, and fitted.
-KNOWN = {"head_mass_kg": 0.175, "tail_mass_kg": 0.175, "supply_positive_psi": round(set_point_psi(8.5), 4)}
 
 
 @dataclass(frozen=True)
@@ -78,21 +75,21 @@ def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
                 outputs / "bench",
                 trials,
                 name="campaign: characterisation",
-                known=KNOWN,
+                known=known_of(rig, bench.known),
                 provenance=bench.settings(0),
                 on_event=lambda e: part(e.planned.file, (e.number - 1 + e.share) / e.total),
             )
 
-    settings = bench.settings(0) | {"effort": asdict(effort), "known": KNOWN}
+    settings = bench.settings(0) | {"effort": asdict(effort), "known": dict(bench.known)}
     return Stage("measure", "characterise the robot on its bench", (), ("bench",), run, settings, resumes=True)
 
 
 def _fit(bench: Bench, part: Part) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
-        found = identify(read_dataset(inputs / "bench"), seed=bench.seed, progress=lambda what: part(what, 0.0))
+        found = identify(read_dataset(inputs / "bench"), progress=lambda what: part(what, 0.0))
         save_model(outputs / "model-base.toml", found.model)
 
-    return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run, {"seed": bench.seed})
+    return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run)
 
 
 def _optimise(name: str, title: str, model: str, gait: str, bench: Bench, part: Part) -> Stage:

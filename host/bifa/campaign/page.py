@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from bifa.report.animation import animate_walk
+from bifa.report.diagnosis import verdict_sentence
 from bifa.report.evidence import draw_errors, draw_probabilities
 from bifa.report.page import Page, Section, Table, both_palettes
 from bifa.report.residuals import draw_residuals
@@ -18,9 +19,19 @@ GAIT_NAMES = {
 
 def campaign_page(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping], walks: Sequence[Walk]) -> Page:
     """The page of a campaign; summary, diagnosis and traces as in summary.json, diagnosis.json and residuals.json."""
+    return Page(
+        "What this robot does that the paper's model does not",
+        _lead(summary),
+        _facts(summary, diagnosis),
+        [_walking(walks), _lacking(summary, diagnosis, traces), _gaits(summary, walks)],
+        "Made by bifa campaign.",
+    )
+
+
+def _facts(summary: Mapping, diagnosis: Mapping) -> list[tuple[str, str]]:
     gaits = {gait["gait"]: gait for gait in summary["gaits"]}
     error = diagnosis["error"]
-    facts = [
+    return [
         (f"{gaits['baseline']['measured']:.1f} mm/s", "baseline gait, measured"),
         (f"{gaits['base']['measured']:.1f} mm/s", "gait from the base model, measured"),
         (f"{gaits['completed']['measured']:.1f} mm/s", "gait from the completed model, measured"),
@@ -29,56 +40,57 @@ def campaign_page(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping
             "error on held-out trials, in units of the noise",
         ),
     ]
-    sections = [
-        Section(
-            "The robot, walking",
-            ["The gait from the completed model, as the motion capture saw it."],
-            svg=animate_walk(
-                walks[-1].measured, 3 * walks[-1].period_s, "The robot walks with the gait from the completed model"
+
+
+def _walking(walks: Sequence[Walk]) -> Section:
+    return Section(
+        "The robot, walking",
+        ["The gait from the completed model, as the motion capture saw it."],
+        svg=animate_walk(
+            walks[-1].measured, 3 * walks[-1].period_s, "The robot walks with the gait from the completed model"
+        ),
+    )
+
+
+def _lacking(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping]) -> Section:
+    error = diagnosis["error"]
+    return Section(
+        "What the base model lacks",
+        _evidence(summary, diagnosis),
+        figures=[
+            both_palettes(
+                lambda stream, dark: draw_errors(error, stream, dark),
+                "Error before and after per experiment, on a logarithmic axis",
+                "Residual of each experiment before and after the effect was added, against the noise floor.",
             ),
-        ),
-        Section(
-            "What the base model lacks",
-            _evidence(summary, diagnosis),
-            figures=[
-                both_palettes(
-                    lambda stream, dark: draw_errors(error, stream, dark),
-                    "Error before and after per experiment, on a logarithmic axis",
-                    "Residual of each experiment before and after the effect was added, against the noise floor.",
-                ),
-                both_palettes(
-                    lambda stream, dark: draw_residuals(traces, stream, dark),
-                    "Residual over time in each condition, before and after",
-                    "Where the residual lives: held-out trials, in standard deviations of the noise.",
-                ),
-                *_probabilities(diagnosis),
-            ],
-            tables=[*_opened(summary), prediction_table(summary["prediction_error"]), error_table(error)],
-        ),
-        Section(
-            "The gaits",
-            ["What the gaits ask of the three chambers, what the pressures did, and how far the robot got."],
-            tables=[speed_table(summary["gaits"])],
-            figures=[
-                both_palettes(
-                    lambda stream, dark: draw_walks(walks, stream, dark=dark),
-                    "CPG outputs, pressures and displacement of the gaits side by side",
-                    "In the manner of the paper's Fig. 7; dashed: predicted by the completed model.",
-                ),
-                both_palettes(
-                    lambda stream, dark: draw_robustness(summary["robustness"], GAIT_NAMES, stream, dark),
-                    "Speed of each gait on robots that differ a little from this one",
-                    "How robust each gait is: its speed on 256 robots of which every parameter differs by 2 % (sd).",
-                ),
-            ],
-        ),
-    ]
-    return Page(
-        "What this robot does that the paper's model does not",
-        _lead(summary),
-        facts,
-        sections,
-        "Made by bifa campaign.",
+            both_palettes(
+                lambda stream, dark: draw_residuals(traces, stream, dark),
+                "Residual over time in each condition, before and after",
+                "Where the residual lives: held-out trials, in standard deviations of the noise.",
+            ),
+            *_probabilities(diagnosis),
+        ],
+        tables=[*_opened(summary), prediction_table(summary["prediction_error"]), error_table(error)],
+    )
+
+
+def _gaits(summary: Mapping, walks: Sequence[Walk]) -> Section:
+    return Section(
+        "The gaits",
+        ["Commands to the three chambers, measured pressures, and displacement."],
+        tables=[speed_table(summary["gaits"])],
+        figures=[
+            both_palettes(
+                lambda stream, dark: draw_walks(walks, stream, dark=dark),
+                "CPG outputs, pressures and displacement of the gaits side by side",
+                "In the manner of the paper's Fig. 7; dashed: predicted by the completed model.",
+            ),
+            both_palettes(
+                lambda stream, dark: draw_robustness(summary["robustness"], GAIT_NAMES, stream, dark),
+                "Speed of each gait on robots that differ slightly from this one",
+                "Robustness of each gait: its speed on 256 robots whose parameters vary by 2 % (one sd).",
+            ),
+        ],
     )
 
 
@@ -113,10 +125,12 @@ def prediction_table(errors: Sequence[Mapping]) -> Table:
 def error_table(error: Mapping) -> Table:
     """Errors before and after, of fitted and held-out trials and by experiment, against the floor."""
     sides = ("before", "after")
-    rows = [[what.replace("_", "-"), *(f"{error[s][what]:.2f}" for s in sides)] for what in ("fitted", "held_out")]
-    floor = error["noise_floor"]
-    rows[0].append(f"{floor['fitted']:.2f}")
-    rows[1].append(f"{floor['held_out']:.2f}")
+    labels = {"fitted": "fitted", "held_out": "not fitted", "held_out_conditions": "conditions not fitted"}
+    rows = [
+        [label, *(f"{error[s][what]:.2f}" for s in (*sides, "noise_floor"))]
+        for what, label in labels.items()
+        if error["before"].get(what) is not None
+    ]
     for name in error["before"]["by_experiment"]:
         rows.append([name.replace("_", " "), *(f"{error[s]['by_experiment'][name]:.2f}" for s in sides), ""])
     return Table(["trials", "base model", "completed model", "noise floor"], rows, f"{error['unit']}.", 1)
@@ -138,23 +152,22 @@ def _opened(summary: Mapping) -> list[Table]:
 
 
 def _lead(summary: Mapping) -> str:
-    names = " and ".join(effect["name"].replace("_", " ") for effect in summary["effects"])
-    return {
-        "identified": f"The residual of the paper's model is traced to {names}; with it the model predicts this robot.",
-        "none": "The residual of the paper's model is noise: nothing is missing that these experiments can show.",
-        "unexplained": "Structure remains that no effect of the library accounts for; its signature is below.",
-    }[summary["verdict"]]
+    return verdict_sentence(summary["verdict"], summary["effects"], summary["remainder"])
 
 
 def _evidence(summary: Mapping, diagnosis: Mapping) -> list[str]:
-    return [diagnosis["signature"]["text"], *_named(summary["effects"]), *_rejected(diagnosis)]
+    left = [f"What these leave: {diagnosis['remainder']['text']}"] if summary["effects"] else []
+    return [diagnosis["signature"]["text"], *_named(summary["effects"]), *left, *_rejected(diagnosis)]
 
 
 def _named(effects: Sequence[Mapping]) -> list[str]:
     named = []
     for effect in effects:
         values = ", ".join(f"{name} = {value:.3g}" for name, value in effect["parameters"].items())
-        named.append(f"{effect['name'].replace('_', ' ')}: {values}; probability {effect['probability']:.2f}.")
+        named.append(
+            f"{effect['name'].replace('_', ' ')}: {values}; closes {100 * effect['share_of_gap']:.0f} % of the gap; "
+            f"probability {effect['probability']:.2f}."
+        )
     return named
 
 
@@ -164,11 +177,11 @@ def _rejected(diagnosis: Mapping) -> list[str]:
     tried = [t for t in diagnosis["tried"] if t["effects"] != [e["name"] for e in diagnosis["effects"]]]
     if tried:
         listed = "; ".join(f"{' + '.join(t['effects']) or 'nothing'} {t['error']:.2f}" for t in tried[:4])
-        said.append(f"Also fitted, with what each leaves on the known trials: {listed}.".replace("_", " "))
+        said.append(f"Also fitted, with the error on the fitted trials: {listed}.".replace("_", " "))
     for experiment in diagnosis.get("separated_by", []):
         settings = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in experiment["settings"].items())
         said.append(
-            f"To tell {' and '.join(experiment['separates'])} apart the rig ran {experiment['experiment']} "
+            f"To separate {' and '.join(experiment['separates'])}, the rig ran {experiment['experiment']} "
             f"({settings}).".replace("_", " ")
         )
     return said

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from bifa.discrepancy.diagnosis import Diagnosis
-from bifa.discrepancy.errors import repeat_differences, rms
-from bifa.identify.fit import evaluate_on
-from bifa.identify.system import Channels
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.diagnosis.residual_error import repeat_differences, rms
+from lacuna.estimation.fit import evaluate_on
+from lacuna.system import Channels
 
 _QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
 
@@ -16,7 +16,7 @@ _QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
 def prediction_errors(found: Diagnosis) -> list[dict]:
     """RMS error of each quantity on the trials that were fitted and on the held-out ones, by the base model and by the
     final one, and the floor: the RMS of what repeats differ by, over the root of 2. Plain types."""
-    known, held_out = found.final.problem.trials, found.split.final
+    known, held_out = found.final.problem.trials, found.split.held_out
     before, after = (fit.residuals() | evaluate_on(fit, held_out).residuals() for fit in (found.base, found.final))
     floors = repeat_differences(known, held_out, after)
     rows = []

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bifa.discrepancy.diagnosis import Diagnosis
-from bifa.identify.fit import evaluate_on
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.estimation.fit import evaluate_on
 
 _POINTS = 400  # of a trace, enough for a small figure
 
@@ -13,10 +13,10 @@ _POINTS = 400  # of a trace, enough for a small figure
 def residuals(found: Diagnosis) -> list[dict]:
     """For each held-out condition the channel whose residual shrank most, in standard deviations of the noise, under
     the base model and the final one; thinned. Plain types."""
-    before = evaluate_on(found.base, found.split.final)
-    after = evaluate_on(found.final, found.split.final)
+    held_out = found.split.held_out
+    before, after = evaluate_on(found.base, held_out), evaluate_on(found.final, held_out)
     shown, seen = [], set()
-    for trial, old, new in zip(found.split.final, before.scaled_residuals(), _in_units_of(before, after), strict=True):
+    for trial, old, new in zip(held_out, before.scaled_residuals(), _in_units_of(before, after), strict=True):
         if (trial.experiment, trial.condition) in seen:
             continue
         seen.add((trial.experiment, trial.condition))

@@ -138,7 +138,7 @@ def _read_records(folder: Path) -> dict:
     except FileNotFoundError:
         return {}
     except (ValueError, KeyError, TypeError) as error:
-        raise StageError(f"{folder / PROVENANCE} is damaged ({error}): delete it to start the campaign anew") from None
+        raise StageError(f"{folder / PROVENANCE} is damaged ({error}): delete it to start the campaign over") from None
 
 
 def _write_json(path: Path, content: dict) -> None:

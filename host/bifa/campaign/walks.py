@@ -6,10 +6,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 from bifa.campaign.stages import Stage
-from bifa.characterisation.locomotion import record_walk
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.link import Uno
+from bifa.measure.locomotion import record_walk
 from bifa.report.walks import Walk, draw_walks
 from bifa.robot import Model
 from bifa.robot.gait import Gait
@@ -41,6 +41,7 @@ def measure_walks(
                         gait=gait.as_dict(),
                         repeat=repeat,
                         session_order=len(trials) + 1,
+                        extra=recorded.extra,
                     )
                 )
     return Dataset(None, "walks", {}, tuple(trials), {"firmware": hello.firmware})

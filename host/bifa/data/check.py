@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .dataset import Dataset, Trial
+from .lag import displacement_lag, misfit, shift_of_all
 from .layout import EXPERIMENTS, is_command
 
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
@@ -88,7 +89,7 @@ def _longest_run(flags: np.ndarray) -> tuple[int, int]:
 def _stuck_channel(trial: Trial) -> Iterator[Finding]:
     for name, values in trial.columns.items():
         if name != "time_s" and not is_command(name) and np.ptp(values) == 0:
-            yield Finding("stuck", f"every sample reads {values[0]:g}: not connected?", trial.file, column=name)
+            yield Finding("stuck", f"every sample reads {values[0]:g}: is it connected?", trial.file, column=name)
 
 
 def _spikes(trial: Trial) -> Iterator[Finding]:
@@ -158,7 +159,7 @@ def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
         numbers = sorted(trial.repeat for trial in group)
         absent = sorted(set(range(1, max(*numbers, REPEATS_WANTED) + 1)) - set(numbers))
         if absent:
-            why = "the noise floor cannot be had from it" if len(group) == 1 else "the noise floor is less certain"
+            why = "no noise floor can be estimated from it" if len(group) == 1 else "the noise floor is less certain"
             text = f"{group[0].label}: repeat {', '.join(map(str, absent))} is missing; {why}"
             yield Finding("missing repeats", text)
 
@@ -171,8 +172,19 @@ def _missing_experiments(dataset: Dataset) -> Iterator[Finding]:
     for actuator in ("large", "small"):
         statics = dataset.of("static_loading", actuator)
         if statics and not any(abs(trial.pressure_psi) < 0.5 for trial in statics):
-            text = f"no static loading of the {actuator} actuator at 0 psi: its stiffness curve K rests on the area"
+            text = f"no static loading of the {actuator} actuator at 0 psi: its stiffness curve K depends on the area"
             yield Finding("missing experiment", text)
+
+
+def _lags(dataset: Dataset) -> Iterator[Finding]:
+    """Instruments whose clocks were lined up wrongly in single trials, or in all of them."""
+    lags = {trial.file: lag for trial in dataset.trials if (lag := displacement_lag(trial)) is not None}
+    for file, lag in lags.items():
+        others = [other for name, other in lags.items() if name != file]
+        if others and (text := misfit(lag, others)):
+            yield Finding("lag", text, file)
+    if text := shift_of_all(list(lags.values())):
+        yield Finding("lag", f"in the {len(lags)} trials that show it (median) {text}")
 
 
 def _session_order(dataset: Dataset) -> Iterator[Finding]:
@@ -180,7 +192,7 @@ def _session_order(dataset: Dataset) -> Iterator[Finding]:
     known = [order for order in orders if order is not None]
     if known and len(known) < len(orders):
         text = f"{len(orders) - len(known)} of {len(orders)} trials have no session_order"
-        yield Finding("session order", f"{text}: a drift over the day is seen in part only")
+        yield Finding("session order", f"{text}: a drift over the session shows only in part")
     twice = sorted(order for order, count in Counter(known).items() if count > 1)
     if twice:
         yield Finding("session order", f"session_order {', '.join(map(str, twice))} is given to several trials")
@@ -201,4 +213,5 @@ DATASET_CHECKS: tuple[Callable[[Dataset], Iterator[Finding]], ...] = (
     _missing_repeats,
     _missing_experiments,
     _session_order,
+    _lags,
 )

@@ -1,6 +1,7 @@
 """The one error of this package: it says which file, line and column is at fault."""
 
 from bifa.errors import BifaError
+from bifa.printable import printable
 
 
 class DatasetError(BifaError):
@@ -17,5 +18,5 @@ class DatasetError(BifaError):
             None if line is None else f"line {line}",
             None if column is None else f"column {column}" if str(file).endswith(".csv") else column,
         ]
-        found = ", ".join(part for part in place if part)
+        found = ", ".join(printable(part, keep="") for part in place if part)
         super().__init__(f"{found}: {problem}" if found else problem)

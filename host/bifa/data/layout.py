@@ -9,16 +9,9 @@ DIRECTIONS = ("forward", "backward")
 
 PRESSURE_RANGE_PSI = (-15.0, 15.0)  # the sensor's span, Honeywell ABP...015PD: +-15 psi
 
-# The gait's six parameters and the coupling, with the ranges that the firmware accepts.
-GAIT_RANGES: dict[str, tuple[float, float]] = {
-    "period_s": (0.5, 60.0),
-    "psi12_deg": (0.0, 360.0),
-    "psi13_deg": (0.0, 360.0),
-    "duty_body": (0.0, 1.0),
-    "duty_head": (0.0, 1.0),
-    "duty_tail": (0.0, 1.0),
-}
-GAIT_OPTIONAL_RANGES: dict[str, tuple[float, float]] = {"coupling_per_s": (0.0, 20.0)}
+# Parameters of a trial's gait, and those that may stand beside them.
+GAIT = ("period_s", "psi12_deg", "psi13_deg", "duty_body", "duty_head", "duty_tail")
+GAIT_OPTIONAL = ("coupling_per_s",)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,9 @@ import tomllib
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
+from bifa.ranges import RANGES
+from bifa.toml import parse_toml
+
 from .dataset import Dataset, Trial
 from .errors import DatasetError
 from .fields import Fields, Source
@@ -13,8 +16,8 @@ from .layout import (
     DIRECTIONS,
     EXPERIMENTS,
     FORMAT,
-    GAIT_OPTIONAL_RANGES,
-    GAIT_RANGES,
+    GAIT,
+    GAIT_OPTIONAL,
     PRESSURE_RANGE_PSI,
     SETTINGS,
     TABLE_FILE,
@@ -64,11 +67,9 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
         line = raw.count(b"\n", 0, error.start) + 1
         raise DatasetError(f"byte 0x{raw[error.start]:02x} is not UTF-8", file=TABLE_FILE, line=line) from None
     try:
-        values = tomllib.loads(text)
+        values = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise DatasetError(f"is not valid TOML: {error}", file=TABLE_FILE) from None
-    except (RecursionError, ValueError) as error:  # nested too deep; an integer of over 4300 digits
-        raise DatasetError(f"is not usable TOML: {error}", file=TABLE_FILE) from None
     listed = values.get("trial")
     source = Source(text, len(listed) if isinstance(listed, list) else 0)
     return Fields(values, source), source
@@ -95,7 +96,7 @@ def _trial_head(entry: Any, source: Source, number: int) -> dict[str, Any]:
     noted = fields.table("extra") if "extra" in fields else {}
     for key in noted:
         if key in SETTINGS:
-            raise fields.error("extra", f"{key} is a key of the trial itself and does not belong into extra")
+            raise fields.error("extra", f"{key} is a key of the trial itself and does not belong in extra")
     fields.finish(also=layout.optional + _COMMON_OPTIONAL)
     return {**head, "extra": {**noted, **extra}}
 
@@ -115,11 +116,9 @@ def _setting(fields: Fields, key: str, source: Source, number: int) -> Any:
 
 
 def _gait(fields: Fields) -> dict[str, float]:
-    gait = {key: fields.number(key, *bounds) for key, bounds in GAIT_RANGES.items()}
-    for key, bounds in GAIT_OPTIONAL_RANGES.items():
-        if key in fields:
-            gait[key] = fields.number(key, *bounds)
-    fields.finish(also=tuple(GAIT_OPTIONAL_RANGES))
+    present = GAIT + tuple(key for key in GAIT_OPTIONAL if key in fields)
+    gait = {key: fields.number(key, *RANGES[key][:2]) for key in present}
+    fields.finish(also=GAIT_OPTIONAL)
     return gait
 
 

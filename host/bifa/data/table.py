@@ -11,6 +11,8 @@ from .layout import Layout, is_command
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NUMERIC_BYTES = b"0123456789+-.eE, \t\n"
 _BLANKS = " \t"
+LARGEST = 1e12  # in any unit: no measurement, and small enough to be squared and averaged
+SHORTEST_STEP_S = 1e-6
 
 
 def read_table(path: Path, file: str, layout: Layout) -> dict[str, np.ndarray]:
@@ -129,6 +131,12 @@ def _shown(text: str) -> str:
 
 
 def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
+    for name, values in columns.items():
+        large = np.flatnonzero(np.abs(values) > LARGEST)
+        if large.size:
+            row = int(large[0])
+            problem = f"{values[row]:g} is beyond any measurement (largest: {LARGEST:g})"
+            raise DatasetError(problem, file=file, line=row + 2, column=name)
     time_s = columns["time_s"]
     back = np.flatnonzero(np.diff(time_s) <= 0)
     if back.size:
@@ -140,6 +148,11 @@ def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
             line=row + 2,
             column="time_s",
         )
+    close = np.flatnonzero(np.diff(time_s) < SHORTEST_STEP_S)
+    if close.size:
+        row = int(close[0]) + 1
+        problem = f"time advances by {time_s[row] - time_s[row - 1]:g} s only (least: {SHORTEST_STEP_S:g} s)"
+        raise DatasetError(problem, file=file, line=row + 2, column="time_s")
     for name, values in columns.items():
         if is_command(name):
             wrong = np.flatnonzero((values != 0) & (values != 1))

@@ -61,7 +61,7 @@ class DatasetWriter:
         head = Dataset(self.partial, name, dict(known or {}), (), dict(provenance or {}))
         if self.partial.exists():
             if not resume:
-                raise DatasetError(f"{self.partial} holds an interrupted session: resume it, or move it out of the way")
+                raise DatasetError(f"{self.partial} holds an interrupted session: resume it, or move it away")
             head = self._recorded(head)
         else:
             self.partial.mkdir(parents=True)
@@ -75,7 +75,7 @@ class DatasetWriter:
             if old != new:
                 raise DatasetError(
                     f"{self.partial} was begun with {what} = {old!r}, not {new!r}; "
-                    f"resume it with the same, or move it out of the way"
+                    f"resume it with the same settings, or move it away"
                 )
         return earlier
 

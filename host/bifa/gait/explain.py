@@ -67,13 +67,13 @@ def reasons(before: Anatomy, after: Anatomy) -> list[str]:
         f"Speed {before.speed_mm_s:.1f} to {after.speed_mm_s:.1f} mm/s: the cycle takes {after.gait.period_s:.2f} s "
         f"in place of {before.gait.period_s:.2f} s and advances {after.advance_mm:.1f} mm "
         f"in place of {before.advance_mm:.1f} mm.",
-        f"The body has {100 * after.contraction_share:.0f} % of the cycle to contract, was "
+        f"The body has {100 * after.contraction_share:.0f} % of the cycle to contract, previously "
         f"{100 * before.contraction_share:.0f} %: it snaps {_seconds(after.contraction_s)} after the command when "
         f"contracting, {_seconds(after.extension_s)} when extending, since the bulging fabric empties slowly.",
-        f"The tail is told to anchor {_lead(after.tail_lead_s)} the body's extension, was "
-        f"{_lead(before.tail_lead_s)}; the head {_lead(after.head_lead_s)} its contraction, was "
-        f"{_lead(before.head_lead_s)}: the body answers later than the ends, so the waiting can be cut.",
-        f"The body's pressure is reversed at {after.extended_psi:.1f} and {after.contracted_psi:.1f} psi, was "
+        f"The tail is commanded to anchor {_lead(after.tail_lead_s)} the body's extension, previously "
+        f"{_lead(before.tail_lead_s)}; the head {_lead(after.head_lead_s)} its contraction, previously "
+        f"{_lead(before.head_lead_s)}: the body responds later than the ends, so less waiting is needed.",
+        f"The body's pressure is reversed at {after.extended_psi:.1f} and {after.contracted_psi:.1f} psi, previously "
         f"{before.extended_psi:.1f} and {before.contracted_psi:.1f} psi: passing the spring's peak is enough, "
         f"the supplies' full pressure ({model_supply:.1f} psi was reached) is not needed.",
     ]

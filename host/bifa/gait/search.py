@@ -228,7 +228,7 @@ def _robustly(model, runs, spread, explored: Found, refined: Found, settings, sa
                 otherwise, most = (Gait(*row.tolist()), float(speed)), speeds.mean()
         if otherwise is not None:
             return otherwise
-    raise SearchError("no finalist stands a finer step and 20 cycles; search longer")
+    raise SearchError("no candidate survives re-simulation over 20 cycles with a finer step; search longer")
 
 
 def _at_periods(stage: Round, space: SearchSpace, points: np.ndarray) -> list[np.ndarray]:
@@ -244,5 +244,5 @@ def _finely(model, runs, rows: np.ndarray, settings: Settings) -> np.ndarray:
 def _best(rows: np.ndarray, speeds: np.ndarray) -> tuple[Gait, float]:
     best = int(np.argmax(speeds))
     if speeds[best] <= 0.0:
-        raise SearchError("no finalist stands a finer step and 20 cycles; search longer")
+        raise SearchError("no candidate survives re-simulation over 20 cycles with a finer step; search longer")
     return Gait(*rows[best].tolist()), float(speeds[best])

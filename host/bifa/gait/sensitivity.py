@@ -8,7 +8,8 @@ import numpy as np
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, distribution
 from bifa.gait.simulations import Simulations
-from bifa.robot.gait import GAIT_RANGES, Gait
+from bifa.ranges import RANGES
+from bifa.robot.gait import Gait
 from bifa.simulate import Plant, gait_rows
 
 # Half the width of the scan of each parameter: a relative change of the period, degrees, parts of the cycle.
@@ -43,7 +44,7 @@ def sensitivity(
     base = gait.as_dict()
     scans, rows = {}, []
     for name, reach in _REACH.items():
-        lower, upper, _ = GAIT_RANGES[name]
+        lower, upper, _ = RANGES[name]
         width = reach * base[name] if name == "period_s" else reach
         values = base[name] + width * np.linspace(-1.0, 1.0, points)
         values = np.mod(values, 360.0) if name.startswith("psi") else np.clip(values, lower, upper)
@@ -54,7 +55,7 @@ def sensitivity(
     for number, (name, values) in enumerate(scans.items()):
         part = speeds[number * points : (number + 1) * points]
         quantile = np.quantile(part[:, 1:], QUANTILE, axis=1)
-        unit = GAIT_RANGES[name][2]
+        unit = RANGES[name][2]
         result.append(Scan(name, unit, base[name], values, part[:, 0], quantile, _room(values, quantile)))
     return result
 

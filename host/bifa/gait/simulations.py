@@ -6,9 +6,9 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from bifa.cluster import cluster
+from bifa.cluster import Tls, cluster
 from bifa.gait.metric import Judged, Metric, Passage
-from bifa.simulate import Plant, Progress, cores, speeds
+from bifa.simulate import Plant, Progress, cores, full_lanes, speeds
 
 _PIECES_PER_WORKER = 8  # gaits differ in cost
 
@@ -23,7 +23,8 @@ class Simulations:
     def judged(self, plants: Sequence[Plant], which: np.ndarray, gaits: np.ndarray, metric: Metric | Passage) -> Judged:
         """Judge walks of `gaits` (n, 6), row k with the model `plants[which[k]]`."""
         self.count += len(gaits)
-        rows = [piece for piece in np.array_split(np.arange(len(gaits)), min(self._pieces, len(gaits))) if piece.size]
+        pieces = min(self._pieces, -(-len(gaits) // full_lanes()))
+        rows = [piece for piece in np.array_split(np.arange(len(gaits)), pieces) if piece.size]
         futures = [
             self._executor.submit(_walks, [plants[i] for i in which[piece]], gaits[piece], metric) for piece in rows
         ]
@@ -42,12 +43,12 @@ def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> 
 
 
 @contextmanager
-def simulations(dask: str | None = None, workers: int | None = None) -> Iterator[Simulations]:
+def simulations(dask: str | None = None, workers: int | None = None, tls: Tls = Tls()) -> Iterator[Simulations]:  # noqa: B008
     """On this machine's cores, or on the dask cluster whose scheduler is at the address `dask`."""
     if dask is None:
         count = workers or cores()
         with ThreadPoolExecutor(count, thread_name_prefix="bifa-gait") as executor:
             yield Simulations(executor, count)
         return
-    with cluster(dask) as (executor, count):
+    with cluster(dask, tls) as (executor, count):
         yield Simulations(executor, count)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.errors import BifaError
-from bifa.robot.gait import GAIT_RANGES, Gait
+from bifa.ranges import RANGES
+from bifa.robot.gait import Gait
 
 
 class SpaceError(BifaError):
@@ -26,7 +27,7 @@ class Axis:
 
     def __post_init__(self):
         for name in self.sets:
-            low, high, unit = GAIT_RANGES[name]
+            low, high, unit = RANGES[name]
             if not low <= self.lower < self.upper <= high:
                 raise SpaceError(
                     f"{self.name}: {self.lower:g} to {self.upper:g} must be a range within {low:g} to {high:g} {unit}"
@@ -72,7 +73,7 @@ class SearchSpace:
         for axis in self.axes:
             first, *others = (values[name] for name in axis.sets)
             if any(abs(other - first) > 1e-9 for other in others):
-                raise SpaceError(f"{axis.name}: {' and '.join(axis.sets)} are searched as equal, and differ")
+                raise SpaceError(f"{axis.name}: {' and '.join(axis.sets)} are searched as one axis and must be equal")
             if not axis.lower <= first <= axis.upper:
                 raise SpaceError(f"{axis.name} = {first:g} is outside {axis.lower:g} to {axis.upper:g} {axis.unit}")
             point.append((first - axis.lower) / (axis.upper - axis.lower))

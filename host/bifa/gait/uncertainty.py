@@ -47,7 +47,7 @@ def spread_of(model: Model, relative: float | None = None) -> Spread:
         values, vectors = np.linalg.eigh(model.covariance.matrix)
         if values.min() < -1e-9 * max(values.max(), 1e-300):
             raise UncertaintyError(
-                f"the covariance of model {model.name!r} has a negative direction; fit the model again, "
+                f"the covariance of model {model.name!r} is not positive semidefinite; fit the model again, "
                 "or give a relative spread"
             )
         factor = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -55,7 +55,7 @@ def spread_of(model: Model, relative: float | None = None) -> Spread:
         return Spread(names, factor, f"the fit's covariance of {len(names)} parameters")
     share = SPREAD if relative is None else relative
     if not 0.0 < share <= 0.5:
-        raise UncertaintyError(f"spread = {share:g} is outside its range 0 (not included) to 0.5")
+        raise UncertaintyError(f"spread = {share:g} must be above 0 and at most 0.5")
     names = tuple(BASE_PARAMETERS)
     factor = np.diag([share * abs(model[name]) for name in names])
     return Spread(names, factor, f"{100 * share:g} % standard deviation of {len(names)} parameters, independent")

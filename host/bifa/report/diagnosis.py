@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bifa.report.evidence import draw_errors, draw_learnt, draw_probabilities
 from bifa.report.page import Page, Section, Table, both_palettes
 
-_LEADS = {
-    "none": "The base model explains this data: what is left differs as repeats of one run do.",
-    "unexplained": "Something is left that no effect of the library accounts for.",
-}
+
+def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
+    """The verdict of `bifa diagnose --json` in one sentence."""
+    if verdict == "none":
+        return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
+    if verdict == "unexplained":
+        return "The base model lacks something that no effect of the library accounts for."
+    names = _names([effect["name"] for effect in effects])
+    closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap"
+    rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
+    return f"What the base model lacks is {names}, which closes {closed}{rest}."
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
     """The page for a record of `bifa diagnose --json`."""
     error, effects = record["error"], record["effects"]
-    lead = _LEADS.get(record["verdict"]) or "What the base model lacks: " + ", ".join(
-        effect["name"].replace("_", " ") for effect in effects
-    )
+    lead = verdict_sentence(record["verdict"], effects, record["remainder"])
     facts = [
-        (f"{error['before']['held_out']:.2f}", "held-out error of the base model, in units of the noise"),
+        (f"{error['before']['held_out']:.2f}", "error of the base model on trials not fitted, in units of the noise"),
         (f"{error['after']['held_out']:.2f}", "after"),
         (f"{error['noise_floor']['held_out']:.2f}", "noise floor"),
     ]
@@ -37,9 +42,19 @@ def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
             lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
         )
         rows = [
-            (effect["name"], ", ".join(f"{k} = {v:g}" for k, v in effect["parameters"].items())) for effect in effects
+            (effect["name"].replace("_", " "), _sized(effect), f"{100 * effect['share_of_gap']:.0f} %")
+            for effect in effects
         ]
-        sections.insert(0, Section("Evidence", tables=(Table(("effect", "parameters"), rows),), figures=(evidence,)))
+        table = Table(("effect", "parameters, with 90 % intervals", "of the gap"), rows)
+        sections.insert(0, Section("Evidence", tables=(table,), figures=(evidence,)))
+        sections.append(Section("What the named effects leave", (record["remainder"]["text"],)))
+    if record["nearest"]:
+        rows = [
+            (" + ".join(r["effects"]).replace("_", " "), f"{100 * r['share_of_gap']:.0f} %") for r in record["nearest"]
+        ]
+        sections.append(Section("Also tried", tables=(Table(("explanation", "of the gap that it would close"), rows),)))
+    if record["warnings"]:
+        sections.append(Section("Before you believe it", tuple(record["warnings"])))
     for curve in record["learnt"]:
         text = f"Added to the model: a curve for {curve['term']}."
         figure = both_palettes(
@@ -48,10 +63,19 @@ def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
         sections.append(Section("Learnt from the data", (text,), figures=(figure,)))
     hidden = record["not_detectable_here"]
     if hidden:
-        sections.append(Section("Not detectable with this data", (", ".join(hidden),)))
+        sections.append(Section("Not detectable in this data", (", ".join(hidden),)))
     coming = record["next_experiment"]
     if coming["experiment"]:
         settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
         text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
         sections.append(Section("Next experiment", (text,)))
     return Page(f"Diagnosis of {name}", lead, facts, sections)
+
+
+def _sized(effect: Mapping[str, Any]) -> str:
+    ends = effect["interval_90"]
+    return ", ".join(f"{k} = {v:g} ({ends[k][0]:g} to {ends[k][1]:g})" for k, v in effect["parameters"].items())
+
+
+def _names(effects: Sequence[str]) -> str:
+    return " and ".join(effects).replace("_", " ")

@@ -47,7 +47,7 @@ def draw_probabilities(effects: Sequence[Mapping], path: Path | BytesIO, dark: b
         axis.barh(rows, [effect["probability"] for effect in effects], height=0.55, color=palette.after)
         for row, effect in zip(rows, effects, strict=True):
             confusable = ", ".join(effect["confusable_with"])
-            note = f"{effect['probability']:.2f}" + (f"   not told apart from: {confusable}" if confusable else "")
+            note = f"{effect['probability']:.2f}" + (f"   indistinguishable from: {confusable}" if confusable else "")
             axis.text(effect["probability"] + 0.01, row, note, va="center")
         axis.set_yticks(rows, [effect["name"].replace("_", " ") for effect in effects])
         axis.set_xlim(0, 1.25)
@@ -75,7 +75,9 @@ def draw_learnt(curve: Mapping, path: Path | BytesIO, dark: bool = False) -> Non
 
 
 def _bars(side: Mapping) -> dict[str, float]:
-    bars = {"fitted trials": side["fitted"], "held-out trials": side["held_out"]}
+    bars = {"fitted trials": side["fitted"], "trials not fitted": side["held_out"]}
+    if side.get("held_out_conditions") is not None:
+        bars["conditions not fitted"] = side["held_out_conditions"]
     return bars | {name.replace("_", " "): value for name, value in side.get("by_experiment", {}).items()}
 
 

@@ -1,0 +1,94 @@
+"""Run the experiment that tells apart what a diagnosis could not, and diagnose again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bifa.data import Dataset, read_dataset
+from bifa.measure.plan import REPEATS, PlannedTrial
+from bifa.measure.session import run_session
+from bifa.robot.gait import Gait
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.diagnosis.next_experiment import NextExperiment
+
+ROUNDS = 3
+SPECIMEN = ("sealed", "profile", "effects", "parameters")  # of a virtual rig: what makes it the same robot again
+_WALK_CYCLES = 4
+
+OpenRig = Callable[[int], AbstractContextManager]
+Diagnose = Callable[[Dataset], Diagnosis]
+Progress = Callable[[str, float], None]
+
+
+def resolve(
+    dataset: Dataset,
+    found: Diagnosis,
+    diagnose: Diagnose,
+    open_rig: OpenRig,
+    folder: Path,
+    progress: Progress = lambda what, share: None,
+) -> tuple[Dataset, Diagnosis, tuple[NextExperiment, ...]]:
+    """As long as `found` names an experiment that separates what it confuses, run that and diagnose again: until the
+    set is one, nothing on offer separates it, or after `ROUNDS` experiments.
+
+    open_rig(n) gives the rig for experiment number n, from 1 on; its data set goes to `folder`/separate-n. Returns all
+    trials as one data set, the last diagnosis, and the experiments that were run.
+    """
+    ran: list[NextExperiment] = []
+    for number in range(1, ROUNDS + 1):
+        if found.next.experiment is None:
+            break
+        trials = planned(found.next)
+        with open_rig(number) as rig:
+            run_session(
+                rig,
+                folder / f"separate-{number}",
+                trials,
+                name=f"to tell {' and '.join(found.next.separates)} apart",
+                known=dataset.known,
+                provenance=dataset.provenance,
+                on_event=lambda e: progress(e.planned.file, (e.number - 1 + e.share) / e.total),
+            )
+        dataset = joined(dataset, read_dataset(folder / f"separate-{number}"), f"separate-{number}_")
+        ran.append(found.next)
+        found = diagnose(dataset)
+    return dataset, found, tuple(ran)
+
+
+def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:
+    """The chosen experiment as trials of a session, with its repeats."""
+    settings: Mapping[str, Any] = chosen.settings
+    gait = Gait(**settings["gait"]) if "gait" in settings else None
+    condition = PlannedTrial(
+        chosen.experiment,
+        settings.get("actuator"),
+        settings.get("pressure_psi"),
+        settings.get("rate_mm_s"),
+        gait,
+        _WALK_CYCLES if gait else 0,
+        settings={key: settings[key] for key in ("direction", "inclination_deg") if key in settings},
+    )
+    return tuple(replace(condition, repeat=repeat) for repeat in range(1, REPEATS + 1))
+
+
+def joined(first: Dataset, second: Dataset, prefix: str) -> Dataset:
+    """Both data sets' trials as one day: the second's come later, under names of their own."""
+    last = max((t.session_order or 0 for t in first.trials), default=0)
+    before = {condition: 0 for condition in (t.condition for t in second.trials)}
+    for trial in first.trials:
+        if trial.condition in before:
+            before[trial.condition] = max(before[trial.condition], trial.repeat)
+    later = tuple(
+        replace(
+            trial,
+            file=prefix + trial.file,
+            repeat=trial.repeat + before[trial.condition],
+            session_order=last + (trial.session_order or 1),
+        )
+        for trial in second.trials
+    )
+    return Dataset(None, first.name, first.known, first.trials + later, first.provenance)

@@ -1,0 +1,29 @@
+"""The model with what a diagnosis added to it, as `bifa simulate` and `bifa optimize` take it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bifa.identify.robust import with_uncertainty
+from bifa.pipe_robot.learnt_terms import learnt_curves
+from bifa.robot import Model
+from bifa.simulate import plant
+from lacuna.estimation.clustered import clustered_covariance
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.uncertainty import uncertainty
+
+
+def completed_model(fit: Fit) -> Model:
+    """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of those
+    values that the data determine."""
+    structure = fit.structure
+    system = structure.system
+    model = system.model_at(fit.theta, structure.effects)
+    model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
+    known = uncertainty(fit)
+    sd = np.sqrt(np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fit))))
+    named = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
+    spread = {e.name: float(s) for e, s in zip(known.estimates, sd, strict=True) if e.determined and e.name in named}
+    return with_uncertainty(model, known, spread)

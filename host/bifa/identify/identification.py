@@ -1,0 +1,178 @@
+"""The whole identification of section IV: the stages, the joint refinement, and what is known afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bifa.data import Dataset
+from bifa.identify.estimate import Estimate
+from bifa.identify.robust import with_uncertainty
+from bifa.identify.start import fit_statics, prepare
+from bifa.identify.static import StaticFit
+from bifa.pipe_robot.inputs import ANCHOR
+from bifa.pipe_robot.system import RobotSystem
+from bifa.robot import Model
+from lacuna.estimation.clustered import clustered_covariance
+from lacuna.estimation.fit import Fit, fit_base
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.settle import settle
+from lacuna.estimation.solve import solve
+from lacuna.estimation.uncertainty import Uncertainty, profile_interval, uncertainty
+
+CONFIDENCE = 0.9
+_NORMAL_HALF = 1.6449  # of a 90 % interval
+# mu_s shows in one sample of a pull, its threshold: there the cost is no parabola.
+_PROFILED = ("mu_s",)
+_PULL_PARAMETERS = ("wall_offset_m", "mu_s", "mu_k")
+
+_GIVEN_BY = {
+    "body_damping_Ns_m": "step_response of the large actuator",
+    "body_area_N_psi": "static_loading of the large actuator at two pressures or more, one of them 0",
+    "body_alpha_n_per_s": "step_response of the large actuator",
+    "body_alpha_s_per_s": "step_response of the large actuator",
+    "small_damping_Ns_m": "step_response of the small actuator",
+    "small_area_N_psi": "static_loading of the small actuator at two pressures or more, one of them 0",
+    "small_alpha_n_per_s": "step_response of the small actuator",
+    "small_alpha_s_per_s": "step_response of the small actuator",
+    "wall_offset_m": "anchor_pull at three pressures",
+    "mu_s": "anchor_pull at three pressures",
+    "mu_k": "anchor_pull at three pressures",
+    "supply_positive_psi": "locomotion, or a gauge",
+    "supply_negative_psi": "step_response, or a gauge",
+    "head_mass_kg": "a balance (a step response does not determine the moving mass)",
+    "head_segment_mass_kg": "a balance",
+    "tail_mass_kg": "a balance (a step response does not determine the moving mass)",
+    "small_mass_kg": "a balance (a step response does not determine the moving mass)",
+    "wall_stiffness_N_m": "pressing a head against a force gauge (a pull cannot separate it from mu and x_w)",
+    "wall_damping_Ns_m": "an impact test at 1 kHz or more",
+}
+
+
+@dataclass(frozen=True)
+class Open:
+    """A parameter that this data set does not determine: the initial value kept, and what would determine it."""
+
+    name: str
+    value: float
+    needs: str
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a data set says about the robot.
+
+    model: the identified model, its covariance included. fit: the joint refinement. uncertainty: of every fitted
+    parameter. intervals: by name, 90 %, those of the profile likelihood where the quadratic ones mislead.
+    statics: the static stage by actuator. open: what could not be determined. error: RMS residual in units of the
+    noise floor, by experiment and channel.
+    """
+
+    system: RobotSystem
+    model: Model
+    fit: Fit
+    uncertainty: Uncertainty
+    intervals: Mapping[str, Estimate]
+    statics: Mapping[str, StaticFit]
+    open: tuple[Open, ...]
+    error: Mapping[tuple[str, str], float]
+
+
+def identify(
+    dataset: Dataset,
+    model: Model | None = None,
+    *,
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Identification:
+    """Identify the robot of `dataset` from `model` (the nominal one) on: the paper's stages, then all together.
+
+    Raises TooLittleDataError where nothing at all can be fitted. Deterministic.
+    """
+    system = prepare(dataset, model, progress)
+    progress("all experiments together, pressures included")
+    fit = fit_base(system, system.trials)
+    progress("final steps and uncertainty")
+    fit = settle(fit)
+    known = uncertainty(fit, confidence=CONFIDENCE)
+    intervals = _intervals(system, fit, known)
+    intervals |= _profiles(fit, intervals)
+    return Identification(
+        system=system,
+        model=_model(system, fit, known, intervals, dataset),
+        fit=fit,
+        uncertainty=known,
+        intervals=intervals,
+        statics=fit_statics(dataset),
+        open=_open(system, dataset, known),
+        error=_errors(fit),
+    )
+
+
+def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, Estimate]:
+    """Quadratic intervals, wider where the experiments contradict one another by more than their noise."""
+    spread = np.sqrt(np.diag(clustered_covariance(fit)))
+    found = {}
+    for estimate, between in zip(known.estimates, spread, strict=True):
+        if estimate.name in system.fitted and estimate.determined:
+            sd = max(estimate.sd, float(between))
+            low, high = estimate.value - _NORMAL_HALF * sd, estimate.value + _NORMAL_HALF * sd
+            parameter = system.model.parameters[estimate.name]
+            low, high = max(low, parameter.lower), min(high, parameter.upper)
+            found[estimate.name] = Estimate(estimate.value, sd, low, high, CONFIDENCE)
+    return found
+
+
+def _profiles(fit: Fit, intervals: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Profile-likelihood intervals from the pulls alone, the rest of the robot where the joint fit has it; never
+    narrower than the quadratic ones."""
+    pulls = [trial for trial in fit.problem.trials if trial.experiment == ANCHOR]
+    free = tuple(fit.structure.names.index(name) for name in _PULL_PARAMETERS if name in intervals)
+    if not pulls or len(free) < len(_PULL_PARAMETERS):
+        return {}
+    problem = Problem(fit.structure, pulls, fit.problem.floor)
+    local = Fit(problem, solve(problem, problem.start(fit.solution.point.values), free=free), 1, 1)
+    found = {}
+    for name in _PROFILED:
+        old = intervals[name]
+        low, high = profile_interval(local, name, confidence=CONFIDENCE)
+        low, high = min(low, old.lower), max(high, old.upper)
+        found[name] = Estimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high, CONFIDENCE)
+    return found
+
+
+def _model(
+    system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, Estimate], dataset: Dataset
+) -> Model:
+    """The identified model: fitted values with their sd, and the covariance of those that are determined."""
+    sd = {name: interval.sd for name, interval in intervals.items()}
+    model = with_uncertainty(system.model_at(fit.theta), known, sd, f"fitted to {dataset.name}")
+    provenance = f"bifa fit, {len(dataset.trials)} trials of {dataset.name}"
+    return replace(model, name=dataset.name, provenance=provenance)
+
+
+_TOLD = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before
+
+
+def _open(system: RobotSystem, dataset: Dataset, known: Uncertainty) -> tuple[Open, ...]:
+    prior_sd = {p.name: p.prior_sd for p in system.parameters}
+    # what the data tell hardly more of than was known before is as open as what they do not tell
+    loose = {e.name for e in known.estimates if not e.determined or e.sd > _TOLD * (prior_sd[e.name] or np.inf)}
+    absent = [n for n in system.model.parameters if n not in system.fitted and n not in dataset.known]
+    names = [n for n in system.model.parameters if n in loose or n in absent]
+    found = [Open(n, system.model.parameters[n].value, _GIVEN_BY[n]) for n in names]
+    for actuator, prefix in (("large", "body"), ("small", "small")):
+        if prefix not in system.curves:
+            needs = f"static_loading of the {actuator} actuator at 0 psi"
+            found.append(Open(f"{prefix} stiffness curve", float("nan"), needs))
+    return tuple(found)
+
+
+def _errors(fit: Fit) -> dict[tuple[str, str], float]:
+    """RMS residual in units of the noise floor, by experiment and channel."""
+    squares: dict[tuple[str, str], list[float]] = {}
+    for trial, channels in zip(fit.problem.trials, fit.scaled_residuals(), strict=True):
+        for channel, z in channels.items():
+            squares.setdefault((trial.experiment, channel), []).append(float(np.nanmean(z**2)))
+    return {key: float(np.sqrt(np.mean(values))) for key, values in squares.items()}

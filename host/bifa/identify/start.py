@@ -1,0 +1,99 @@
+"""Where identification begins: what static loadings, rests and sensors say by themselves (section IV).
+
+Static loading gives the stiffness curve K and the area a of each actuator; where an actuator rests in its step
+responses pins K beyond the static range; supplies are read off the sensors. Everything else is found by the fit over
+all experiments, from afar.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from bifa import robot
+from bifa.data import Dataset
+from bifa.identify.equilibria import pressure_sd_psi, reach_m, rests
+from bifa.identify.static import StaticFit, fit_static
+from bifa.pipe_robot.curves import FittedCurve
+from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.system import RobotSystem, fittable
+from bifa.robot import Model, ParameterError
+
+_ACTUATORS = {"large": "body", "small": "small"}
+_SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supply
+
+Progress = Callable[[str], None]
+
+
+def prepare(dataset: Dataset, model: Model | None = None, progress: Progress = lambda stage: None) -> RobotSystem:
+    """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
+    stand where the static stage leaves them, and the rest is as in `model` (default: nominal).
+
+    `progress` is told the stage's name. Raises TooLittleDataError where the data set holds nothing that can be fitted.
+    """
+    if not dataset.trials:
+        raise TooLittleDataError("the data set holds no trials: nothing can be fitted")
+    model = model or robot.nominal()
+    progress("static loading: stiffness and area")
+    statics = fit_statics(dataset)
+    values = _known(dataset, model) | _supplies(dataset, model)
+    values |= {f"{_ACTUATORS[a]}_area_N_psi": fit.area_N_psi.value for a, fit in statics.items() if fit.area_N_psi}
+    curves = {_ACTUATORS[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
+    system = RobotSystem(dataset, model.with_values(values), curves, fittable(dataset, curves))
+    if not system.parameters:
+        raise TooLittleDataError("these trials constrain no unknown parameter of the model")
+    return system
+
+
+def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
+    """Static fits by actuator, of those that were loaded at 0 psi. A curve without steps beside it continues alone."""
+    found = {}
+    for actuator in _ACTUATORS:
+        try:
+            found[actuator] = fit_static(dataset, actuator, reach_m(dataset, actuator))
+        except TooLittleDataError:
+            continue  # the model's own curve stands in; the report says so
+    return found
+
+
+def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model: Model) -> FittedCurve:
+    """The static curve, pinned by where the actuator rested in step responses."""
+    prefix = _ACTUATORS[fit.actuator]
+    name = f"{prefix}_area_N_psi"
+    area = values.get(name, model.parameters[name].value)
+    seen = rests(dataset, fit.actuator)
+    moves = bool(seen or dataset.of("locomotion"))
+    if not seen:
+        return FittedCurve(prefix, fit.stiffness, moves)
+    sd = np.full(len(seen), area * pressure_sd_psi())
+    pinned = fit.stiffness.with_equilibria(
+        [rest.displacement_m for rest in seen], [area * rest.pressure_psi for rest in seen], sd
+    )
+    return FittedCurve(prefix, pinned, moves)
+
+
+def _known(dataset: Dataset, model: Model) -> dict[str, float]:
+    unknown = [name for name in dataset.known if name not in model.parameters]
+    if unknown:
+        raise ParameterError(
+            f"[known] in dataset.toml names {', '.join(unknown)}, which is not a parameter of the model; "
+            f"there are {', '.join(model.parameters)}"
+        )
+    return dict(dataset.known)
+
+
+def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
+    """Supplies that the lab did not measure, read off the sensors; the joint refinement has the last word."""
+    found = {}
+    vacuum = [r.pressure_psi for a in _ACTUATORS for r in rests(dataset, a) if r.pressure_psi < 0]
+    if "supply_negative_psi" not in dataset.known and vacuum:
+        found["supply_negative_psi"] = float(np.median(vacuum))
+    walks = [t.columns["pressure_body_psi"] for t in dataset.of("locomotion") if t.pressure_psi is None]
+    if "supply_positive_psi" not in dataset.known and walks:
+        found["supply_positive_psi"] = float(np.median([np.quantile(p, _SUPPLY_SETTLED) for p in walks]))
+    return {name: float(np.clip(v, *_bounds(model, name))) for name, v in found.items()}
+
+
+def _bounds(model: Model, name: str) -> tuple[float, float]:
+    return model.parameters[name].lower, model.parameters[name].upper

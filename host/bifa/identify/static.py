@@ -1,0 +1,89 @@
+"""First stage: stiffness K and area a from static loading (paper, IV.A.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.data import Dataset, Trial
+from bifa.identify.estimate import Estimate, weighted_mean
+from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.motion import imposed_motion
+from bifa.pipe_robot.stiffness import StiffnessFit, fit_stiffness
+
+UNPRESSURISED_PSI = 0.05  # below this commanded pressure a trial counts as one at 0 psi
+
+
+@dataclass(frozen=True)
+class StaticFit:
+    """What static loading tells about one actuator.
+
+    area_N_psi: None where every trial was at 0 psi.
+    hysteresis_N: half of the mean distance between the loading and the unloading branch at 0 psi.
+    residual_N: RMS of force - (K(x) - a p) of every trial, by file.
+    """
+
+    actuator: str
+    stiffness: StiffnessFit
+    area_N_psi: Estimate | None
+    hysteresis_N: float
+    residual_N: dict[str, float]
+
+
+def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | None = None) -> StaticFit:
+    """K at 0 psi through the middle of the hysteresis, then the area that brings the other pressures onto it.
+
+    reach_m: the least and greatest displacement that other experiments reach.
+
+    Raises TooLittleDataError without a trial at 0 psi.
+    """
+    trials = dataset.of("static_loading", actuator)
+    unloaded = [trial for trial in trials if abs(trial.pressure_psi) < UNPRESSURISED_PSI]
+    if not unloaded:
+        raise TooLittleDataError(
+            f"the stiffness curve of the {actuator} actuator cannot be determined: there is no static_loading of it at "
+            f"0 psi; run `bifa experiment static_loading --actuator {actuator}`"
+        )
+    x, force, loading = (np.concatenate(parts) for parts in zip(*map(_branches, unloaded), strict=True))
+    stiffness = fit_stiffness(x, force, loading, reach_m=reach_m)
+    pressurised = [trial for trial in trials if trial not in unloaded]
+    area = _area(stiffness, pressurised) if pressurised else None
+    residual = {t.file: _residual_rms(stiffness, area.value if area else 0.0, t) for t in trials}
+    return StaticFit(actuator, stiffness, area, _half_width(x, force, loading, stiffness), residual)
+
+
+def _branches(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Displacement [m], force [N], and whether the actuator was being extended; rests take no part."""
+    x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] * 1e-3)
+    moving = direction != 0
+    return x[moving], trial.columns["force_N"][moving], direction[moving] > 0
+
+
+def _area(stiffness: StiffnessFit, trials: list[Trial]) -> Estimate:
+    """Each trial gives one area, the mean of (K(x) - F) / p; higher pressures measure it better."""
+    areas, weights = [], []
+    for trial in trials:
+        x, force, _ = _branches(trial)
+        areas.append(np.mean(stiffness.force(x) - force) / trial.pressure_psi)
+        weights.append(trial.pressure_psi**2)
+    # What is not known of K's mean shifts every trial alike, so the scatter between them does not show it.
+    x = np.linspace(*stiffness.covered_m, 50)
+    mean_pressure = np.average([trial.pressure_psi for trial in trials], weights=weights)
+    common_sd = stiffness.mean_force_sd(x) / abs(mean_pressure)
+    return weighted_mean(np.array(areas), np.array(weights), common_sd)
+
+
+def _residual_rms(stiffness: StiffnessFit, area: float, trial: Trial) -> float:
+    x, force, _ = _branches(trial)
+    return float(np.sqrt(np.mean((force - stiffness.force(x) + area * trial.pressure_psi) ** 2)))
+
+
+def _half_width(x: np.ndarray, force: np.ndarray, loading: np.ndarray, stiffness: StiffnessFit) -> float:
+    """Half of (mean residual loading - mean residual unloading), away from the ends where the direction turns."""
+    low, high = stiffness.covered_m
+    middle = (x > low + 0.1 * (high - low)) & (x < high - 0.1 * (high - low))
+    if not (loading & middle).any() or not (~loading & middle).any():
+        return 0.0
+    residual = force - stiffness.force(x)
+    return 0.5 * float(residual[loading & middle].mean() - residual[~loading & middle].mean())

@@ -1,0 +1,156 @@
+"""Bring an instrument's record onto the Uno's clock.
+
+The Uno's sampling strobe (D10) is wired to the instrument's sync input: the instrument stamps each rising edge with its
+own clock, the Uno stamps the same edge in its telemetry. One edge looks like the next; so that both sides number them
+alike, the Uno leaves out ten strobes when it is told to (`mark`) and names the sample that comes first after the
+pause. A straight line through the pairs gives offset and drift; what is left is the alignment's error.
+"""
+
+from dataclasses import dataclass
+from math import fsum
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from bifa.errors import BifaError
+from bifa.link.uno import MARK_PAUSE
+
+MIN_EDGES = 20
+MAX_RMS_S = 2e-3
+MAX_DRIFT = 0.01  # the Uno's resonator is good to 0.5 %
+_OFF_GRID = 0.4  # periods by which an edge may miss its place
+_FOLLOW = 0.2  # share of an edge's deviation that the next is expected to have
+_RESTART_PERIODS = 5  # a restart takes the bootloader's second; lost edges do not come in such numbers
+
+
+class AlignmentError(BifaError):
+    """The instrument's record cannot be lined up with the Uno's clock."""
+
+
+@dataclass(frozen=True)
+class ClockLine:
+    """uno_s = offset_s + rate * instrument_s, with the RMS of the edges about that line."""
+
+    offset_s: float
+    rate: float
+    rms_s: float
+    edges: int
+
+    def to_uno(self, instrument_s: np.ndarray) -> np.ndarray:
+        """Instrument times [s], shape (n,), as times of the Uno's clock [s]."""
+        return self.offset_s + self.rate * np.asarray(instrument_s)
+
+
+def align(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray, marked: int) -> ClockLine:
+    """Line up an instrument's clock with the Uno's by a mark in the strobe.
+
+    sync_s: the instrument's stamps of rising edges [s], shape (m,), increasing, from before the mark; some may be lost.
+    uno_s, sequence: the Uno's stamps of its samples [s] and their numbers, shape (k,); some may be lost.
+    marked: number of the sample whose strobe was the first after the pause (`Uno.mark_strobe`).
+
+    Raises AlignmentError where the edges do not show the pause once and whole, too few of them pair up with samples or
+    the pairs do not lie on a line of a plausible drift: nothing is guessed.
+    """
+    gaps = _gaps(sync_s)
+    pauses = np.flatnonzero(np.abs(gaps - (MARK_PAUSE + 1)) < _OFF_GRID)
+    if len(pauses) != 1:
+        raise AlignmentError(_no_pause(gaps, len(pauses)))
+    return _line_up(sync_s[pauses[0] + 1 :], marked, uno_s, sequence)
+
+
+def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray) -> ClockLine:
+    """As `align`, where the mark is the Uno's restart: the first edge after the last long pause is its sample 1."""
+    pauses = np.flatnonzero(_gaps(sync_s) > _RESTART_PERIODS)
+    if not len(pauses):
+        raise AlignmentError(
+            "the sync edges show no pause of the strobe: start the instrument first, then `bifa record`; the pause "
+            "tells which edge is which sample"
+        )
+    return _line_up(sync_s[pauses[-1] + 1 :], 1, uno_s, sequence)
+
+
+def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """What a camera saw at other times, shape of `time_s`; before and after its record, what it saw first and last.
+
+    A snap-through lasts a few samples: a cubic through them follows it, a straight line would not.
+    """
+    return CubicSpline(instrument_s, values)(np.clip(time_s, instrument_s[0], instrument_s[-1]))
+
+
+def _gaps(sync_s: np.ndarray) -> np.ndarray:
+    """Times between edges in periods of the strobe, shape (m - 1,)."""
+    if len(sync_s) < MIN_EDGES:
+        raise AlignmentError(
+            f"only {len(sync_s)} sync edges: at least {MIN_EDGES} are needed; is D10 wired to the instrument's sync "
+            "input, and was it recording?"
+        )
+    return np.diff(sync_s) / np.median(np.diff(sync_s))
+
+
+def _no_pause(gaps: np.ndarray, pauses: int) -> str:
+    if pauses > 1:
+        return (
+            f"the sync edges show {pauses} pauses of {MARK_PAUSE} strobes, so that it is not clear which one is this "
+            "recording's: start the instrument anew for every recording, and repeat"
+        )
+    return (
+        f"the sync edges do not show the pause of {MARK_PAUSE} strobes that tells which edge is which sample (the "
+        f"longest gap is {gaps.max():.1f} periods): the instrument has to record from before the Uno's mark, and must "
+        "not lose an edge beside it; repeat"
+    )
+
+
+def _numbers(sync_s: np.ndarray) -> np.ndarray:
+    """The edges' places on the strobe's grid, shape (m,), the first at 0.
+
+    Followed from edge to edge, as a phase-locked loop does: counted from the first one, an error of the period of one
+    part in 10,000 would be half a sample after a minute.
+    """
+    period_s = np.median(np.diff(sync_s))
+    places, due_s = np.zeros(len(sync_s), int), sync_s[0]
+    for i in range(1, len(sync_s)):
+        periods = (sync_s[i] - due_s) / period_s
+        step = round(periods)
+        if step < 1 or abs(periods - step) > _OFF_GRID:
+            raise AlignmentError(
+                f"sync edge {i} is {periods:.2f} periods of the strobe after the one before: check the sync wiring "
+                "(D10, ground, a threshold of about 2.5 V), then repeat"
+            )
+        places[i] = places[i - 1] + step
+        due_s += period_s * (step + _FOLLOW * (periods - step))
+    return places
+
+
+def _line_up(sync_s: np.ndarray, first: int, uno_s: np.ndarray, sequence: np.ndarray) -> ClockLine:
+    """Edges of which the first belongs to the sample of number `first`."""
+    if len(sync_s) < MIN_EDGES:
+        raise AlignmentError(f"only {len(sync_s)} sync edges after the pause of the strobe: at least {MIN_EDGES}")
+    _, edge_at, sample_at = np.intersect1d(first + _numbers(sync_s), sequence, return_indices=True)
+    if len(edge_at) < MIN_EDGES:
+        raise AlignmentError(
+            f"only {len(edge_at)} sync edges fall on samples of the Uno: the instrument and the Uno did not record "
+            "at the same time"
+        )
+    x, y = np.asarray(sync_s)[edge_at], np.asarray(uno_s)[sample_at]
+    rate, offset_s = _line(x, y)
+    rms_s = float(np.sqrt(np.mean((y - offset_s - rate * x) ** 2)))
+    if rms_s > MAX_RMS_S:
+        raise AlignmentError(
+            f"the sync edges scatter by {rms_s * 1e3:.1f} ms about the Uno's samples (at most {MAX_RMS_S * 1e3:g} ms): "
+            "check the sync wiring"
+        )
+    if abs(rate - 1.0) > MAX_DRIFT:
+        raise AlignmentError(
+            f"the instrument's clock and the Uno's differ by {1e2 * (rate - 1.0):+.1f} % (at most "
+            f"{1e2 * MAX_DRIFT:g} %): are the instrument's times in seconds?"
+        )
+    return ClockLine(offset_s, rate, rms_s, len(edge_at))
+
+
+def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope and intercept of least squares. By exact sums: what a linear algebra library says may differ in the last
+    digit from run to run, and the same seed is to give the same bytes."""
+    x_mean, y_mean = fsum(x) / len(x), fsum(y) / len(y)
+    away = x - x_mean
+    slope = fsum(away * (y - y_mean)) / fsum(away * away)
+    return slope, y_mean - slope * x_mean

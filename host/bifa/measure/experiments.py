@@ -1,0 +1,187 @@
+"""The paper's characterisation experiments (section IV), run on a rig through the real firmware and link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from bifa.data import Trial
+from bifa.errors import BifaError
+from bifa.link import Uno
+from bifa.link.units import set_point_psi
+from bifa.measure.alignment import AlignmentError, resampled
+from bifa.measure.locomotion import noted, record_walk
+from bifa.measure.plan import PULL_MM, PlannedTrial
+from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, instruments_of
+
+CHAMBERS = ("body", "head", "tail")
+CHAMBER_OF = {"large": "body", "small": "head"}
+SNAP_PSI = 8.5  # extends every actuator
+SETTLE_S = 6.0  # of a pressure: five of the slowest time constants of about 1 s
+RELIEF_S = 12.0  # the regulator lets air out more slowly
+
+# The second switch is 5 ms off the sampling grid of the first: together they are known to 5 ms instead of 10.
+STEP_UP_S, STEP_DOWN_S, STEP_END_S = 0.5, 5.005, 14.0
+_ATTEMPTS = 3  # at a trial in which no telemetry is lost and the clocks line up
+
+Progress = Callable[[float], None]
+
+
+def record_trial(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None) -> Trial:
+    """Run one planned trial and return it as a data set holds it; the valves are off afterwards.
+
+    `extra` notes how well the clocks were lined up (`clock_error_s`), what the regulator was really asked for
+    (`set_point_psi`) and, of a step, when the valves switched.
+    Raises BifaError where telemetry keeps getting lost or the clocks do not line up.
+    """
+    instruments_of(rig)
+    why = ""
+    for _ in range(_ATTEMPTS):
+        try:
+            columns, extra, lost = _RUNS[planned.experiment](rig, uno, planned, on_progress)
+        except AlignmentError as error:
+            why = str(error)
+            continue
+        if (commanded_psi := _commanded_psi(uno, planned)) >= 0.0:  # below: the vacuum, which nothing regulates
+            extra["set_point_psi"] = round(set_point_psi(commanded_psi), 4)
+        if not lost:
+            return planned.as_trial(columns, extra=extra)
+        why = f"{lost} samples were lost on the link; check the cable, then resume the session"
+    raise BifaError(f"{planned.file}, {_ATTEMPTS} times over: {why}")
+
+
+def _static(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+    rig.instruments.mount("static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
+    chamber = CHAMBER_OF[planned.actuator]
+    _pressurise(rig, uno, chamber, planned.pressure_psi)
+    with Recording(rig, uno, on_progress) as tape:
+        tape.wait(LEAD_S)
+        rig.instruments.move()
+        tape.wait_while(lambda: rig.instruments.moving, 2 * 54.0 / planned.rate_mm_s)
+        tape.wait(LEAD_S)
+    moved = _moving_span(tape.instrument_s)
+    return _machine_columns(tape, chamber, moved), noted(tape.clock), tape.lost_samples
+
+
+def _pull(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+    rig.instruments.mount("anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
+    # Extended first: a head holds with no pressure at all, but it has to snap out for that.
+    _pressurise(rig, uno, "head", SNAP_PSI)
+    if planned.pressure_psi < SNAP_PSI:
+        _pressurise(rig, uno, "head", planned.pressure_psi, RELIEF_S)
+    elif planned.pressure_psi > SNAP_PSI:
+        _pressurise(rig, uno, "head", planned.pressure_psi)
+    with Recording(rig, uno, on_progress) as tape:
+        tape.wait(LEAD_S)
+        rig.instruments.move()
+        tape.wait_while(lambda: rig.instruments.moving, PULL_MM / planned.rate_mm_s)
+        tape.wait(LEAD_S)
+    moved = _moving_span(tape.instrument_s)
+    return _machine_columns(tape, "head", moved), noted(tape.clock), tape.lost_samples
+
+
+def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+    rig.instruments.mount("step_response", actuator=planned.actuator)
+    chamber = CHAMBER_OF[planned.actuator]
+    _off(uno)
+    uno.set("pressure_psi", planned.pressure_psi)
+    uno.hold(chamber, "vacuum")
+    _pass(rig, uno, SETTLE_S)
+    with Recording(rig, uno, on_progress) as tape:
+        tape.wait(LEAD_S)
+        uno.schedule([(STEP_UP_S, chamber, "positive"), (STEP_DOWN_S, chamber, "vacuum")])
+        tape.wait(STEP_END_S + LEAD_S)
+    i = CHAMBERS.index(chamber)
+    command = tape.commands[:, i]
+    up_s, error_s = _scheduled_start(tape.uno_s, command)
+    begin_s = up_s - STEP_UP_S
+    keep = (tape.uno_s >= begin_s) & (tape.uno_s <= begin_s + STEP_END_S) & np.isfinite(command)
+    time_s = tape.pressures_s[keep]
+    columns = {
+        "time_s": time_s - time_s[0],
+        "command": command[keep],
+        "displacement_mm": resampled(time_s, tape.instrument_s, tape.record["displacement_mm"]),
+        "pressure_psi": tape.pressures_psi[keep, i],
+    }
+    switches = [up_s - time_s[0], up_s - time_s[0] + STEP_DOWN_S - STEP_UP_S]
+    known = {"switch_time_s": [float(t) for t in switches], "switch_error_s": error_s}
+    return columns, noted(tape.clock) | known, tape.lost_samples
+
+
+def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+    walk = record_walk(rig, uno, planned.gait, planned.cycles, on_progress, **planned.settings)
+    return walk.columns, walk.extra, walk.lost_samples
+
+
+_RUNS: dict[str, Callable[..., tuple[dict[str, np.ndarray], dict[str, Any], int]]] = {
+    "static_loading": _static,
+    "step_response": _step,
+    "anchor_pull": _pull,
+    "locomotion": _walk,
+}
+
+
+def _commanded_psi(uno: Uno, planned: PlannedTrial) -> float:
+    return uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
+
+
+def _off(uno: Uno) -> None:
+    for chamber in CHAMBERS:
+        uno.hold(chamber, "off")
+
+
+def _pressurise(rig, uno: Uno, chamber: str, pressure_psi: float, settle_s: float = SETTLE_S) -> None:
+    """Bring a chamber to a positive pressure, 0 (vented) or, for any negative one, full vacuum, and let it settle."""
+    _off(uno)
+    if pressure_psi > 0.0:
+        uno.set("pressure_psi", pressure_psi)
+        uno.hold(chamber, "positive")
+    elif pressure_psi < 0.0:
+        uno.hold(chamber, "vacuum")
+    _pass(rig, uno, settle_s)
+
+
+def _pass(rig, uno: Uno, duration_s: float) -> None:
+    """Let time pass without letting the Uno think that the host has gone."""
+    until_s = rig.clock.now() + duration_s
+    while (left_s := until_s - rig.clock.now()) > 0:
+        rig.clock.sleep(min(left_s, 0.25))
+        uno.keep_alive()
+
+
+def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, float]:
+    """When the positive pressure was switched on, on the Uno's clock, and by how much that may be off: each switch of
+    the schedule happened between two samples, and the two are known to be STEP_DOWN_S - STEP_UP_S apart."""
+    changes = np.flatnonzero(np.diff(np.nan_to_num(command, nan=0.0)) != 0.0) + 1
+    if len(changes) != 2:
+        raise BifaError(
+            f"the Uno's commands changed {len(changes)} times instead of twice during the step: was it stopped?"
+        )
+    apart_s = STEP_DOWN_S - STEP_UP_S
+    low = max(uno_s[changes[0] - 1], uno_s[changes[1] - 1] - apart_s)
+    high = min(uno_s[changes[0]], uno_s[changes[1]] - apart_s)
+    return float(0.5 * (low + high)), float(0.5 * (high - low))
+
+
+def _moving_span(time_s: np.ndarray) -> slice:
+    """The record about the motion, without most of the lead on both sides."""
+    begin_s, end_s = time_s[0] + BEFORE_MARK_S + 0.8 * LEAD_S, time_s[-1] - 0.5 * LEAD_S
+    inside = np.flatnonzero((time_s >= begin_s) & (time_s <= end_s))
+    return slice(inside[0], inside[-1] + 1)
+
+
+def _machine_columns(tape: Recording, chamber: str, span: slice) -> dict[str, np.ndarray]:
+    """What a testing machine recorded, with the pressure at its own times."""
+    time_s = tape.instrument_s[span]
+    pressure = tape.pressures_psi[:, CHAMBERS.index(chamber)]
+    sampled_s = tape.pressures_s
+    nearest = np.clip(np.searchsorted(sampled_s, time_s), 1, len(sampled_s) - 1)
+    nearest -= time_s - sampled_s[nearest - 1] < sampled_s[nearest] - time_s
+    return {
+        "time_s": time_s - time_s[0],
+        "displacement_mm": tape.record["displacement_mm"][span],
+        "force_N": tape.record["force_N"][span],
+        "pressure_psi": pressure[nearest],
+    }

@@ -1,0 +1,167 @@
+"""Bring in the record of a lab's own instrument: a CSV of what it measured, lined up with the Uno's telemetry.
+
+The instrument's file has `time_s` by its own clock and its channels under the data set's names (`displacement_mm`,
+`force_N`, `displacement_head_mm` ...). Beside it lies `<name>.sync.csv` with one column `sync_time_s`: when its sync
+input saw the strobe of D10 rise, by the same clock. The instrument is started before `bifa record`: that has the Uno
+leave out ten strobes and notes which samples these were (`strobe` = 0), so that both records show the same pause.
+Telemetry without that column is lined up by the Uno's restart when `bifa record` opened the port: the first edge after
+that pause is sample 1.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from bifa.data import Dataset, DatasetWriter
+from bifa.errors import BifaError
+from bifa.link.uno import PRESSURES_AFTER_S
+from bifa.measure.alignment import AlignmentError, ClockLine, align, align_after_restart, resampled
+from bifa.measure.locomotion import noted
+from bifa.measure.plan import PlannedTrial
+
+_MARGIN_S = 0.25
+_MOVED_MM = 0.05
+_CHAMBERS = ("body", "head", "tail")
+_MEASURES = {
+    "static_loading": ("displacement_mm", "force_N"),
+    "anchor_pull": ("displacement_mm", "force_N"),
+    "step_response": ("displacement_mm",),
+    "locomotion": ("displacement_head_mm",),
+}
+
+
+class InstrumentFileError(BifaError):
+    """An instrument's file or the telemetry cannot be used; the text says which and why."""
+
+
+def import_trial(
+    instrument: Path, telemetry: Path, planned: PlannedTrial, folder: Path, known: Mapping[str, float] | None = None
+) -> tuple[Dataset, ClockLine]:
+    """Write a data set of one trial, `planned`, from an instrument's CSV and the folder or file of telemetry.
+
+    known: what was measured directly (`bifa.measure.known`).
+
+    Raises InstrumentFileError where a column is missing, the two do not overlap or their clocks do not line up,
+    DatasetError where `folder` exists.
+    """
+    measured = _columns(instrument, ("time_s", *_MEASURES[planned.experiment]))
+    edges = _columns(instrument.with_suffix(".sync.csv"), ("sync_time_s",))["sync_time_s"]
+    uno = _columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
+    clock = _line_up(edges, uno, instrument, telemetry)
+    uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
+    columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
+    writer = DatasetWriter(folder, f"{planned.experiment} from {instrument.name}", known or {})
+    writer.add(planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S}))
+    return writer.finish(), clock
+
+
+def _telemetry_file(path: Path) -> Path:
+    if path.is_file():
+        return path
+    files = sorted(path.glob("telemetry_*.csv"))
+    if len(files) != 1:
+        raise InstrumentFileError(f"{path} holds {len(files)} telemetry files: name the one of this trial")
+    return files[0]
+
+
+def _columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Columns of numbers; an empty field is NaN (a chamber that is off), text columns are left out."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InstrumentFileError(f"{path} cannot be read: {error}") from None
+    header = rows[0] if rows else []
+    missing = [name for name in required if name not in header]
+    if missing:
+        raise InstrumentFileError(f"{path} lacks the column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
+    columns = {}
+    for place, name in enumerate(header):
+        if name == "state":
+            continue
+        try:
+            columns[name] = np.array([float(row[place]) if row[place] else np.nan for row in rows[1:]])
+        except (ValueError, IndexError):
+            line = next(i for i, row in enumerate(rows[1:], 2) if len(row) <= place or not _is_number(row[place]))
+            raise InstrumentFileError(f"{path}, line {line}, column {name}: not a number") from None
+    if len(rows) < 3:
+        raise InstrumentFileError(f"{path} holds {max(len(rows) - 1, 0)} samples: nothing to synchronise")
+    return columns
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _line_up(edges_s: np.ndarray, uno: dict[str, np.ndarray], instrument: Path, telemetry: Path) -> ClockLine:
+    sequence = uno["sequence"].astype(int)
+    try:
+        if "strobe" not in uno:
+            return align_after_restart(edges_s, uno["time_s"], sequence)
+        return align(edges_s, uno["time_s"], sequence, _marked(uno["strobe"], sequence, telemetry))
+    except AlignmentError as error:
+        raise InstrumentFileError(f"{instrument.with_suffix('.sync.csv')}: {error}") from None
+
+
+def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
+    """The sample whose strobe is the first after those that were left out."""
+    ends = np.flatnonzero(np.diff(strobe) > 0)
+    if len(ends) != 1 or sequence[ends[0] + 1] != sequence[ends[0]] + 1:
+        raise InstrumentFileError(
+            f"{telemetry}: samples about the pause of the strobe (column strobe) were lost on the link, or there are "
+            "several pauses: nothing tells which edge is which sample; record again"
+        )
+    return int(sequence[ends[0] + 1])
+
+
+def _assemble(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+    overlap = (instrument_s >= uno["time_s"][0]) & (instrument_s <= uno["time_s"][-1])
+    if overlap.sum() < 3:
+        raise InstrumentFileError(f"{instrument} and the telemetry do not overlap in time")
+    if planned.experiment in ("static_loading", "anchor_pull"):
+        return _machine(measured, instrument_s, overlap, uno, planned, instrument)
+    return _camera(measured, instrument_s, uno, planned, instrument)
+
+
+def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+    moved = overlap & (np.abs(measured["displacement_mm"] - measured["displacement_mm"][overlap][0]) > _MOVED_MM)
+    if not moved.any():
+        raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
+    first, last = instrument_s[moved][0] - _MARGIN_S, instrument_s[moved][-1] + _MARGIN_S
+    keep = overlap & (instrument_s >= first) & (instrument_s <= last)
+    chamber = "body" if planned.actuator == "large" else "head"
+    time_s = instrument_s[keep]
+    return {
+        "time_s": time_s - time_s[0],
+        "displacement_mm": measured["displacement_mm"][keep],
+        "force_N": measured["force_N"][keep],
+        "pressure_psi": np.interp(time_s, uno["time_s"], uno[f"pressure_{chamber}_psi"]),
+    }
+
+
+def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+    step = planned.experiment == "step_response"
+    chambers = (("body" if planned.actuator == "large" else "head"),) if step else _CHAMBERS
+    commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])
+    keep = np.isfinite(commands).all(axis=0)
+    keep &= (uno["time_s"] >= instrument_s[0]) & (uno["time_s"] <= instrument_s[-1])
+    if not keep.any():
+        raise InstrumentFileError(f"{instrument} does not cover the time in which the valves were commanded")
+    time_s = uno["time_s"][keep]
+    columns = {"time_s": time_s - time_s[0]}
+    for chamber, command in zip(chambers, commands, strict=True):
+        suffix = "" if step else f"_{chamber}"
+        columns[f"command{suffix}"] = command[keep]
+        columns[f"pressure{suffix}_psi"] = uno[f"pressure_{chamber}_psi"][keep]
+    for name in ("displacement_mm",) if step else ("displacement_head_mm", "displacement_tail_mm"):
+        if name in measured:
+            columns[name] = resampled(time_s, instrument_s, measured[name])
+    return columns

@@ -1,0 +1,88 @@
+"""The Uno's telemetry and an instrument's record of the same minutes, on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bifa.errors import BifaError
+from bifa.link import Uno
+from bifa.link.uno import PRESSURES_AFTER_S
+from bifa.measure.alignment import ClockLine, align
+
+LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
+_PIECE_S = 0.25
+BEFORE_MARK_S = 0.1  # that the instrument surely sees strobes before the pause
+
+
+def instruments_of(rig):
+    """The rig's instruments; BifaError where it has none."""
+    if rig.instruments is None:
+        raise BifaError(
+            "this port has no instruments: use `--port virtual`, or record with your own and give their file "
+            "with --instrument"
+        )
+    return rig.instruments
+
+
+class Recording:
+    """A context manager: the instrument and the Uno's stream run inside it; afterwards the valves are off. The Uno
+    marks its strobe at the beginning, so that both sides number the samples alike.
+
+    `samples`: the Uno's own. When it has ended well: `commands` and `pressures_psi` (n, 3) of body, head and tail;
+    `uno_s` (n,) the Uno's times of the commands, `pressures_s` (n,) of the pressures; `record` what the instrument
+    measured; `instrument_s` its times on the Uno's clock; `clock` how the two were lined up; `lost_samples`.
+    AlignmentError where they cannot be.
+    """
+
+    def __init__(self, rig, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
+        self._instruments = instruments_of(rig)
+        self._rig, self._uno, self._on_progress = rig, uno, on_progress
+        self.samples: list = []
+
+    def __enter__(self) -> Recording:
+        self._uno.samples(0.0)  # what is left of an earlier recording
+        self._uno.stream(True)
+        self._instruments.start()
+        self.wait(BEFORE_MARK_S, report=False)
+        self._marked = self._uno.mark_strobe()
+        return self
+
+    def __exit__(self, kind, *_) -> None:
+        self._uno.halt()
+        self.record = self._instruments.stop()
+        self._uno.stream(False)
+        if kind is None:
+            self._line_up()
+
+    def wait(self, duration_s: float, report: bool = True) -> None:
+        """Let `duration_s` pass, and keep what the Uno says meanwhile; report: how far that is, as progress."""
+        begun_s = self._rig.clock.now()
+        while (left_s := begun_s + duration_s - self._rig.clock.now()) > 0:
+            self.samples += self._uno.samples(min(left_s, _PIECE_S))
+            if report:
+                self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
+
+    def wait_while(self, condition: Callable[[], bool], expected_s: float) -> None:
+        """Wait for as long as `condition()` holds, about `expected_s`; BifaError after three times as long."""
+        begun_s = self._rig.clock.now()
+        while condition():
+            self.samples += self._uno.samples(_PIECE_S)
+            elapsed_s = self._rig.clock.now() - begun_s
+            self._on_progress(min(elapsed_s / expected_s, 1.0))
+            if elapsed_s > 3.0 * expected_s + 5.0:
+                raise BifaError(f"the cross-head is still moving after {elapsed_s:.0f} s: look at the stand")
+
+    def _line_up(self) -> None:
+        samples = self.samples
+        if not samples:
+            raise BifaError("the Uno sent no samples: check the link's counters with `bifa monitor`")
+        self.uno_s = np.array([sample.time_us for sample in samples]) * 1e-6
+        self.pressures_s = self.uno_s + PRESSURES_AFTER_S
+        self.pressures_psi = np.array([sample.pressure_psi for sample in samples])
+        self.commands = np.array([sample.command for sample in samples])
+        self.lost_samples = samples[-1].sequence - samples[0].sequence + 1 - len(samples)
+        sequence = np.array([sample.sequence for sample in samples])
+        self.clock: ClockLine = align(self.record["sync_time_s"], self.uno_s, sequence, self._marked)
+        self.instrument_s = self.clock.to_uno(self.record["time_s"])

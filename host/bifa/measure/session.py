@@ -1,0 +1,80 @@
+"""A session at the bench: the planned trials one after the other into a data set that grows on disk.
+
+An interrupted session goes on where it was; a finished data set is never written over; whatever happens, the valves
+are off when it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import bifa
+from bifa.data import Dataset, DatasetWriter
+from bifa.data.lag import misfit_of_last
+from bifa.link import Uno
+from bifa.measure.experiments import record_trial
+from bifa.measure.plan import PlannedTrial
+
+
+@dataclass(frozen=True)
+class Event:
+    """How a session is getting on: trial `number` of `total`, `share` of it done; once it is, `clock_error_s`, and what
+    is wrong with its displacement's lag beside the earlier trials' (`misfit`)."""
+
+    planned: PlannedTrial
+    number: int
+    total: int
+    share: float
+    clock_error_s: float | None = None
+    skipped: bool = False
+    misfit: str | None = None
+
+
+def run_session(
+    rig,
+    folder: Path,
+    trials: Sequence[PlannedTrial],
+    *,
+    name: str,
+    known: Mapping[str, float],
+    provenance: Mapping[str, Any],
+    on_event: Callable[[Event], None] = lambda event: None,
+) -> Dataset:
+    """Record `trials` on `rig` into `folder`; those that an interrupted session already has are skipped.
+
+    Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session.
+    """
+    writer = DatasetWriter(folder, name, known, provenance, resume=True)
+    with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
+        uno.connect()
+        uno.clear()
+        for number, planned in enumerate(trials, start=1):
+            if writer.has(planned.as_trial()):
+                on_event(Event(planned, number, len(trials), 1.0, skipped=True))
+                continue
+            on_event(Event(planned, number, len(trials), 0.0))
+            trial = record_trial(
+                rig, uno, planned, lambda share, p=planned, n=number: on_event(Event(p, n, len(trials), share))
+            )
+            writer.add(planned.as_trial(trial.columns, session_order=number, extra=_measured(trial.extra, planned)))
+            wrong = misfit_of_last(writer.trials)
+            on_event(Event(planned, number, len(trials), 1.0, trial.extra["clock_error_s"], misfit=wrong))
+    return writer.finish()
+
+
+def provenance(port: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Who made a data set, with what: for the reader of the file."""
+    return {
+        "recorded_by": f"bifa experiment {bifa.__version__}",
+        "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "port": port or "found by USB identity",
+        "options": {key: value for key, value in options.items() if value is not None},
+    }
+
+
+def _measured(extra: Mapping[str, Any], planned: PlannedTrial) -> dict[str, Any]:
+    return {key: value for key, value in extra.items() if key not in planned.settings}

@@ -1,0 +1,42 @@
+"""What accuracy matters to the person, for each quantity that is measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from bifa.errors import BifaError
+
+QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
+
+
+class AccuracyError(BifaError):
+    """An accuracy that was asked for is no CHANNEL=VALUE; the text says what there is."""
+
+
+def accuracies(texts: Iterable[str]) -> dict[str, float]:
+    """RMS errors by quantity from texts like "displacement_mm=0.5". Raises AccuracyError."""
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if name not in QUANTITIES or not (math.isfinite(number) and number > 0.0):
+            raise AccuracyError(
+                f"--matters {text!r}: give a quantity ({', '.join(QUANTITIES)}) and the RMS error that is good enough,"
+                " as in --matters displacement_mm=0.5"
+            )
+        found[name] = number
+    return found
+
+
+def accuracy_of(channel: str, accuracies: Mapping[str, float]) -> float:
+    """The accuracy of a channel: displacement_head_mm is a displacement_mm. 0: only the noise counts."""
+    return next((v for q, v in accuracies.items() if _is_of(channel, q)), 0.0)
+
+
+def _is_of(channel: str, quantity: str) -> bool:
+    first, unit = quantity.rsplit("_", 1)
+    return channel.startswith(first) and channel.endswith(unit)

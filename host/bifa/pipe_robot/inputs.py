@@ -1,0 +1,233 @@
+"""What was done to the robot in a trial, without what came of it: all that a free-running prediction may use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bifa import simulate
+from bifa.data import Trial
+from bifa.pipe_robot.motion import imposed_motion
+from bifa.pipe_robot.switches import elapsed_s, shifted, step_timeline, switch_sd_s, walk_timeline
+from bifa.pipe_robot.unmeasured import LOAD_CELL
+from bifa.simulate import Plant, Timeline
+from lacuna.system import Theta
+
+STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
+_MM = 1e3
+_STEADY_MM = 0.05  # a pull that departs from its straight line by less was driven at its rate
+
+
+@dataclass(frozen=True)
+class Case:
+    """One robot in a trial. `inputs`: what reached it (learnt curves may change the trial's own); `zeros_m`: K's
+    contracted zero of body and small actuator; `nuisances` may hold what varies from run to run."""
+
+    inputs: Inputs
+    plant: Plant
+    zeros_m: tuple[float, float]
+    nuisances: Theta
+
+    @property
+    def commands(self) -> Timeline:
+        """When the valves switched."""
+        return shifted(self.inputs.commands, self.nuisances.get("switch_late_s", 0.0))
+
+    @property
+    def zero_m(self) -> float:
+        """Of the actuator on its stand."""
+        return self.zeros_m[self.inputs.actuator == "small"]
+
+
+class Inputs(Protocol):
+    """`channels`: what is predicted. `actuator`: "large", "small", or None where it is not a single one's test.
+    `positive_psi`: the supply, where the trial sets one of its own for the walk."""
+
+    channels: tuple[str, ...]
+    actuator: str | None
+    positive_psi: float | None
+
+    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        """The channels of each case, each of shape (n,). `together`: see `bifa.simulate.walks`."""
+        ...
+
+
+@dataclass(frozen=True)
+class StaticInputs:
+    actuator: str
+    time_s: np.ndarray
+    displacement_m: np.ndarray
+    direction: np.ndarray
+    pressure_psi: float
+    channels: tuple[str, ...] = ("force_N", "pressure_psi")
+    positive_psi: None = None
+
+    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        paths_mm = [(self.displacement_m - case.zero_m) * _MM for case in cases]
+        records = simulate.static_loadings(
+            [case.plant for case in cases], self.actuator, self.time_s, paths_mm, self.pressure_psi
+        )
+        return [record.columns for record in records]
+
+
+@dataclass(frozen=True)
+class StepInputs:
+    actuator: str
+    time_s: np.ndarray
+    commands: Timeline
+    pressure_psi: float
+    switch_sd_s: float = 0.0
+    channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
+    positive_psi: None = None
+
+    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        records = simulate.step_responses(
+            [case.plant for case in cases],
+            self.actuator,
+            self.time_s,
+            [case.commands for case in cases],
+            self.pressure_psi,
+            tolerance_m,
+            together,
+        )
+        return [
+            {**record.columns, "displacement_mm": record["displacement_mm"] + case.zero_m * _MM}
+            for record, case in zip(records, cases, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class PullInputs:
+    """`grip`: factor of the friction's coefficients, (n,) or one for all samples."""
+
+    pulled_s: np.ndarray
+    rate_mm_s: float
+    pressure_psi: float
+    load_cell_N_m: float
+    channels: tuple[str, ...] = ("force_N", "pressure_psi")
+    actuator: None = None
+    positive_psi: None = None
+    grip: np.ndarray | float = 1.0
+
+    @property
+    def sample_s(self) -> float:
+        return float(np.median(np.diff(self.pulled_s)))
+
+    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        records = simulate.anchor_pulls(
+            [case.plant for case in cases],
+            self.pulled_s,
+            self.rate_mm_s,
+            self.pressure_psi,
+            self.load_cell_N_m,
+            tolerance_m,
+            together,
+        )
+        return [
+            {**record.columns, "force_N": case.inputs._force(record, case.nuisances)}
+            for record, case in zip(records, cases, strict=True)
+        ]
+
+    def _force(self, record: simulate.Record, nuisances: Theta) -> np.ndarray:
+        """The resistance, passing from the wound-up load cell to sliding over one sample instead of at once.
+
+        A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change
+        of a parameter would move it, and no derivative could find mu_s.
+        """
+        late_s = nuisances.get("slip_late_s", 0.0)
+        # until the head slips the load cell winds up alone: what it pulls is in proportion to its stiffness
+        wound = record["wound_N"] * (nuisances.get(LOAD_CELL, self.load_cell_N_m) / self.load_cell_N_m)
+        holding, kinetic = self.grip * record["holding_N"], self.grip * record["kinetic_N"]
+        gives = np.flatnonzero(wound >= holding)
+        if not len(gives):
+            return wound
+        k, before = gives[0], max(gives[0] - 1, 0)
+        excess, rise = holding[before] - wound[before], (wound - holding)[k] - (wound - holding)[before]
+        share = excess / rise if rise > 0.0 else 0.0
+        slip_s = self.pulled_s[before] + share * (self.pulled_s[k] - self.pulled_s[before]) + late_s
+        slid = np.clip((self.pulled_s - slip_s) / self.sample_s + 0.5, 0.0, 1.0)
+        return (1.0 - slid) * wound + slid * kinetic
+
+
+@dataclass(frozen=True)
+class WalkInputs:
+    time_s: np.ndarray
+    commands: Timeline
+    inclination_deg: float
+    positive_psi: float | None
+    channels: tuple[str, ...]
+    switch_sd_s: float = 0.0
+    actuator: None = None
+
+    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        records = simulate.walks(
+            [case.plant for case in cases],
+            [case.commands for case in cases],
+            self.time_s,
+            inclination_deg=self.inclination_deg,
+            tolerance_m=tolerance_m,
+            together=together,
+            states=False,
+        )
+        return [record.columns for record in records]
+
+
+def inputs_of(trial: Trial) -> Inputs:
+    """The inputs of a recorded trial."""
+    return _MAKERS[trial.experiment](trial)
+
+
+def _pressure_psi(trial: Trial) -> float | None:
+    """What the regulator was asked for, where the recorder noted it: its converter has steps of 0.03 psi."""
+    return trial.extra.get("set_point_psi", trial.pressure_psi)
+
+
+def _static(trial: Trial) -> StaticInputs:
+    x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
+    return StaticInputs(trial.actuator, elapsed_s(trial), x, direction, _pressure_psi(trial))
+
+
+def _step(trial: Trial) -> StepInputs:
+    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), _pressure_psi(trial), switch_sd_s(trial))
+
+
+def _pull(trial: Trial) -> PullInputs:
+    rate = abs(trial.rate_mm_s)
+    backward = trial.extra.get("direction") == "backward"
+    pulled_mm = np.abs(trial.columns["displacement_mm"])
+    return PullInputs(
+        pulled_s=_pulled_time(elapsed_s(trial), pulled_mm, rate),
+        rate_mm_s=-rate if backward else rate,
+        pressure_psi=_pressure_psi(trial),
+        load_cell_N_m=float(trial.extra.get(LOAD_CELL, simulate.records.LOAD_CELL_N_M)),
+    )
+
+
+def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
+    """For how long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
+    moving = (pulled_mm > 0.1 * pulled_mm.max()) & (pulled_mm < 0.95 * pulled_mm.max())
+    begin_s = float(np.median(time_s[moving] - pulled_mm[moving] / rate_mm_s)) if moving.any() else 0.0
+    straight_s = np.clip(time_s - begin_s, 0.0, None)
+    if np.sqrt(np.mean((rate_mm_s * straight_s - pulled_mm) ** 2)) < _STEADY_MM:
+        return straight_s
+    smooth_m, _ = imposed_motion(time_s, pulled_mm / _MM)
+    return np.maximum.accumulate(np.clip(smooth_m * _MM / rate_mm_s, 0.0, None))
+
+
+def _walk(trial: Trial) -> WalkInputs:
+    pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
+    displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
+    return WalkInputs(
+        time_s=elapsed_s(trial),
+        commands=walk_timeline(trial),
+        inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
+        positive_psi=_pressure_psi(trial),
+        channels=(*displacements, *pressures),
+        switch_sd_s=switch_sd_s(trial),
+    )
+
+
+_MAKERS = {STATIC: _static, STEP: _step, ANCHOR: _pull, WALK: _walk}

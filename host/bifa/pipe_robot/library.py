@@ -1,0 +1,46 @@
+"""The robot's library of effects in the words of the engine."""
+
+from __future__ import annotations
+
+from bifa import effects
+from lacuna.system import Effect, Parameter
+
+
+def engine_effects() -> dict[str, Effect]:
+    """Every effect of `bifa.effects`, its size first among its parameters."""
+    return {name: _engine_effect(effect) for name, effect in effects.library().items()}
+
+
+def _engine_effect(effect: effects.Effect) -> Effect:
+    ordered = sorted((p for p in effect.parameters if not p.own), key=lambda p: not p.size)
+    return Effect(
+        name=effect.name,
+        parameters=tuple(_engine_parameter(p) for p in ordered),
+        enters=effect.enters,
+        experiments=effect.experiments,
+        confusable_with=effect.confusable_with,
+        equation=effect.equation,
+        source=effect.source,
+        sizes=len(effect.sizes),
+        own=tuple(_engine_parameter(p) for p in effect.parameters if p.own),
+        frequency=next((p.name for p in effect.parameters if p.frequency), None),
+    )
+
+
+def _engine_parameter(parameter: effects.EffectParameter) -> Parameter:
+    return Parameter(
+        name=parameter.name,
+        unit=parameter.unit,
+        value=parameter.typical,
+        lower=parameter.lower,
+        upper=parameter.upper,
+        scale=_scale(parameter),
+        source=parameter.meaning,
+    )
+
+
+def _scale(parameter: effects.EffectParameter) -> float:
+    width = parameter.upper - parameter.lower
+    if parameter.own:
+        return 0.25 * width  # a trial's own value may lie anywhere
+    return 0.3 * abs(parameter.typical) or 0.05 * width

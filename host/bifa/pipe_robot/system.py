@@ -1,0 +1,357 @@
+"""The robot and its bench as a `System`: what `bifa fit` and `bifa diagnose` run on.
+
+Displacements of single actuators are those of the data set (0 where the testing machine says 0); the simulator counts
+from K's own contracted zero, so the two differ by that zero, which is 0 where the lab set its instruments well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from bifa import robot
+from bifa.data import Dataset
+from bifa.data import Trial as Recorded
+from bifa.errors import BifaError
+from bifa.pipe_robot import candidates, learnt_terms, regressors, sites
+from bifa.pipe_robot.accuracy import accuracy_of
+from bifa.pipe_robot.curves import FittedCurve
+from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK, Case, Inputs, inputs_of
+from bifa.pipe_robot.library import engine_effects
+from bifa.pipe_robot.spare import spare
+from bifa.pipe_robot.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
+from bifa.robot import Model
+from bifa.robot.stiffness import StiffnessCurve
+from bifa.simulate import Plant, layout
+from bifa.simulate.plant import of_values
+from bifa.simulate.tables import tabulated
+from lacuna.system import (
+    CandidateExperiment,
+    Channels,
+    Correction,
+    CorrectionSite,
+    Effect,
+    Parameter,
+    System,
+    Theta,
+    Trial,
+)
+
+FRICTION_WOBBLE = 0.01  # from run to run, relative
+_ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
+_EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
+_COARSE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-6}
+
+_LARGE = ("body_damping_Ns_m", "body_area_N_psi", "body_alpha_n_per_s", "body_alpha_s_per_s")
+_SMALL = ("small_damping_Ns_m", "small_area_N_psi", "small_alpha_n_per_s", "small_alpha_s_per_s")
+_PIPE = ("wall_offset_m", "mu_s", "mu_k")
+# A pull fits about as well with a wall nearer by a centimetre and less friction; only walks tell.
+_PLACES = {"wall_offset_m": (0.017, 0.022, 0.026, 0.031)}
+_SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
+_WALL = ("wall_stiffness_N_m", "wall_damping_Ns_m")
+_MASSES = ("head_mass_kg", "tail_mass_kg", "small_mass_kg")
+_FELT = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
+# Which experiments see which parameters; the shapes of the curves are added in `matters`.
+_SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
+    (STATIC, "large"): frozenset({"body_area_N_psi"}),
+    (STATIC, "small"): frozenset({"small_area_N_psi"}),
+    (STEP, "large"): frozenset({*_LARGE, "supply_negative_psi"}),
+    (STEP, "small"): frozenset({*_SMALL, "small_mass_kg", "supply_negative_psi"}),
+    (ANCHOR, None): frozenset({"small_area_N_psi", "head_segment_mass_kg", "wall_stiffness_N_m", *_PIPE}),
+    (WALK, None): frozenset(
+        {*_LARGE, *_SMALL, *_PIPE, *_SUPPLIES, *_MASSES, "wall_stiffness_N_m", "wall_damping_Ns_m"}
+    ),
+}
+
+
+class RobotSystem(System):
+    """The robot's base model, its library of effects, and the trials of a data set.
+
+    model: values from which the search starts, and those that are not searched.
+    curves: the fitted stiffness curves, "body" and "small"; their shapes are parameters. An actuator without one keeps
+        the model's.
+    fitted: names of the model's parameters to be searched.
+    """
+
+    name = "pipe robot"
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        model: Model,
+        curves: Mapping[str, FittedCurve],
+        fitted: Sequence[str],
+    ):
+        self.dataset, self.model, self.curves = dataset, model, dict(curves)
+        self.fitted = tuple(fitted)
+        self.accuracies: Mapping[str, float] = {}  # RMS by quantity, up to which a prediction is good enough
+        self._inputs = {trial.file: inputs_of(trial) for trial in dataset.trials}
+        self.trials = tuple(_engine_trial(trial, self._inputs[trial.file]) for trial in dataset.trials)
+        self._last_in_session = max((t.session_order or 0 for t in self.trials), default=0)
+        self.effects: Mapping[str, Effect] = engine_effects()
+        shapes = [p for curve in self.curves.values() for p in curve.parameters]
+        self.bench = tuple(BENCH[name] for name in _bench_unknowns(dataset))
+        self.parameters = (*(self._named(name) for name in self.fitted), *self.bench, *shapes)
+        self._remember()
+
+    def _remember(self) -> None:
+        self._plant = lru_cache(maxsize=512)(self._plant_of)
+
+    def __getstate__(self) -> dict:
+        """What travels to another process: all but what is remembered."""
+        return {name: value for name, value in vars(self).items() if name != "_plant"}
+
+    def __setstate__(self, state: dict) -> None:
+        vars(self).update(state)
+        self._remember()
+
+    # -- the System protocol ----------------------------------------------------------------------------------
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        return self.predict_many([theta], effects, trial, coarse=coarse, corrections=[corrections])[0]
+
+    def predict_many(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Sequence[Correction]] = (),
+        alike: bool = False,
+    ) -> list[Channels]:
+        corrections = corrections or [()] * len(thetas)
+        tolerance_m = (_COARSE_M if coarse else _EXACT_M)[trial.experiment]
+        cases = [self._case(*one, effects, trial) for one in zip(thetas, corrections, strict=True)]
+        whole = [case for case in cases if case]
+        try:
+            found = iter(trial.payload.simulate(whole, tolerance_m, alike) if whole else ())
+        except BifaError:  # what is out of range in one of them
+            if len(thetas) == 1:
+                return [_nothing(trial)]
+            each = zip(thetas, corrections, strict=True)
+            return [self.predict(one, effects, trial, coarse=coarse, corrections=learnt) for one, learnt in each]
+        return [
+            _seen(next(found), learnt, case, trial) if case else _nothing(trial)
+            for case, learnt in zip(cases, corrections, strict=True)
+        ]
+
+    def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Trial) -> Case | None:
+        """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
+        place = self._place_in_session(trial)
+        inputs: Inputs = learnt_terms.corrected_inputs(trial.payload, learnt, place)
+        try:
+            plant, zeros = self._plant(self._key(theta, effects))
+            plant = learnt_terms.corrected(plant, learnt, place)
+        except BifaError:
+            return None
+        return Case(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
+
+    def _place_in_session(self, trial: Trial) -> float:
+        """0 for the day's first trial, 1 for its last; 0 where the order was not noted."""
+        return (trial.session_order or 0) / max(self._last_in_session, 1)
+
+    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+        return regressors.of(trial, prediction)
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        found = []
+        if trial.experiment in (ANCHOR, WALK):
+            source = "friction differs from run to run"
+            found.append(Parameter("friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source=source))
+        if trial.experiment in (STEP, WALK) and (sd := trial.payload.switch_sd_s) > 0.0:
+            source = "the valves switched between two samples"
+            found.append(Parameter("switch_late_s", "s", 0.0, -3.0 * sd, 3.0 * sd, scale=sd, source=source))
+        if trial.experiment == ANCHOR:
+            found.append(self._slip_late(trial))
+        return tuple(found)
+
+    def _slip_late(self, trial: Trial) -> Parameter:
+        # Repeats are sampled alike, so that the same half sample may be missed in all of them.
+        half_s = 0.5 * trial.payload.sample_s
+        alike = sum(other.condition == trial.condition for other in self.trials)
+        return Parameter(
+            "slip_late_s",
+            "s",
+            0.0,
+            -2.0 * half_s,
+            2.0 * half_s,
+            scale=half_s * np.sqrt(max(alike, 1) / 3.0),
+            source="the peak lies between two samples",
+        )
+
+    def spare(self) -> tuple[tuple[str, Hashable], ...]:
+        return spare(self.dataset)
+
+    def matters(self, parameter: str, trial: Trial) -> bool:
+        actuator = trial.payload.actuator
+        if parameter in BENCH:
+            return (trial.experiment, actuator) == _FELT[parameter]
+        if "_shape_" not in parameter:
+            return parameter in _SEEN_BY[trial.experiment, actuator]
+        prefix = parameter.split("_", 1)[0]
+        if actuator is not None and prefix != {"large": "body", "small": "small"}[actuator]:
+            return False
+        if trial.experiment == ANCHOR and prefix == "body":
+            return False
+        return trial.experiment in (STATIC, STEP) or parameter in self.curves[prefix].felt
+
+    def isolates(self, trial: Trial) -> bool:
+        return trial.experiment != WALK
+
+    def accuracy(self, experiment: str, channel: str) -> float:
+        return accuracy_of(channel, self.accuracies)
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        """A converter's count is the least that a pressure can be uncertain by."""
+        return _ADC_COUNT_PSI / np.sqrt(12.0) if channel.startswith("pressure") else 0.0
+
+    @property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        return sites.sites(self.model, self.curves)
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return tuple(
+            CandidateExperiment(
+                experiment=recorded.experiment,
+                settings=settings,
+                trial=_engine_trial(recorded, inputs_of(recorded), measured=False),
+            )
+            for settings, recorded in candidates.of(self.dataset)
+        )
+
+    # -- from a vector to a model -----------------------------------------------------------------------------
+
+    def model_at(self, theta: Theta, effects: Iterable[str] = ()) -> Model:
+        """The model with the values of `theta`, curves included, and these effects active."""
+        values = {name: theta[name] for name in self.fitted}
+        chosen = {
+            effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
+        }
+        model = self.model.with_values(values).with_effects(chosen)
+        return _with_curves(
+            model, {prefix: curve.curve(self._weights(prefix, theta)) for prefix, curve in self.curves.items()}
+        )
+
+    def _named(self, name: str) -> Parameter:
+        entry = self.model.parameters[name]
+        low, high = entry.plausible
+        prior_sd = PRIOR_SD.get(name)
+        # friction shows in fewer samples: wider steps for its derivatives
+        scale = prior_sd or (high - low) * (1.0 if name in _PIPE else 0.1)
+        # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
+        at_least = "mu_k" if name == "mu_s" else None
+        return Parameter(
+            name,
+            entry.unit,
+            entry.value,
+            entry.lower,
+            entry.upper,
+            (low, high),
+            scale,
+            entry.source,
+            prior_sd,
+            at_least,
+            _PLACES.get(name, ()),
+        )
+
+    def _weights(self, prefix: str, theta: Theta) -> tuple[float, ...]:
+        return tuple(theta[name] for name in self.curves[prefix].names)
+
+    def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple:
+        """All that a plant depends on, hashable."""
+        named = tuple(theta[name] for name in self.fitted)
+        weights = tuple((prefix, self._weights(prefix, theta)) for prefix in self.curves)
+        extra = tuple(
+            (effect, tuple((p.name, theta.get(f"{effect}.{p.name}", p.value)) for p in _all_of(self.effects[effect])))
+            for effect in effects
+        )
+        return named, weights, extra
+
+    def _plant_of(self, key: tuple) -> tuple[Plant, tuple[float, float]]:
+        """The compiled code's form of a model, and K's contracted zeros of body and small actuator."""
+        named, weights, extra = key
+        shapes = dict(weights)
+        body, small = (
+            self.curves[prefix].tables.at(shapes[prefix]) if prefix in shapes else tabulated(own)
+            for prefix, own in (("body", self.model.body_stiffness), ("small", self.model.small_stiffness))
+        )
+        effects = {effect: dict(values) for effect, values in extra}
+        values = {name: p.value for name, p in self.model.parameters.items()} | dict(
+            zip(self.fitted, named, strict=True)
+        )
+        values |= {f"{effect}.{name}": v for effect, own in effects.items() for name, v in own.items()}
+        return of_values(values, effects, body, small), (body.contracted_m, small.contracted_m)
+
+
+def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:
+    """Names of the model's parameters that these trials see and the lab does not know."""
+    seen: set[str] = set()
+    for trial in dataset.trials:
+        seen |= _SEEN_BY[trial.experiment, trial.actuator]
+    return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known)
+
+
+def _bench_unknowns(dataset: Dataset) -> list[str]:
+    """Constants of the bench that these trials feel and nobody declared."""
+    experiments = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
+    return [name for name, where in _FELT.items() if where in experiments]
+
+
+def _nothing(trial: Trial) -> Channels:
+    return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
+
+
+def _seen(channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case, trial: Trial) -> Channels:
+    """What the instruments show of a simulation."""
+    channels = learnt_terms.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
+    return {name: channels[name] for name in trial.channels}
+
+
+def _all_of(effect: Effect) -> tuple[Parameter, ...]:
+    return effect.parameters + effect.own
+
+
+def _engine_trial(recorded: Recorded, inputs: Inputs, measured: bool = True) -> Trial:
+    channels = {
+        name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
+        for name in inputs.channels
+    }
+    return Trial(
+        name=recorded.file,
+        experiment=recorded.experiment,
+        condition=recorded.condition,
+        time_s=recorded.time_s,
+        channels=channels,
+        session_order=recorded.session_order,
+        payload=inputs,
+    )
+
+
+def _altered(plant: Plant, trial: Trial, theta: Theta, positive_psi: float | None) -> Plant:
+    """`plant` as it is in one trial: its friction, its supply, and what moves on the stand."""
+    friction = theta.get("friction_scale", 1.0)
+    q = plant.q.copy()
+    q[layout.MU_S] *= friction
+    q[layout.MU_K] *= friction
+    if positive_psi is not None:
+        q[layout.SUPPLY_POSITIVE] = positive_psi
+    if trial.experiment == STEP:
+        q[layout.BODY + layout.MASS] = theta.get(STAND_MASS, q[layout.BODY + layout.MASS])
+    return plant._replace(q=q)
+
+
+def _with_curves(model: Model, curves: Mapping[str, StiffnessCurve]) -> Model:
+    from dataclasses import replace
+
+    return replace(model, **{f"{prefix}_stiffness": curve for prefix, curve in curves.items()})

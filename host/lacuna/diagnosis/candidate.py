@@ -1,0 +1,220 @@
+"""One explanation tried: the base model plus a set of effects, fitted with the same effort as every other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.spectrum import peaks
+from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit, best_of, evaluate_on, solve_from_afar, starting_point
+from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.problem import Point, Problem
+from lacuna.estimation.solve import Solution, solve
+from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import effective_samples
+from lacuna.system import Effect, Parameter
+
+_PROFILE_STEPS = 4
+_PEAKS = 3  # of the residual's spectrum that a frequency begins at
+_PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
+_SKETCH = {"max_iterations": 12, "relative": 3e-3}
+_REFIT = {"max_iterations": 40, "relative": 1e-4}
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """`fitted` on the trials to fit; `checked`: how it does on those that it is judged on besides (`Split.judging`)."""
+
+    fitted: Fit
+    checked: Fit
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        return self.fitted.structure.effects
+
+    @cached_property
+    def pieces(self) -> float:
+        """Independent pieces of information in the trials that it is judged on."""
+        return effective_samples(self.fitted) + effective_samples(self.checked)
+
+    @property
+    def rms(self) -> float:
+        """Weighted RMS residual of the known trials, in units of the noise; large ones compressed, as in the fit."""
+        return float(np.sqrt(2.0 * (self.fitted.cost + self.checked.cost) / self.pieces))
+
+    @cached_property
+    def cost(self) -> float:
+        """Minus log-likelihood of all known trials, plus what implausible parameters and extra ones cost."""
+        system = self.fitted.structure.system
+        extra = sum(len(system.effects[name].parameters) for name in self.effects)
+        trials = [*self.fitted.problem.trials, *self.checked.problem.trials]
+        own = sum(len(self.fitted.structure.own(trial)) for trial in trials)
+        return (
+            self.fitted.cost
+            + self.checked.cost
+            + implausibility(self.fitted)
+            + 0.5 * extra * np.log(max(self.pieces, 2.0))
+            + 0.5 * own * np.log(max(self.pieces / len(trials), 2.0))
+        )
+
+    @cached_property
+    def by_trial(self) -> dict[str, float]:
+        """Of each trial that it is judged on, by name, minus the log-likelihood of its residuals."""
+        return {
+            trial.name: 0.5 * float(r @ r)
+            for fit in (self.fitted, self.checked)
+            for trial, r in zip(fit.problem.trials, fit.problem.residuals(fit.solution.point), strict=True)
+        }
+
+    @property
+    def excess(self) -> float:
+        """Of the cost, what noise at the floor would not leave."""
+        return max(self.cost - 0.5 * self.pieces, 0.0)
+
+
+def implausibility(fitted: Fit) -> float:
+    """What it costs an explanation to need parameters that no sane system has."""
+    total = 0.0
+    for parameter in fitted.structure.parameters:
+        if parameter.plausible is not None:
+            total += POLICY.implausible * _outside(parameter, fitted.theta[parameter.name]) ** 2
+    return total
+
+
+def _outside(parameter: Parameter, value: float) -> float:
+    """How far beyond the plausible range, in half ranges."""
+    lower, upper = parameter.plausible
+    return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
+
+
+def judge(fitted: Fit, split: Split) -> Candidate:
+    return Candidate(fitted, evaluate_on(fitted, split.judging))
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How a parent explanation and one more effect do at fixed sizes of that effect, the rest refitted in a
+    few cheap steps. `points` are starts for the full refit, best first."""
+
+    effect: str
+    problem: Problem
+    cost: float
+    points: tuple[Point, ...]
+
+    def from_afar(self) -> np.ndarray:
+        """The base model's own start, with the effect as it is at the best point: what has been fitted without the
+        effect may have gone astray."""
+        structure = self.problem.structure
+        effect = structure.system.effects[self.effect]
+        own = {effect.full_name(p) for p in effect.parameters}
+        best = structure.theta(self.points[0].values)
+        return structure.values(structure.theta(structure.start()) | {k: v for k, v in best.items() if k in own})
+
+
+def profiles(parent: Fit, effects: Sequence[str], split: Split, floor: NoiseFloor, crew: Crew) -> list[Profile]:
+    """The amplitude profiles of `effects` on top of `parent`, the best first."""
+    problems = [Problem(_grown(parent, effect), split.fit, floor) for effect in effects]
+    jobs = [
+        (problem, _sizes(parent, problem.structure, effect), parent.solution)
+        for effect, problem in zip(effects, problems, strict=True)
+    ]
+    found = crew.map("trying", [p.structure.effects for p in problems], _profiled, jobs)
+    each = zip(effects, problems, found, strict=True)
+    return sorted((Profile(e, p, cost, points) for e, p, (cost, points) in each), key=lambda p: p.cost)
+
+
+def _grown(parent: Fit, effect: str) -> Structure:
+    return Structure(parent.structure.system, (*parent.structure.effects, effect))
+
+
+def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -> tuple[float, tuple[Point, ...]]:
+    rest = tuple(range(len(parent.free)))
+    # the parent's derivatives serve; what the effect has for each trial stays where the start found it
+    wider = (len(q) - s.nuisances for q, s in zip(problem.nuisances, parent.sensitivities, strict=True))
+    known = [s.widened(n) if n else s for n, s in zip(wider, parent.sensitivities, strict=True)]
+
+    def released(start: Point, steps: int) -> Solution:
+        return solve(problem, start, free=rest, max_iterations=steps, sensitivities=known)
+
+    starts = [problem.start(values, parent.point.nuisances) for values in sizes]
+    found = sorted((released(start, 1) for start in starts), key=lambda s: s.cost)
+    best = [released(s.point, _PROFILE_STEPS - 1) for s in found[:_PROFILED_FURTHER]]
+    found = sorted([*best, *found[_PROFILED_FURTHER:]], key=lambda s: s.cost)
+    return found[0].cost, tuple(s.point for s in found)
+
+
+def sketches(profiled: Sequence[Profile], twice: int, crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Release everything for as long as it pays quickly, from the best point of each profile; the best few, `twice`,
+    from afar as well. The best first."""
+    names = [p.problem.structure.effects for p in profiled]
+    near = crew.map("refitting", names, _sketched, [(p.problem, p.points[0]) for p in profiled])
+    pairs = sorted(zip(near, profiled, strict=True), key=lambda pair: pair[0].cost)
+    again = [p for _, p in pairs[:twice]]
+    names = [p.problem.structure.effects for p in again]
+    afar = crew.map("refitting from afar", names, _sketched_from_afar, [(p.problem, p.from_afar()) for p in again])
+    fits = [(best_of(p.problem, [solution, *afar[place : place + 1]]), p) for place, (solution, p) in enumerate(pairs)]
+    return sorted(fits, key=lambda pair: pair[0].cost)
+
+
+def _sketched(problem: Problem, start: Point) -> Solution:
+    return solve(problem, start, **_SKETCH)
+
+
+def _sketched_from_afar(problem: Problem, values: np.ndarray) -> Solution:
+    return solve_from_afar(problem, values, **_SKETCH)
+
+
+def finish(sketched: Fit) -> Fit:
+    """Refit to the end: from afar once more, since with the effect at its size the trials that isolate parameters lead
+    those back that went astray without it."""
+    again = solve_from_afar(sketched.problem, sketched.solution.point.values, **_REFIT)
+    return best_of(sketched.problem, [sketched.solution, again])
+
+
+def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:
+    """The better of a finished refit and one from the profile's second best point."""
+    others = [solve(profiled.problem, point, **_REFIT) for point in profiled.points[1:2]]
+    return best_of(profiled.problem, [finished.solution, *others])
+
+
+def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
+    """Starting vectors: the parent's values, the effect at a grid of sizes of either sign."""
+    described = structure.system.effects[effect]
+    base = starting_point(parent, structure)
+    at = [structure.names.index(name) for name in described.size_names]
+    vectors = []
+    for factor in described.start_factors:
+        for signs in _signs(described.parameters[: described.sizes]):
+            vector = base.copy()
+            for index, parameter, sign in zip(at, described.parameters, signs, strict=False):
+                size = described.absent + sign * factor * (parameter.value - described.absent)
+                vector[index] = np.clip(size, parameter.lower, parameter.upper)
+            vectors.append(vector)
+    if described.frequency is None:
+        return vectors
+    return [v for vector in vectors for v in _at_peaks(parent, structure, described, vector)]
+
+
+def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndarray) -> list[np.ndarray]:
+    """`vector` with the effect's frequency at each of the residual's most prominent ones."""
+    index = structure.names.index(f"{effect.name}.{effect.frequency}")
+    parameter = structure.parameters[index]
+    problem = parent.problem
+    found = []
+    for frequency in peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS):
+        moved = vector.copy()
+        moved[index] = frequency
+        found.append(moved)
+    return found
+
+
+def _signs(sizes: Sequence[Parameter]) -> list[tuple[float, ...]]:
+    both_ways = all(p.lower < 0 < p.upper for p in sizes)
+    positive = (1.0,) * len(sizes)
+    return [positive, tuple(-s for s in positive)] if both_ways else [positive]

@@ -1,0 +1,76 @@
+"""One data set under diagnosis: its split, its base fit, and every explanation refitted and tested at most once."""
+
+from __future__ import annotations
+
+from lacuna.diagnosis.candidate import Candidate, judge
+from lacuna.diagnosis.policy import Policy
+from lacuna.diagnosis.remainder import Remainder, find_remainder
+from lacuna.diagnosis.residual_error import repeat_differences, rms, share_of_gap
+from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit, evaluate_on, fit, refit_on, spread_starts
+from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.structure import Structure
+from lacuna.system import System
+
+_ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another follows, and one that is reported
+_HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away
+
+
+class Case:
+    """Answers what the search and the verdict ask about a candidate, each refit and each test made once."""
+
+    def __init__(self, system: System, split: Split, policy: Policy, seed: int):
+        self.system, self.split, self.policy, self.seed = system, split, policy, seed
+        self._refitted: dict[Candidate, Fit] = {}
+        self._sufficient: dict[Candidate, bool] = {}
+
+    def fit_base(self, starts: int) -> Fit:
+        """Base fitted to the trials to fit, with a floor from what repeats' residuals differ by among all but the
+        final trials."""
+        structure, split = Structure(self.system), self.split
+        floor = estimate_noise(self.system, split.fit + split.judging)
+        vectors = spread_starts(structure, structure.start(), starts, self.seed)
+        first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, from_afar=True)
+        residuals = first.residuals() | evaluate_on(first, split.judging).residuals()
+        sharper = floor.lowered_by(estimate_noise(self.system, split.fit + split.judging, residuals))
+        again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], relative=_FINE)
+        return Fit(again.problem, again.solution, first.starts, first.starts_agreeing)
+
+    def judge(self, fitted: Fit) -> Candidate:
+        return judge(fitted, self.split)
+
+    def on_known(self, candidate: Candidate) -> Fit:
+        """The explanation fitted to all known trials, every one with the same effort."""
+        if candidate not in self._refitted:
+            near = (candidate.fitted, candidate.checked)
+            self._refitted[candidate] = refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
+        return self._refitted[candidate]
+
+    def remainder(self, fitted: Fit) -> Remainder:
+        """What a fit leaves, on its own trials and on the others that may inform a choice."""
+        names = {t.name for t in fitted.problem.trials}
+        others = tuple(t for t in self.split.known + self.split.unseen if t.name not in names)
+        return self._tested(fitted, evaluate_on(fitted, others)) if others else self._tested(fitted)
+
+    def suffices(self, candidate: Candidate) -> bool:
+        """Whether an explanation leaves nothing that matters, if need be once it is fitted to all known trials."""
+        if candidate not in self._sufficient:
+            worst = self._tested(candidate.fitted, candidate.checked).worst
+            if 1.0 <= worst < _HOPELESS:
+                worst = self.remainder(self.on_known(candidate)).worst
+            self._sufficient[candidate] = worst < 1.0
+        return self._sufficient[candidate]
+
+    def closed(self, candidate: Candidate, base: Candidate) -> float:
+        """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may
+        inform a choice."""
+        before, after = (rms(c.checked.scaled_residuals()) for c in (base, candidate))
+        fits = (candidate.fitted, candidate.checked)
+        scaled = {t.name: z for f in fits for t, z in zip(f.problem.trials, f.scaled_residuals(), strict=True)}
+        pairs = repeat_differences(self.split.fit, self.split.judging, scaled)[1]
+        return share_of_gap(before, after, rms(pairs) if pairs else 1.0)
+
+    def _tested(self, *fits: Fit) -> Remainder:
+        trials = [trial for one in fits for trial in one.problem.trials]
+        scaled = [channels for one in fits for channels in one.scaled_residuals()]
+        return find_remainder(self.system, trials, scaled, fits[0].problem.floor, policy=self.policy, seed=self.seed)

@@ -1,0 +1,131 @@
+"""From fitted explanations to a choice: which effects, with what probability, and which the data cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.policy import Policy
+from lacuna.diagnosis.search import Search
+from lacuna.diagnosis.split import Split
+
+_DRAWS = 1000  # of the bootstrap over conditions
+_COMPARED = 16  # explanations, the best first
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The chosen explanation, the base if nothing is worth adding.
+
+    `probability` of each of its effects; `confusable_with`: by effect, those that it could be exchanged for;
+    `weights`: probability of every explanation compared, by its effects.
+    """
+
+    candidate: Candidate
+    probability: dict[str, float]
+    confusable_with: dict[str, tuple[str, ...]]
+    weights: dict[tuple[str, ...], float]
+
+
+def choose(search: Search, split: Split, policy: Policy, suffices: Callable[[Candidate], bool]) -> Choice:
+    """The set that explains best, no larger than the evidence carries; nothing is added to one that `suffices`."""
+    dispersion = dispersion_of(search.tried)
+    chosen = search.base
+    while not suffices(chosen):
+        larger = [
+            c
+            for c in search.tried
+            if len(c.effects) > len(chosen.effects)
+            and worth_adding(chosen, c, dispersion, policy)
+            and (_share(chosen, c, search.base) > policy.share_of_gap or suffices(c))
+        ]
+        if not larger:
+            break
+        size = min(len(c.effects) for c in larger)
+        chosen = min((c for c in larger if len(c.effects) == size), key=lambda c: c.cost)
+    return weigh(search, _supported(chosen, search, split, dispersion, policy), policy)
+
+
+def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
+    """`chosen` with the probability of each of its effects, against everything that was tried."""
+    weights = _weights(search, chosen, dispersion_of(search.tried))
+    probability = {e: sum(w for effects, w in weights.items() if e in effects) for e in chosen.effects}
+    confusable = {e: _exchanges(e, chosen.effects, weights, policy) for e in chosen.effects}
+    return Choice(chosen, probability, confusable, weights)
+
+
+def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:
+    """Whether the larger explanation is better beyond the doubt of noise and remaining misfit, also on trials that it
+    was not fitted to, and closes a share of what was left for every effect more."""
+    extra = len(larger.effects) - len(smaller.effects)
+    gain = (smaller.cost - larger.cost) / dispersion
+    unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
+    share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
+    least = extra * max(policy.gain, policy.gain_per_piece * smaller.pieces)
+    return gain > least and unseen > policy.unseen_gain * least and share > min(extra * policy.share, 0.9)
+
+
+def dispersion_of(tried: Sequence[Candidate]) -> float:
+    """By how much the best explanation's residual exceeds the floor: evidence is counted in this unit, so that a model
+    with much left to explain is not sure of anything."""
+    best = min(tried, key=lambda c: c.cost)
+    return max(1.0, best.cost / (0.5 * best.pieces))
+
+
+def _share(smaller: Candidate, larger: Candidate, base: Candidate) -> float:
+    """Of the base model's gap, what an effect more closes."""
+    extra = len(larger.effects) - len(smaller.effects)
+    return (smaller.cost - larger.cost) / max(extra * base.excess, 1e-300)
+
+
+def _supported(chosen: Candidate, search: Search, split: Split, dispersion: float, policy: Policy) -> Candidate:
+    """`chosen`, less the effects without which conditions that were never fitted are predicted no worse."""
+    unseen = split.unseen or split.select
+    for effect in chosen.effects:
+        smaller = search.with_effects([e for e in chosen.effects if e != effect])
+        if smaller is None:
+            continue
+        gain = (_cost_on(smaller, unseen) - _cost_on(chosen, unseen)) / dispersion
+        if gain <= policy.unseen_gain * policy.gain:
+            return _supported(smaller, search, split, dispersion, policy)
+    return chosen
+
+
+def _cost_on(candidate: Candidate, trials) -> float:
+    return sum(candidate.by_trial[trial.name] for trial in trials)
+
+
+def _weights(search: Search, chosen: Candidate, dispersion: float) -> dict[tuple[str, ...], float]:
+    """Probability of each explanation, sets of every size compared, base included.
+
+    A likelihood alone would be sure by e^1000 of a model that is wrong by something: what a wrong model explains well
+    differs from condition to condition. So the conditions are drawn anew (the Bayesian bootstrap, Rubin 1981), and an
+    explanation's probability is the mean, over the draws, of its share of the likelihood in units of the dispersion.
+    """
+    compared = list(dict.fromkeys([chosen, search.base, *sorted(search.tried, key=lambda c: c.cost)[:_COMPARED]]))
+    trials = [*chosen.fitted.problem.trials, *chosen.checked.problem.trials]
+    keys = list(dict.fromkeys((t.experiment, t.condition) for t in trials))
+    costs = np.zeros((len(compared), len(keys)))
+    for trial in trials:
+        costs[:, keys.index((trial.experiment, trial.condition))] += [c.by_trial[trial.name] for c in compared]
+    penalty = np.array([c.cost for c in compared]) - costs.sum(axis=1)
+    draw = np.random.default_rng(0)
+    drawn = draw.dirichlet(np.ones(len(keys)), _DRAWS) * len(keys) @ costs.T + penalty
+    likelihood = np.exp(-(drawn - drawn.min(axis=1, keepdims=True)) / dispersion)
+    mean = (likelihood / likelihood.sum(axis=1, keepdims=True)).mean(axis=0)
+    return {c.effects: float(w) for c, w in zip(compared, mean, strict=True)}
+
+
+def _exchanges(effect: str, chosen: tuple[str, ...], weights, policy: Policy) -> tuple[str, ...]:
+    """What `effect` could be exchanged for, the most probable first."""
+    others = frozenset(chosen) - {effect}
+    mine = weights[chosen]
+    found = [
+        (weight, next(iter(frozenset(effects) - others)))
+        for effects, weight in weights.items()
+        if len(effects) == len(chosen) and others < frozenset(effects) and effect not in effects
+    ]
+    return tuple(name for weight, name in sorted(found, reverse=True) if weight > policy.confusable * (weight + mine))

@@ -1,0 +1,177 @@
+"""From trials to a verdict: fit, detect, trace, decide, learn what is left, and say what to measure next."""
+
+from __future__ import annotations
+
+import time
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew, Progress
+from lacuna.diagnosis.decide import Choice, choose, dispersion_of
+from lacuna.diagnosis.drift import find_drift
+from lacuna.diagnosis.learn import holds, learn_correction
+from lacuna.diagnosis.named import Named, Rival, describe_effects, drop_absent, nearest
+from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
+from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.diagnosis.remainder import Remainder
+from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, rms, share_of_gap
+from lacuna.diagnosis.search import Search, screen, search
+from lacuna.diagnosis.signature import Signature, describe
+from lacuna.diagnosis.split import Split, split_trials
+from lacuna.diagnosis.warn import warnings_of
+from lacuna.errors import LacunaError
+from lacuna.estimation.fit import Fit, converged
+from lacuna.system import Correction, CorrectionSite, System
+
+
+class TooLittleDataError(LacunaError):
+    """There is nothing to fit, or nothing to judge a fit by."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What the named effects (or the base model) leave. `share_of_gap`: of the base model's gap; `learnt`: sites of the
+    curves that take up some of it."""
+
+    remainder: Remainder
+    signature: Signature
+    share_of_gap: float
+    learnt: tuple[str, ...]
+
+    @property
+    def matters(self) -> bool:
+        return self.remainder.matters
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The engine's answer to three questions.
+
+    `verdict`: "none" (nothing that matters), "identified" (the mechanisms in `effects` are supported), or "unexplained"
+    (something matters and no mechanism is supported). `base`, `explained` and `final` are fitted to all known trials:
+    the base model, that with the named effects, and that with the curves `learnt` on top where they hold. `signature`:
+    where what the base model lacks lives; `left`: what the named effects leave.
+    """
+
+    verdict: str
+    effects: tuple[Named, ...]
+    base: Fit
+    explained: Fit
+    final: Fit
+    before: Error
+    after: Error
+    floor: Floor
+    remainder_before: Remainder
+    signature: Signature
+    left: Left
+    nearest: tuple[Rival, ...]
+    warnings: tuple[str, ...]
+    learnt: tuple[tuple[CorrectionSite, Correction], ...]
+    next: NextExperiment
+    search: Search
+    choice: Choice
+    split: Split
+    drifts: tuple[str, ...]
+    seconds: float
+
+
+def diagnose(
+    system: System,
+    *,
+    seed: int = 0,
+    starts: int = 1,
+    policy: Policy = POLICY,
+    progress: Progress = lambda _: None,
+    executor: Executor | None = None,
+) -> Diagnosis:
+    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Explanations are tried
+    on `executor`, if there is one that can ship the system."""
+    began = time.monotonic()
+    split = split_trials(system.trials, system.spare())
+    if not split.fit or not split.judging:
+        raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
+    crew = Crew(progress, executor)
+    case = Case(system, split, policy, seed)
+    crew.say("fitting the base model")
+    base = case.fit_base(starts)
+    found = _explanations(case, base, crew)
+    choice = choose(found, split, policy, case.suffices)
+    choice = drop_absent(case, found, choice)
+    base_known = converged(case.on_known(found.base))
+    explained = converged(case.on_known(choice.candidate)) if choice.candidate.effects else base_known
+    remainder = case.remainder(base_known)
+    drifts = find_drift(explained, policy=policy, seed=seed)
+    before, floor = error_of(base_known, split), floor_of(explained, split)
+    with_effects = error_of(explained, split)
+    closed = share_of_gap(before.held_out, with_effects.held_out, floor.held_out)
+    verdict = _verdict(case, choice, found, remainder, drifts)
+    if verdict != "identified":
+        explained, closed = base_known, 0.0
+    left = case.remainder(explained) if verdict == "identified" else remainder
+    final = explained
+    if verdict != "none" and left.matters:
+        final = _corrected(case, found, choice, verdict, explained, crew)
+    sites = tuple(final.structure.sites)
+    return Diagnosis(
+        verdict,
+        describe_effects(case, found, choice) if verdict == "identified" else (),
+        base_known,
+        explained,
+        final,
+        before,
+        error_of(final, split),
+        floor,
+        remainder,
+        describe(base_known, remainder, drifts),
+        Left(left, describe(explained, left, drifts), 1.0 - closed, sites),
+        nearest(case, found, choice if verdict == "identified" else None),
+        warnings_of(final, split),
+        tuple((system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
+        _next(choice, found) if verdict == "identified" else NextExperiment(),
+        found,
+        choice,
+        split,
+        drifts,
+        time.monotonic() - began,
+    )
+
+
+def _explanations(case: Case, base: Fit, crew: Crew) -> Search:
+    """Everything tried. Nothing is where the base model leaves nothing that matters."""
+    first = case.judge(base)
+    if case.suffices(first):
+        return Search(first, base.problem.floor, (first,), tuple(screen(base, case.split, base.problem.floor)))
+    return search(base, case.split, base.problem.floor, enough=case.suffices, policy=case.policy, crew=crew)
+
+
+def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, drifts: tuple[str, ...]) -> str:
+    if not remainder.matters:
+        return "unexplained" if drifts else "none"
+    if not choice.probability or min(choice.probability.values()) < case.policy.supported:
+        return "unexplained"
+    return "identified" if case.closed(choice.candidate, found.base) >= case.policy.half else "unexplained"
+
+
+def _corrected(case: Case, found: Search, choice: Choice, verdict: str, explained: Fit, crew: Crew) -> Fit:
+    """`explained` with curves learnt on top where they hold on trials that informed nothing. Where nothing is
+    supported, the best of everything tried stands beside them, so that what is reported is never worse than that."""
+    split = case.split
+    parents = [choice.candidate] if verdict == "identified" else list(dict.fromkeys((found.base, choice.candidate)))
+    learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew)
+    offered = [learnt] if learnt and holds(case.on_known(learnt), explained, split) else []
+    if verdict == "unexplained":
+        offered += found.tried
+    best = min(offered, key=lambda c: rms(c.checked.scaled_residuals()), default=None)
+    return explained if best is None else converged(case.on_known(best))
+
+
+def _next(choice: Choice, found: Search) -> NextExperiment:
+    chosen = frozenset(choice.candidate.effects)
+    rivals = [choice.candidate]
+    for effect, others in choice.confusable_with.items():
+        for other in others:
+            rival = found.with_effects(chosen - {effect} | {other})
+            if rival is not None:
+                rivals.append(rival)
+    return next_experiment(rivals, found.floor, dispersion_of(found.tried))

@@ -1,0 +1,80 @@
+"""Does something change over the session? Repeats in a row hide it; the order of the trials shows it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.estimation.fit import Fit
+
+_SHUFFLES = 2000
+_FEWEST = 6  # trials, and as many that tell about a parameter
+
+
+def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[str, ...]:
+    """Names of base parameters whose value, as each single trial would have it, moves with `session_order`.
+
+    Each trial's residual is projected on the derivative by each parameter: the shift that this trial alone asks for,
+    weighed by how well it knows and by how much the trials differ anyway (DerSimonian and Laird 1986). The correlation
+    with the order is held against shuffled orders, all parameters at once.
+    """
+    trials = fitted.problem.trials
+    ordered = [k for k, t in enumerate(trials) if t.session_order is not None]
+    if len(ordered) < _FEWEST or not fitted.solution.sensitivities:
+        return ()
+    order = np.array([float(trials[k].session_order) for k in ordered])
+    names, asked, weights = _asked(fitted, ordered)
+    if not names:
+        return ()
+    observed = _trend(asked, weights, order)
+    draw = np.random.default_rng(seed)
+    largest = [_trend(asked, weights, draw.permutation(order)).max() for _ in range(_SHUFFLES)]
+    limit = np.quantile(largest, 1 - policy.drift_chance)
+    return tuple(name for name, trend in zip(names, observed, strict=True) if trend > limit)
+
+
+def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Names of the parameters that enough trials tell about, and by trial the shifts asked for and their weights,
+    shapes (P, n)."""
+    residuals, jacobians = fitted.problem.residuals(fitted.solution.point), fitted.solution.jacobians
+    names, asked, weights = [], [], []
+    for column, index in enumerate(fitted.solution.free):
+        if index >= fitted.structure.base_size:
+            continue
+        pairs = [(jacobians[k][0][:, column], residuals[k]) for k in ordered]
+        known = np.array([float(d @ d) for d, _ in pairs])
+        pulls = np.array([-float(d @ r) for d, r in pairs])
+        shifts = np.divide(pulls, known, out=np.zeros_like(pulls), where=known > 0)
+        weight = _weights(shifts, known)
+        if _effective(weight) >= _FEWEST:
+            names.append(fitted.structure.names[index])
+            asked.append(shifts)
+            weights.append(weight)
+    return names, np.array(asked), np.array(weights)
+
+
+def _weights(shifts: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """One over the variance of each shift: what its trial cannot know, and what trials differ by beyond that."""
+    total, count = known.sum(), np.count_nonzero(known)
+    if count < 2:
+        return known
+    excess = float(known @ (shifts - known @ shifts / total) ** 2) - (count - 1)
+    between = max(excess, 0.0) / max(total - float(known @ known) / total, 1e-300)
+    return known / (1.0 + between * known)
+
+
+def _effective(weight: np.ndarray) -> float:
+    """How many trials of equal weight would tell as much."""
+    square = float(weight @ weight)
+    return float(weight.sum()) ** 2 / square if square > 0 else 0.0
+
+
+def _trend(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """By parameter the weighted correlation with the order, as standard deviations (Fisher's transform), shape (P,)."""
+    total = weights.sum(axis=1)
+    shift = asked - ((weights * asked).sum(axis=1) / total)[:, None]
+    place = order - ((weights @ order) / total)[:, None]
+    both, squares, spread = ((weights * product).sum(axis=1) for product in (shift * place, shift**2, place**2))
+    correlation = np.abs(both) / np.sqrt(np.maximum(squares * spread, 1e-300))
+    effective = total**2 / (weights**2).sum(axis=1)
+    return np.arctanh(np.minimum(correlation, 1.0 - 1e-9)) * np.sqrt(effective - 3.0)

@@ -1,0 +1,110 @@
+"""Curves learnt from data in the equations where the discrepancy lives: for what no effect of the library explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lacuna.diagnosis.candidate import Candidate, finish, judge
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.linear import remaining_after, stacked
+from lacuna.diagnosis.policy import Policy
+from lacuna.diagnosis.residual_error import rms
+from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit, evaluate_on, starting_point
+from lacuna.estimation.problem import Point, Problem
+from lacuna.estimation.solve import Solution, solve
+from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import effective_samples
+
+_MOST = 4  # curves in one correction
+_FITTED = 4  # sites where a curve is sketched, the most promising first,
+_PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
+_SKETCH = {"max_iterations": 8, "relative": 3e-3}
+
+
+@dataclass(frozen=True)
+class _Promise:
+    """What a curve at a site would be worth: the cost that a linear regression foretells."""
+
+    candidate: Candidate
+    problem: Problem
+    start: Point
+    cost: float
+
+
+def learn_correction(
+    candidates: Sequence[Candidate], split: Split, *, enough, policy: Policy, crew: Crew
+) -> Candidate | None:
+    """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
+    `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
+    None if none helps."""
+    best: Candidate | None = None
+    while best is None or len(best.fitted.structure.sites) < _MOST:
+        grown = _best_grown([best] if best else candidates, split, policy, crew)
+        if grown is None:
+            break
+        best = grown
+        if enough(best):
+            break
+    return best
+
+
+def _best_grown(parents: Sequence[Candidate], split: Split, policy: Policy, crew: Crew) -> Candidate | None:
+    before = min(parents, key=lambda c: c.checked.cost)
+    promises = sorted((p for c in parents for p in _promises(c, split)), key=lambda p: p.cost)[:_FITTED]
+    promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
+    names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
+    solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
+    grown = [judge(Fit(p.problem, solution, 1, 1), split) for p, solution in zip(promises, solutions, strict=True)]
+    if not grown:
+        return None
+    best = min(grown, key=lambda c: c.checked.cost)
+    if before.checked.cost - best.checked.cost < policy.curve * _excess(before.checked):
+        return None
+    best = min(best, judge(finish(best.fitted), split), key=lambda c: c.checked.cost)
+    return best if _rms(best) < _rms(before) else None
+
+
+def _rms(candidate: Candidate) -> float:
+    """On unseen trials, large residuals at their full size: a fit may not buy small ones with them."""
+    return rms(candidate.checked.scaled_residuals())
+
+
+def _excess(fit: Fit) -> float:
+    """Of a fit's cost, what noise at the floor would not leave."""
+    return max(fit.cost - 0.5 * effective_samples(fit), 0.0)
+
+
+def _sketched(problem: Problem, start: Point) -> Solution:
+    return solve(problem, start, **_SKETCH)
+
+
+def _promises(candidate: Candidate, split: Split) -> list[_Promise]:
+    """Every further site's curve, regressed on what `candidate` leaves and its own parameters cannot take up."""
+    parent = candidate.fitted
+    basis, remaining = remaining_after(parent)
+    found = []
+    for site in parent.structure.system.correction_sites:
+        if site in parent.structure.sites:
+            continue
+        structure = Structure(parent.structure.system, candidate.effects, (*parent.structure.sites, site))
+        problem = Problem(structure, split.fit, parent.problem.floor)
+        start = problem.start(starting_point(parent, structure), parent.solution.point.nuisances)
+        knots = range(len(parent.structure.names), len(structure.names))
+        moves, _ = stacked(problem.jacobians(start, knots, problem.first_steps()))
+        moves -= basis @ (basis.T @ moves)
+        prior = problem.prior_precision[np.ix_(knots, knots)]
+        push = moves.T @ remaining
+        gain = 0.5 * push @ np.linalg.solve(moves.T @ moves + prior, push)
+        found.append(_Promise(candidate, problem, start, candidate.cost - float(gain)))
+    return found
+
+
+def holds(corrected: Fit, before: Fit, split: Split) -> bool:
+    """Whether the curves also help on the trials that informed nothing."""
+    if not split.final:
+        return False
+    return evaluate_on(corrected, split.final).cost < evaluate_on(before, split.final).cost

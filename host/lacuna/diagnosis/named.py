@@ -1,0 +1,142 @@
+"""The effects of a verdict, each with its size, its interval, and what it explains; and what came nearest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.decide import Choice, weigh
+from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
+from lacuna.diagnosis.search import Search
+from lacuna.estimation.clustered import clustered_covariance
+from lacuna.estimation.fit import Fit, fit, starting_point
+from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import uncertainty
+from lacuna.system import Effect
+
+_CONFIDENCE = 0.9
+_NEAREST = 5
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect of the verdict. `interval`: 90 % for each parameter. `share_of_gap`: of the base model's gap on
+    held-out trials, what it closes on top of those named before it. `form`: how it acts, "as in the library" or freed.
+    """
+
+    name: str
+    form: str
+    parameters: dict[str, float]
+    interval: dict[str, tuple[float, float]]
+    probability: float
+    share_of_gap: float
+    confusable_with: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another explanation, and the share of the gap that it would close."""
+
+    effects: tuple[str, ...]
+    share_of_gap: float
+
+
+def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
+    """90 % interval of every fitted parameter, within its bounds: by the curvature of the likelihood or by what
+    conditions disagree about, whichever is wider; Student's t with as many degrees of freedom as conditions, less
+    one."""
+    known = uncertainty(fitted)
+    sd = np.sqrt(np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted))))
+    conditions = len({(t.experiment, t.condition) for t in fitted.problem.trials})
+    half = sd * student.ppf(0.5 + _CONFIDENCE / 2, max(conditions - 1, 1))
+    found = {}
+    for estimate, index, width in zip(known.estimates, fitted.solution.free, half, strict=True):
+        parameter = fitted.structure.parameters[index]
+        lower, upper = max(parameter.lower, estimate.value - width), min(parameter.upper, estimate.value + width)
+        found[estimate.name] = (float(lower), float(upper))
+    return found
+
+
+def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
+    """`choice` without effects whose interval holds the value at which they are absent: the least certain first."""
+    fitted = case.on_known(choice.candidate)
+    within = intervals(fitted)
+    idle = [e for e in choice.candidate.effects if _may_be_absent(fitted.structure.system.effects[e], within)]
+    if not idle:
+        return choice
+    least = min(idle, key=lambda e: choice.probability[e])
+    rest = tuple(e for e in choice.candidate.effects if e != least)
+    smaller = found.with_effects(rest) or _refitted_without(case, choice.candidate, rest)
+    return drop_absent(case, found, weigh(found, smaller, case.policy))
+
+
+def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, ...]:
+    """Every effect of the choice, in the order of what it explains."""
+    candidate = choice.candidate
+    fitted = case.on_known(candidate)
+    within = intervals(fitted)
+    named = []
+    for effect, share in _shares(case, found, candidate):
+        described = fitted.structure.system.effects[effect]
+        named.append(
+            Named(
+                effect,
+                "as in the library",
+                {p.name: fitted.theta[described.full_name(p)] for p in described.parameters},
+                {p.name: within[described.full_name(p)] for p in described.parameters},
+                choice.probability[effect],
+                share,
+                choice.confusable_with[effect],
+            )
+        )
+    return tuple(named)
+
+
+def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Rival, ...]:
+    """The best other explanations tried, with what each would close."""
+    chosen = choice.candidate if choice else found.base
+    others = sorted((c for c in found.tried if c.effects and c is not chosen), key=lambda c: c.cost)[:_NEAREST]
+    closes = _closing(case, found)
+    return tuple(Rival(c.effects, closes(c.fitted)) for c in others)
+
+
+def _closing(case: Case, found: Search):
+    """A function that says what share of the base model's gap a fit closes on held-out trials."""
+    split = case.split
+    best = min(found.tried, key=lambda c: c.cost)
+    before, floor = error_of(case.on_known(found.base), split), floor_of(case.on_known(best), split)
+    return lambda fitted: share_of_gap(before.held_out, error_of(fitted, split).held_out, floor.held_out)
+
+
+def _shares(case: Case, found: Search, candidate: Candidate) -> list[tuple[str, float]]:
+    """Each effect with the share of the gap that it closes on top of those before it, the largest first of all."""
+    closes = _closing(case, found)
+    rest, chosen, closed, shares = list(candidate.effects), (), 0.0, []
+    while rest:
+        ahead = {}
+        for effect in rest:
+            smaller = candidate if len(rest) == 1 else found.with_effects((*chosen, effect))
+            smaller = smaller or _refitted_without(case, candidate, (*chosen, effect))
+            ahead[effect] = closes(case.on_known(smaller) if smaller is candidate else smaller.fitted)
+        best = max(ahead, key=ahead.get)
+        shares.append((best, ahead[best] - closed))
+        chosen, closed = (*chosen, best), ahead[best]
+        rest.remove(best)
+    return shares
+
+
+def _refitted_without(case: Case, candidate: Candidate, effects: Sequence[str]) -> Candidate:
+    """`candidate` with these of its effects only, fitted from where it stands."""
+    parent = candidate.fitted
+    structure = Structure(parent.structure.system, tuple(e for e in candidate.effects if e in effects))
+    start = [starting_point(parent, structure)]
+    return case.judge(fit(structure, case.split.fit, parent.problem.floor, starts=start, relative=1e-3))
+
+
+def _may_be_absent(effect: Effect, within: dict[str, tuple[float, float]]) -> bool:
+    return all(within[name][0] <= effect.absent <= within[name][1] for name in effect.size_names)

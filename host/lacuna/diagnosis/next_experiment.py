@@ -1,0 +1,66 @@
+"""Which experiment would tell apart what this data cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from lacuna.diagnosis.candidate import Candidate
+from lacuna.estimation.noise import NoiseFloor
+from lacuna.system import CandidateExperiment, Channels
+
+_TELLS_APART = 5.0  # log-likelihood
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """`separates`: effects that it tells apart; empty, with `experiment` None, if there is nothing to
+    separate or no experiment on offer does. `gain`: expected log-likelihood ratio between the closest
+    two."""
+
+    separates: tuple[str, ...] = ()
+    experiment: str | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    gain: float = 0.0
+
+
+def next_experiment(rivals: Sequence[Candidate], floor: NoiseFloor, dispersion: float) -> NextExperiment:
+    """The experiment on offer in which the rivals' predictions differ most, against the noise of that experiment."""
+    if len(rivals) < 2:
+        return NextExperiment()
+    system = rivals[0].fitted.structure.system
+    best = NextExperiment()
+    for offer in system.candidate_experiments():
+        predictions = [_predict(c, offer) for c in rivals]
+        gains = [
+            _expected_gain(a, b, offer, floor) / dispersion for k, a in enumerate(predictions) for b in predictions[:k]
+        ]
+        if min(gains) > best.gain:
+            names = tuple(sorted({name for c in rivals for name in c.effects} - _shared(rivals)))
+            best = NextExperiment(names, offer.experiment, dict(offer.settings), float(min(gains)))
+    return best if best.gain > _TELLS_APART else NextExperiment()
+
+
+def _shared(rivals: Sequence[Candidate]) -> set[str]:
+    return set.intersection(*(set(c.effects) for c in rivals))
+
+
+def _predict(candidate: Candidate, offer: CandidateExperiment) -> Channels:
+    fitted = candidate.fitted
+    theta = fitted.theta | {p.name: p.value for p in fitted.structure.system.nuisances(offer.trial)}
+    return fitted.structure.system.predict(theta, candidate.effects, offer.trial)
+
+
+def _expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: NoiseFloor) -> float:
+    """Half the squared difference in standard deviations, thinned to independent pieces."""
+    total = 0.0
+    for channel in a:
+        noise = floor.channels.get((offer.experiment, channel))
+        if noise is None:
+            continue
+        z = np.abs(a[channel] - b[channel]) / noise.sd
+        total += 0.5 * float(np.nansum(np.minimum(z, 10.0) ** 2)) / noise.samples_per_piece
+    return total

@@ -1,0 +1,103 @@
+"""Every rule by which the engine decides, in one place: its unit, its reason, and where it comes from.
+
+Constants of numerics (steps, tolerances, iterations) stay where they are used. What follows changes answers. `origin`
+is "derivation" (it follows from something else), "simulation" (tried on the toy system and on robots whose truth is
+known) or "convention" (a choice that a person may make otherwise; pass another `Policy` to `diagnose`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+
+def _rule(value: float, unit: str, reason: str, origin: str):
+    return field(default=value, metadata={"unit": unit, "reason": reason, "origin": origin})
+
+
+@dataclass(frozen=True)
+class Policy:
+    """The engine's rules. Each field's metadata has `unit`, `reason` and `origin`; `table()` lists them."""
+
+    # Is there anything that matters?
+    chance: float = _rule(
+        0.005,
+        "probability",
+        "so much shared by repeats by chance in any channel counts as structure: one false alarm in 200 data sets",
+        "convention",
+    )
+    relevance: float = _rule(
+        1.1**2 - 1,
+        "floor's variance",
+        "a model that predicts to within a tenth of the floor, RMS, is as good as the data: sqrt(1 + 0.21) = 1.1",
+        "derivation",
+    )
+    drift_chance: float = _rule(
+        0.002,
+        "probability",
+        "a trend over the session, over all parameters at once, against shuffled orders",
+        "convention",
+    )
+
+    # Which mechanisms are supported?
+    gain: float = _rule(
+        8.0,
+        "log-likelihood over dispersion",
+        "what one more effect must bring beyond its parameters' cost: odds of 3000 to 1",
+        "convention",
+    )
+    gain_per_piece: float = _rule(
+        5e-4,
+        "log-likelihood over dispersion, a piece",
+        "with many pieces any small misfit pays for a parameter",
+        "simulation",
+    )
+    unseen_gain: float = _rule(
+        0.25, "of the gain asked for", "part of it must come from trials that were not fitted", "simulation"
+    )
+    share: float = _rule(
+        0.15, "of what is left", "an effect more must close this share of what the smaller set leaves", "simulation"
+    )
+    share_of_gap: float = _rule(
+        0.03,
+        "of the base model's gap",
+        "a further effect that closes less is as likely the wrong form of the first: it goes into the remainder,"
+        " unless it leaves nothing that matters",
+        "simulation",
+    )
+    half: float = _rule(0.5, "of the gap", "mechanisms that together close less do not explain the data", "convention")
+    confusable: float = _rule(
+        0.05, "probability", "an exchange of effects at least so probable is not ruled out", "convention"
+    )
+    supported: float = _rule(
+        0.5, "probability", "a named effect is at least as likely as not, against everything tried", "convention"
+    )
+    implausible: float = _rule(
+        2.0, "log-likelihood", "cost of a parameter half its plausible range outside it", "convention"
+    )
+
+    # How far is the search worth its time?
+    promising: float = _rule(
+        0.05, "of what is left", "an effect that takes away less in a quick fit is not fitted to the end", "simulation"
+    )
+    hopeful: float = _rule(
+        3.0, "times the least excess of the beam", "sets that leave more are not grown further", "simulation"
+    )
+    hopeless: float = _rule(
+        10.0, "times the least excess finished", "a sketch that leaves more is not finished", "simulation"
+    )
+    reach: float = _rule(
+        3.0, "times the cost of a set that suffices", "rivals beyond are not pursued: they cannot win", "derivation"
+    )
+
+    # What is learnt?
+    curve: float = _rule(
+        0.1, "of what is left on unseen trials beyond noise", "what one more curve must take away", "simulation"
+    )
+
+    @classmethod
+    def table(cls) -> list[tuple[str, float, str, str, str]]:
+        """(name, value, unit, reason, origin) of every rule."""
+        return [(f.name, f.default, *(f.metadata[k] for k in ("unit", "reason", "origin"))) for f in fields(cls)]
+
+
+POLICY = Policy()

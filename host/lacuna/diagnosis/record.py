@@ -1,0 +1,103 @@
+"""A diagnosis as JSON, format 2."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from lacuna.diagnosis.diagnose import Diagnosis, Left
+from lacuna.diagnosis.residual_error import Error, Floor
+from lacuna.system import Correction, CorrectionSite
+
+FORMAT = 2
+_TRIED = 8  # explanations listed, the best first
+
+
+def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Plain types only; numbers that do not exist (no trial held out) are null."""
+    d = diagnosis
+    return {
+        "format": FORMAT,
+        "verdict": d.verdict,
+        "effects": [
+            {
+                "name": e.name,
+                "form": e.form,
+                "parameters": {name: _number(value) for name, value in e.parameters.items()},
+                "interval_90": {name: [_number(v) for v in ends] for name, ends in e.interval.items()},
+                "probability": _number(e.probability),
+                "share_of_gap": _number(e.share_of_gap),
+                "confusable_with": list(e.confusable_with),
+            }
+            for e in d.effects
+        ],
+        "remainder": _left(d.left),
+        "nearest": [{"effects": list(r.effects), "share_of_gap": _number(r.share_of_gap)} for r in d.nearest],
+        "warnings": list(d.warnings),
+        "held_out": {
+            "repeats": [trial.name for trial in d.split.repeats],
+            "conditions": [trial.name for trial in d.split.conditions],
+        },
+        "error": {
+            "unit": "RMS residual in units of the noise",
+            "before": _error(d.before),
+            "after": _error(d.after),
+            "noise_floor": _sides(d.floor),
+        },
+        "signature": {
+            "experiments": list(d.signature.experiments),
+            "depends_on": list(d.signature.depends_on),
+            "text": d.signature.text,
+        },
+        "learnt": [_curve(site, learnt) for site, learnt in d.learnt],
+        "tried": [
+            {"effects": list(c.effects), "error": _number(c.rms)}
+            for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]
+        ],
+        "not_detectable_here": [s.effect for s in d.search.screened if not s.detectable],
+        "next_experiment": {
+            "separates": list(d.next.separates),
+            "experiment": d.next.experiment,
+            "settings": dict(d.next.settings),
+        },
+        "seconds": _number(d.seconds),
+    }
+
+
+def _curve(site: CorrectionSite, learnt: Correction) -> dict[str, Any]:
+    """What is added to a term: a row of values each, at equal intervals from `lower` to `upper` of the variable."""
+    return {
+        "site": site.name,
+        "term": site.term,
+        "unit": site.unit,
+        "variable": site.variable,
+        "lower": site.lower,
+        "upper": site.upper,
+        "rows": {row: [_number(v) for v in values] for row, values in zip(site.rows, learnt.table, strict=True)},
+    }
+
+
+def _left(left: Left) -> dict[str, Any]:
+    """What the named effects leave: `times_floor` is the RMS of what repeats share of it where that is largest."""
+    return {
+        "matters": left.matters,
+        "share_of_gap": _number(left.share_of_gap),
+        "times_floor": _number(math.sqrt(max(left.remainder.largest, 0.0))),
+        "experiments": list(dict.fromkeys(experiment for experiment, _ in left.remainder.found)),
+        "depends_on": list(left.signature.depends_on),
+        "learnt": list(left.learnt),
+        "text": left.signature.text,
+    }
+
+
+def _error(error: Error) -> dict[str, Any]:
+    by_experiment = {name: _number(value) for name, value in error.by_experiment.items()}
+    return _sides(error) | {"by_experiment": by_experiment}
+
+
+def _sides(error: Error | Floor) -> dict[str, Any]:
+    return {name: _number(getattr(error, name)) for name in ("fitted", "held_out", "held_out_conditions")}
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.4g}") if math.isfinite(value) else None

@@ -1,0 +1,161 @@
+"""Is there anything left in a residual but noise? Structure is what repeats of a condition have in common.
+
+The product of two repeats' residuals, averaged, is the mean square of what they share: noise averages out
+whatever its colour, because it is drawn anew in each run. How large that average gets by chance is found by
+a bootstrap: every trial is given a stretch of pure noise, taken from the differences between repeats, in
+which all that is shared cancels. No distribution, whiteness or known noise level is assumed.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.problem import SOFT_LIMIT
+from lacuna.system import Channels, System, Trial
+
+_DRAWS = 200
+_TAIL = 0.1
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left in the residual of a fit.
+
+    By (experiment, channel): `shared`, mean square of what repeats share, in units of the floor's variance; `z`, the
+    same in standard deviations of what chance makes of it; `chance`, the probability of so much by chance in any of
+    the channels; `good_enough`, what `shared` may be by the accuracy that the person asked for. It matters where an
+    experiment's mean over its channels exceeds `relevance`, and is no chance.
+    """
+
+    shared: Mapping[tuple[str, str], float]
+    z: Mapping[tuple[str, str], float]
+    chance: Mapping[tuple[str, str], float]
+    good_enough: Mapping[tuple[str, str], float]
+    policy: Policy
+
+    @property
+    def found(self) -> list[tuple[str, str]]:
+        """Where there is structure, the largest first."""
+        found = (key for key, p in self.chance.items() if p < self.policy.chance)
+        return sorted(found, key=lambda key: -self.shared[key])
+
+    @property
+    def matters(self) -> bool:
+        return self.worst > 1.0
+
+    @property
+    def largest(self) -> float:
+        """The largest `shared` that is not chance."""
+        return max((self.shared[key] for key in self.found), default=0.0)
+
+    @property
+    def worst(self) -> float:
+        """The largest multiple of what is relevant in any experiment with structure: above 1 something matters."""
+        places = [key for key in self.found if self.shared[key] > self.good_enough[key]]
+        return max((self._mean(e) / self.policy.relevance for e in {e for e, _ in places}), default=0.0)
+
+    def _mean(self, experiment: str) -> float:
+        """What repeats of an experiment share, over all of its channels; what is good enough counts as nothing."""
+        each = [
+            value if value > self.good_enough[key] else 0.0
+            for key, value in self.shared.items()
+            if key[0] == experiment
+        ]
+        return sum(each) / len(each)
+
+
+def find_remainder(
+    system: System,
+    trials: Sequence[Trial],
+    scaled: Sequence[Channels],
+    floor: NoiseFloor,
+    *,
+    policy: Policy = POLICY,
+    seed: int = 0,
+) -> Remainder:
+    """Test the residuals `scaled` (in standard deviations, one mapping a trial) for structure."""
+    draw = np.random.default_rng(seed)
+    shared, z, alone = {}, {}, {}
+    for key, conditions in _by_condition(trials, scaled).items():
+        repeated = [rows for rows in conditions if len(rows) > 1]
+        if repeated:
+            shared[key] = _shared(repeated)
+            by_chance = _by_chance(repeated, draw)
+            z[key] = (shared[key] - by_chance.mean()) / max(by_chance.std(), 1e-12)
+            alone[key] = _exceeded(by_chance, shared[key])
+        else:
+            samples = np.concatenate([rows.ravel() for rows in conditions])
+            shared[key] = float(np.mean(samples**2) - 1)
+            z[key] = shared[key] / np.sqrt(2 * floor.channels[key].samples_per_piece / len(samples))
+            alone[key] = float(norm.sf(z[key]))
+    chance = {key: float(-np.expm1(len(z) * np.log1p(-min(p, 0.999)))) for key, p in alone.items()}
+    good_enough = {key: (system.accuracy(*key) / floor.channels[key].sd) ** 2 for key in shared}
+    return Remainder(shared, z, chance, good_enough, policy)
+
+
+def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
+    """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base."""
+    groups: dict[object, list[tuple[Trial, Channels]]] = defaultdict(list)
+    for trial, channels in zip(trials, scaled, strict=True):
+        groups[trial.experiment, trial.condition].append((trial, channels))
+    found: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
+    for members in groups.values():
+        first, channels = members[0]
+        for channel in channels:
+            rows = [
+                _compressed(np.interp(first.time_s, t.time_s, np.nan_to_num(c[channel])))
+                for t, c in members
+                if channel in c
+            ]
+            found[first.experiment, channel].append(np.array(rows))
+    return found
+
+
+def _compressed(z: np.ndarray) -> np.ndarray:
+    return SOFT_LIMIT * np.arcsinh(z / SOFT_LIMIT)
+
+
+def _shared(conditions: Sequence[np.ndarray]) -> float:
+    """Mean product of different repeats at the same sample."""
+    total, count = 0.0, 0
+    for rows in conditions:
+        repeats, length = rows.shape
+        total += (float((rows.sum(axis=0) ** 2).sum()) - float((rows**2).sum())) / (2 * length)
+        count += repeats * (repeats - 1) // 2
+    return total / count
+
+
+def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> np.ndarray:
+    """`_shared` of noise alone, `_DRAWS` times: signs, order and places in time of pure noise turned at random."""
+    noise = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
+    found = np.empty(_DRAWS)
+    for k in range(_DRAWS):
+        drawn = [
+            np.array([_stretch(noise[draw.integers(len(noise))], rows.shape[1], draw) for _ in rows])
+            for rows in conditions
+        ]
+        found[k] = _shared(drawn)
+    return found
+
+
+def _exceeded(draws: np.ndarray, value: float) -> float:
+    """Probability that chance exceeds `value`. Beyond the largest tenth of the draws an exponential tail goes on: what
+    walks share by chance is far from normal, since each has few independent errors."""
+    threshold = float(np.quantile(draws, 1 - _TAIL))
+    if value <= threshold:
+        return float(np.mean(draws >= value))
+    excess = draws[draws > threshold] - threshold
+    return _TAIL * float(np.exp(-(value - threshold) / max(float(excess.mean()), 1e-12)))
+
+
+def _stretch(trace: np.ndarray, length: int, draw: np.random.Generator) -> np.ndarray:
+    start = draw.integers(len(trace))
+    doubled = np.resize(np.concatenate([trace[start:], trace[:start]]), length)
+    return doubled * draw.choice((-1.0, 1.0))

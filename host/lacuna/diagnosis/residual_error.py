@@ -1,0 +1,100 @@
+"""How large a fit's residual is, in units of the noise."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.noise import repeat_pairs
+from lacuna.system import Channels, Trial
+
+
+@dataclass(frozen=True)
+class Error:
+    """RMS residual in units of the noise: over the trials that were fitted, all that were held out, those among them
+    whose conditions were never fitted, and the held-out ones by experiment (all trials where none is held out)."""
+
+    fitted: float
+    held_out: float
+    held_out_conditions: float
+    by_experiment: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What repeats of one condition differ by, in the same units: no model can do better."""
+
+    fitted: float
+    held_out: float
+    held_out_conditions: float
+
+
+def error_of(fitted: Fit, split: Split) -> Error:
+    """Errors of a fit on its own trials and on trials that it has not seen."""
+    known = dict(zip((t.name for t in fitted.problem.trials), fitted.scaled_residuals(), strict=True))
+    unseen = _on(fitted, split.held_out)
+    by_experiment: dict[str, list[Channels]] = defaultdict(list)
+    for trial in split.held_out:
+        by_experiment[trial.experiment].append(unseen[trial.name])
+    held_out = set(by_experiment)
+    for trial in fitted.problem.trials:
+        if trial.experiment not in held_out:
+            by_experiment[trial.experiment].append(known[trial.name])
+    return Error(
+        rms(known.values()),
+        rms(unseen.values()),
+        rms(unseen[t.name] for t in split.conditions),
+        {name: rms(members) for name, members in by_experiment.items()},
+    )
+
+
+def floor_of(fitted: Fit, split: Split) -> Floor:
+    """The floor on the same trials, from the differences between repeats' residuals."""
+    known = fitted.problem.trials
+    scaled = dict(zip((t.name for t in known), fitted.scaled_residuals(), strict=True)) | _on(fitted, split.held_out)
+    fit_pairs, held_out_pairs = repeat_differences(known, split.held_out, scaled)
+    condition_pairs = repeat_differences((), split.conditions, scaled)[1]
+    return Floor(*(rms(pairs) if pairs else 1.0 for pairs in (fit_pairs, held_out_pairs, condition_pairs)))
+
+
+def share_of_gap(before: float, after: float, floor: float) -> float:
+    """Of the gap between a model's error and the floor, RMS all three, the share that is closed: squares add up."""
+    return (before**2 - after**2) / max(before**2 - floor**2, 1e-12)
+
+
+def repeat_differences(
+    known: Sequence[Trial], held_out: Sequence[Trial], residuals: Mapping[str, Channels]
+) -> tuple[list[Channels], list[Channels]]:
+    """What repeats differ by, over the root of 2 (as large as the noise of one of them): of the pairs among the known
+    trials, and of those with a held-out one. `residuals` by trial."""
+    names = {t.name for t in held_out}
+    known_pairs, unseen_pairs = [], []
+    for first, second in repeat_pairs((*known, *held_out)):
+        pairs = unseen_pairs if {first.name, second.name} & names else known_pairs
+        pairs.append(_difference(first, second, residuals))
+    return known_pairs, unseen_pairs
+
+
+def rms(members) -> float:
+    """Root mean square over trials and channels, each trial's channel counting the same; NaN without any."""
+    squares = [np.nanmean(z**2) for channels in members for z in channels.values() if np.isfinite(z).any()]
+    return float(np.sqrt(np.mean(squares))) if squares else float("nan")
+
+
+def _on(fitted: Fit, trials: Sequence[Trial]) -> dict[str, Channels]:
+    if not trials:
+        return {}
+    return dict(zip((t.name for t in trials), evaluate_on(fitted, trials).scaled_residuals(), strict=True))
+
+
+def _difference(first: Trial, second: Trial, residuals: Mapping[str, Channels]) -> Channels:
+    return {
+        c: (r - np.interp(first.time_s, second.time_s, residuals[second.name][c])) / np.sqrt(2)
+        for c, r in residuals[first.name].items()
+        if c in residuals[second.name]
+    }

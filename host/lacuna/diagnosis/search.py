@@ -1,0 +1,198 @@
+"""Search over sets of effects with a beam: the right effect may rank third alone and first in company."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lacuna.diagnosis.candidate import Candidate, Profile, finish, finish_elsewhere, judge, profiles, sketches
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.linear import remaining_after
+from lacuna.diagnosis.policy import Policy
+from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit, reweigh
+from lacuna.estimation.noise import NoiseFloor, estimate_noise
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import effective_samples
+
+LARGEST_SET = 3
+_BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
+_SKETCHED = {1: 8, 2: 8, 3: 6}  # sets refitted, by their size: roughly,
+_SKETCHED_TWICE = {1: 4, 2: 3, 3: 2}  # the best of these from afar as well,
+_FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
+_ROUNDS = 4  # of finishing at most
+_PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
+_LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
+_REWEIGHED_ITERATIONS = 5
+_LEAST = 3.0  # log-likelihood: gaining less, a further round of finishing is not worth it
+_ABSORBED = 0.02  # a change in the residual of which less than this share is left after the base's is absorbed
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What the data could tell of an effect of typical size.
+
+    `visible`: standard deviations that its typical size stands out by after everything that the base can
+    imitate is taken off; `absorbed` if hardly anything is left. `gain`: log-likelihood that a linear
+    regression of the residual on that direction would bring.
+    """
+
+    effect: str
+    visible: float
+    absorbed: bool
+    gain: float
+
+    @property
+    def detectable(self) -> bool:
+        return self.visible > 5.0 and not self.absorbed
+
+
+@dataclass(frozen=True)
+class Search:
+    """Every explanation that was refitted, all against the same `floor`, and the screening of the library."""
+
+    base: Candidate
+    floor: NoiseFloor
+    tried: tuple[Candidate, ...]
+    screened: tuple[Screened, ...]
+
+    def with_effects(self, effects: Sequence[str]) -> Candidate | None:
+        wanted = frozenset(effects)
+        return next((c for c in self.tried if frozenset(c.effects) == wanted), None)
+
+
+def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
+    """Sensitivity to each effect at its typical size, projected off what the parent's parameters can do."""
+    found = []
+    reference = parent.problem.residuals(parent.solution.point)
+    basis, remaining = remaining_after(parent)
+    for name, effect in parent.structure.system.effects.items():
+        if name in parent.structure.effects:
+            continue
+        structure = Structure(parent.structure.system, (*parent.structure.effects, name))
+        problem = Problem(structure, split.fit, floor)
+        values = structure.values(
+            structure.theta(structure.start())
+            | parent.theta
+            | {effect.full_name(p): p.value for p in effect.parameters}
+        )
+        moved = problem.residuals(problem.start(values, parent.solution.point.nuisances))
+        change = np.concatenate([m - r for m, r in zip(moved, reference, strict=True)])
+        left = change - basis @ (basis.T @ change)
+        size, visible = float(np.linalg.norm(change)), float(np.linalg.norm(left))
+        gain = 0.5 * float(left @ remaining) ** 2 / max(visible**2, 1e-300)
+        found.append(Screened(name, visible, size == 0 or visible < _ABSORBED * size, gain))
+    return found
+
+
+def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy, crew: Crew) -> Search:
+    """Grow sets from the base model until one is `enough(candidate)`, or what the best leaves is too little for a
+    further effect to be named, or nothing promises to take its share away, or there are three effects.
+
+    At each size, every effect is tried on every parent in the beam by its amplitude profile, the most
+    promising are refitted with equal effort, and the best sets make the next beam.
+    """
+    screened = screen(base, split, floor)
+    first = judge(base, split)
+    tried: dict[frozenset[str], Candidate] = {frozenset(): first}
+    beam = [first]
+    library = list(base.structure.system.effects)
+    for size in range(1, LARGEST_SET + 1):
+        if not _grow(beam, library, split, floor, tried, enough, policy, crew):
+            break
+        lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
+        if lower.share_of(floor) < _LOWER:
+            floor = lower
+            crew.say("weighing again against a lower floor")
+            reach = policy.reach * _ranked(tried, size)[0].cost
+            tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
+        before = min(tried[frozenset(c.effects)].excess for c in beam)
+        beam = _ranked(tried, size)[: _BEAM[size]]
+        best = beam[0]
+        if before - best.excess < policy.promising * before or enough(best):
+            break
+        beam = [c for c in beam if c.excess <= policy.hopeful * best.excess]
+    return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened))
+
+
+def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate]:
+    return sorted((c for s, c in tried.items() if len(s) == size), key=lambda c: c.cost)
+
+
+def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
+    """The floor as the repeats show it once a better explanation has taken its share of what differs between runs."""
+    residuals = candidate.fitted.residuals() | candidate.checked.residuals()
+    system = candidate.fitted.structure.system
+    return floor.lowered_by(estimate_noise(system, split.known, residuals))
+
+
+def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
+    """The same explanation against another floor, fitted from where it stands if it is to be done thoroughly."""
+    steps = _REWEIGHED_ITERATIONS if thoroughly else 0
+    return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split)
+
+
+def _grow(
+    beam: Sequence[Candidate], library, split, floor, tried, enough, policy: Policy, crew: Crew
+) -> list[Candidate]:
+    """Every parent of the beam with one effect more: the most promising of all, with equal effort."""
+    size = len(beam[0].effects) + 1
+    profiled: dict[frozenset[str], Profile] = {}
+    for parent in beam:
+        fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
+        if parent.effects:
+            gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
+            fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
+        least = policy.promising * max(parent.fitted.cost - 0.5 * effective_samples(parent.fitted), 0.0)
+        for found in profiles(parent.fitted, fresh, split, floor, crew):
+            if parent.effects and parent.fitted.cost - found.cost < least:
+                continue
+            same = frozenset(found.problem.structure.effects)
+            if same not in profiled or found.cost < profiled[same].cost:
+                profiled[same] = found
+    promising = sorted(profiled.values(), key=lambda p: p.cost)[: _SKETCHED[size]]
+    sketched = sketches(promising, _SKETCHED_TWICE[size], crew)
+    return _finish(min(beam, key=lambda c: c.cost), sketched, _FINISHED[size], split, tried, enough, policy, crew)
+
+
+def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:
+    """From afar again for as long as that pays: a friction that went astray comes back in more than one go."""
+    for _ in range(_ROUNDS):
+        further = judge(finish(candidate.fitted), split)
+        fruitful = candidate.cost - further.cost > max(policy.promising * candidate.excess, _LEAST)
+        candidate = min(candidate, further, key=lambda c: c.cost)
+        if not fruitful:
+            break
+    return candidate
+
+
+def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Policy, crew: Crew) -> list[Candidate]:
+    """Refit to the end the best `count` of those that explain more than the best set so far, `before`; once one of them
+    explains enough, only those that are not out of its reach. What does not explain enough gets a second start, so that
+    it is not the optimiser who failed."""
+    grown = [judge(fitted, split) for fitted, _ in sketched]
+    profiled = {candidate.effects: profile for candidate, (_, profile) in zip(grown, sketched, strict=True)}
+    waiting = sorted(grown, key=lambda c: c.cost)
+    done: list[Candidate] = []
+    explained = np.inf
+    while waiting and len(done) < count:
+        candidate = waiting[0]
+        fruitful = before.cost - candidate.cost > policy.promising * before.excess
+        hopeless = done and candidate.excess > policy.hopeless * min(c.excess for c in done)
+        if not fruitful or hopeless or candidate.cost > policy.reach * explained:
+            break
+        waiting.pop(0)
+        crew.say(f"finishing {' + '.join(candidate.effects)}")
+        candidate = _finished(candidate, split, policy)
+        suffices = enough(candidate)
+        if not suffices:
+            candidate = judge(finish_elsewhere(candidate.fitted, profiled[candidate.effects]), split)
+            suffices = enough(candidate)
+        if suffices:
+            explained = min(explained, candidate.cost)
+        done.append(candidate)
+    tried.update((frozenset(candidate.effects), candidate) for candidate in [*done, *waiting])
+    return [*done, *waiting]

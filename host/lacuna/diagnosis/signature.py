@@ -1,0 +1,150 @@
+"""Where a residual lives and what it depends on, in words and numbers."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lacuna.diagnosis.remainder import Remainder
+from lacuna.estimation.fit import Fit
+from lacuna.system import Trial
+
+_BINS = 15
+_WORTH_NAMING = 0.08  # share of a residual's square that a dependence must predict in other runs
+_MOST_NAMED = 3
+_VISIBLE = 4.0  # standard deviations of structure by chance
+_SHARE_OF_LARGEST = 0.05
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """`share` of the residual's square that a curve over these quantities predicts in other runs."""
+
+    experiment: str
+    channel: str
+    quantities: tuple[str, ...]
+    share: float
+
+
+@dataclass(frozen=True)
+class Signature:
+    """`experiments` with structure, worst first; `depends_on`, strongest first; `text`: one paragraph."""
+
+    experiments: tuple[str, ...]
+    depends_on: tuple[str, ...]
+    dependences: tuple[Dependence, ...]
+    text: str
+
+
+def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[str] = ()) -> Signature:
+    """The signature of what `fitted` leaves, given the test of it and what drifts over the session."""
+    top = remainder.largest
+    places = sorted(
+        (key for key, z in remainder.z.items() if z > _VISIBLE and remainder.shared[key] > _SHARE_OF_LARGEST * top),
+        key=lambda key: -remainder.shared[key],
+    )
+    experiments = tuple(dict.fromkeys(experiment for experiment, _ in places))
+    data = _gather(fitted)
+    dependences = [d for key in places[:4] if (d := _dependence(key, data[key])) is not None]
+    depends_on = list(dict.fromkeys(q for d in dependences for q in d.quantities))[:_MOST_NAMED]
+    if drifts:
+        depends_on.append("order of the session")
+    return Signature(
+        experiments, tuple(depends_on), tuple(dependences), _sentence(places, remainder, dependences, drifts)
+    )
+
+
+_Rows = list[tuple[np.ndarray, Mapping[str, np.ndarray]]]
+
+
+def _gather(fitted: Fit) -> dict[tuple[str, str], _Rows]:
+    """By (experiment, channel): of each trial the scaled residual and the quantities that it may depend on."""
+    system = fitted.structure.system
+    rows: dict[tuple[str, str], _Rows] = defaultdict(list)
+    predictions = fitted.predictions()
+    for trial, prediction, scaled in zip(
+        fitted.problem.trials, predictions, fitted.problem.scaled(predictions), strict=True
+    ):
+        quantities = _finite(system.regressors(trial, prediction), trial)
+        for channel, z in scaled.items():
+            rows[trial.experiment, channel].append((np.clip(z, -50, 50), quantities))
+    return rows
+
+
+def _finite(quantities: Mapping[str, np.ndarray], trial: Trial) -> dict[str, np.ndarray]:
+    return {n: np.nan_to_num(q) for n, q in quantities.items() if q.shape == trial.time_s.shape}
+
+
+def _dependence(key: tuple[str, str], rows: _Rows) -> Dependence | None:
+    """The quantity, or the pair of them, whose binned mean made from every other trial predicts the rest best."""
+    half = len(rows) // 2
+    if half == 0:
+        return None
+    make, check = rows[::2], rows[1::2]
+    names = list(rows[0][1])
+    if not names:  # the system offers nothing that a residual may depend on
+        return None
+    singles = {(n,): _predicted_share(make, check, (n,)) for n in names}
+    best = max(singles, key=singles.get)
+    found, share = best, singles[best]
+    pairs = {(*best, n): _predicted_share(make, check, (*best, n)) for n in names if n not in best}
+    if pairs:
+        pair = max(pairs, key=pairs.get)
+        if pairs[pair] > share + _WORTH_NAMING:
+            found, share = pair, pairs[pair]
+    return Dependence(*key, found, share) if share > _WORTH_NAMING else None
+
+
+def _predicted_share(make: _Rows, check: _Rows, names: tuple[str, ...]) -> float:
+    edges = [_edges(np.concatenate([q[n] for _, q in make])) for n in names]
+    shape = tuple(len(e) + 1 for e in edges)
+    total, count = np.zeros(shape), np.zeros(shape)
+    for z, quantities in make:
+        known = np.isfinite(z)
+        at = _cells(quantities, names, edges, known)
+        np.add.at(total, at, z[known])
+        np.add.at(count, at, 1)
+    mean = total / np.maximum(count, 1)
+    left = whole = 0.0
+    for z, quantities in check:
+        known = np.isfinite(z)
+        at = _cells(quantities, names, edges, known)
+        left += float(((z[known] - mean[at]) ** 2).sum())
+        whole += float((z[known] ** 2).sum())
+    return 1 - left / max(whole, 1e-12)
+
+
+def _edges(samples: np.ndarray) -> np.ndarray:
+    levels = np.unique(samples)
+    if len(levels) <= _BINS:
+        return 0.5 * (levels[1:] + levels[:-1])
+    return np.unique(np.quantile(samples, np.linspace(0, 1, _BINS + 1)[1:-1]))
+
+
+def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
+    return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
+
+
+def _sentence(places, remainder: Remainder, dependences, drifts) -> str:
+    if not places and not drifts:
+        return "Nothing is left in the residual but what repeats of a run differ by."
+    parts = []
+    if places:
+        listed = ", ".join(
+            f"{channel} in {experiment} ({np.sqrt(max(remainder.shared[experiment, channel], 0)):.1f} x the floor)"
+            for experiment, channel in places[:4]
+        )
+        parts.append(f"Repeats share a residual that the model does not predict: {listed}.")
+    for d in dependences[:2]:
+        parts.append(
+            f"In {d.experiment}, {' and '.join(d.quantities)} explain{'s' if len(d.quantities) == 1 else ''} "
+            f"{100 * d.share:.0f} % of the residual variance of {d.channel}."
+        )
+    if places and not dependences:
+        parts.append("No single quantity of the model explains it.")
+    if drifts:
+        parts.append(f"{', '.join(drifts)} drift{'s' if len(drifts) == 1 else ''} over the session.")
+    return " ".join(parts)

@@ -1,0 +1,83 @@
+"""Which trials are fitted, which choose between explanations, and which are looked at only at the end."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Hashable, Sequence
+from dataclasses import dataclass
+
+from lacuna.system import Trial
+
+
+@dataclass(frozen=True)
+class Split:
+    """`fit`: fitted. `select`: further repeats of the same conditions, and `unseen`: whole conditions that are never
+    fitted; both choose between explanations. `final`: repeats (without repeats: trials) that inform nothing."""
+
+    fit: tuple[Trial, ...]
+    select: tuple[Trial, ...]
+    unseen: tuple[Trial, ...]
+    final: tuple[Trial, ...]
+
+    @property
+    def known(self) -> tuple[Trial, ...]:
+        """What the final explanation is fitted to."""
+        return self.fit + self.select
+
+    @property
+    def judging(self) -> tuple[Trial, ...]:
+        """What explanations are compared on besides the trials that they are fitted to."""
+        return self.select + self.unseen
+
+    @property
+    def held_out(self) -> tuple[Trial, ...]:
+        """Everything that the final explanation is not fitted to."""
+        return self.unseen + self.final
+
+    @property
+    def conditions(self) -> tuple[Trial, ...]:
+        """The held-out trials of conditions that were never fitted."""
+        fitted = {(t.experiment, t.condition) for t in self.known}
+        return tuple(t for t in self.held_out if (t.experiment, t.condition) not in fitted)
+
+    @property
+    def repeats(self) -> tuple[Trial, ...]:
+        """The held-out trials of conditions of which other repeats were fitted."""
+        names = {t.name for t in self.conditions}
+        return tuple(t for t in self.held_out if t.name not in names)
+
+
+def split_trials(trials: Sequence[Trial], spare: Collection[tuple[str, Hashable]] = ()) -> Split:
+    """Split by whole trials; deterministic.
+
+    `spare`: (experiment, condition) of those that are never fitted. Of three or more repeats of any other condition
+    one goes to `final` and one to `select`, which one rotates from condition to condition, so that no part has all the
+    early or all the late runs of a session; of two, every other condition gives one away; where there are no repeats,
+    every fifth trial is held out and every fourth selects.
+    """
+    groups: dict[tuple[str, Hashable], list[Trial]] = defaultdict(list)
+    for trial in trials:
+        groups[trial.experiment, trial.condition].append(trial)
+    left_out = set(spare)
+    parts: dict[str, list[Trial]] = {"fit": [], "select": [], "unseen": [], "final": []}
+    pairs = 0
+    singles = [members[0] for members in groups.values() if len(members) == 1]
+    for turn, (key, members) in enumerate(groups.items()):
+        if len(members) == 1:
+            continue
+        if key in left_out:
+            parts["unseen"] += members
+            continue
+        if len(members) == 2:
+            parts["fit"].append(members[pairs % 2])
+            parts["select" if pairs % 2 else "final"].append(members[1 - pairs % 2])
+            pairs += 1
+            continue
+        for place, trial in enumerate(members):
+            role = {0: "final", 1: "select"}.get((place + turn) % len(members), "fit")
+            parts[role].append(trial)
+    for place, trial in enumerate(singles):
+        role = "final" if place % 5 == 4 else "select" if place % 5 == 2 else "fit"
+        parts[role].append(trial)
+    order = {trial.name: k for k, trial in enumerate(trials)}
+    return Split(**{role: tuple(sorted(ts, key=lambda t: order[t.name])) for role, ts in parts.items()})

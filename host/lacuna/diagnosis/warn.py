@@ -1,0 +1,64 @@
+"""What a person should know before believing a fit: bounds, open directions, predictions that failed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.uncertainty import uncertainty
+
+_NEAR_LIMIT = 3.5  # standard deviations that a nuisance strayed: it stands in for something
+
+
+def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
+    """One sentence each, the gravest first."""
+    held_out = evaluate_on(fitted, split.held_out) if split.held_out else None
+    fits = [fitted, held_out] if held_out else [fitted]
+    return (*_failed(fits), *_parameters(fitted), *_strayed(fits))
+
+
+def _failed(fits: list[Fit]) -> list[str]:
+    names = []
+    for fit in fits:
+        for trial, prediction in zip(fit.problem.trials, fit.predictions(), strict=True):
+            if any(not np.isfinite(p[np.isfinite(trial.channels[c])]).all() for c, p in prediction.items()):
+                names.append(trial.name)
+    if not names:
+        return []
+    return [f"The model could not predict {_listed(names)}: these trials count as badly predicted."]
+
+
+def _parameters(fitted: Fit) -> list[str]:
+    known = uncertainty(fitted)
+    found = [
+        f"{e.name} is at its bound ({e.value:.4g} {e.unit}): the data ask for more than it allows.".replace(" )", ")")
+        for e in known.estimates
+        if e.at_bound
+    ]
+    found += [
+        f"{e.name} = {e.value:.4g} {e.unit} lies outside its plausible range.".replace("  ", " ")
+        for e in known.estimates
+        if e.implausible and not e.at_bound
+    ]
+    for direction in known.undetermined:
+        found.append(f"The data do not determine {_listed(list(direction))}: a combination of them is open.")
+    return found
+
+
+def _strayed(fits: list[Fit]) -> list[str]:
+    far: dict[str, list[str]] = {}
+    for fit in fits:
+        for trial, values, parameters in zip(
+            fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True
+        ):
+            for value, parameter in zip(values, parameters, strict=True):
+                if "." not in parameter.name and abs(value - parameter.value) > _NEAR_LIMIT * parameter.step_scale:
+                    far.setdefault(parameter.name, []).append(trial.name)
+    return [f"{name} is at its limit in {_listed(trials)}: it stands in for something." for name, trials in far.items()]
+
+
+def _listed(names: list[str], most: int = 4) -> str:
+    shown = names[:most]
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(shown) + more

@@ -1,0 +1,82 @@
+"""Fits that begin far away: residuals are first looked at from a distance, and closer from view to view.
+
+A record that jumps (a snap-through, a foot that slips) and a prediction that jumps at another time differ by the whole
+jump until the two meet, and nothing says which way to go. Low-passed, the two overlap, and with a raised floor what is
+far off still counts: the same search then finds its way (graduated optimisation; Blake and Zisserman, Visual
+Reconstruction, 1987). Trials that isolate parameters go first, since where everything acts together errors add up over
+time. What they cannot tell apart (`Parameter.elsewhere`), all trials together decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lacuna.estimation.problem import SHARP, Problem, View
+from lacuna.estimation.solve import RELATIVE, Solution, solve
+
+_FAR, _NEARER, _CLOSE = View(1 / 20, 30.0, 30.0), View(1 / 60, 10.0, 30.0), View(1 / 200, 3.0, 30.0)
+_ISOLATED = (_FAR, _NEARER, _CLOSE)
+_TOGETHER = (_FAR, _NEARER)
+_PLACES = View(raised=10.0)
+_NEAR = {"max_iterations": 40, "relative": 1e-3}
+_SAME = 0.2  # scales: places that end within this of one another are one
+_BETTER = 0.9  # of the cost that the start leads to, what one from elsewhere must come down to, to be preferred
+_ENOUGH, _HOPEFUL = 0.02, 3.0  # log-likelihood, and times the least cost: what leaves more is not followed any closer
+
+
+def solve_from_afar(
+    problem: Problem, values: np.ndarray, *, max_iterations: int, relative: float = RELATIVE
+) -> Solution:
+    """Minimise the cost from `values`, wherever they are. Parameters of which something was known beforehand begin
+    there, and stay until the others are near."""
+    free = tuple(i for i, p in enumerate(problem.structure.parameters) if p.prior_sd is None)
+    every = range(len(values))
+    values = np.where(np.isin(np.arange(len(values)), free), values, problem.structure.prior_mean())
+    isolates = problem.structure.system.isolates
+    isolated = problem.over([t for t in problem.trials if isolates(t)])
+    if isolated.trials:
+        values = _followed(isolated, values, _ISOLATED, free).point.values
+        values = _followed(isolated, values, (SHARP,), every).point.values
+    hidden = [j for j in every if not any(problem.structure.moves(j, t) for t in isolated.trials)]
+    starts = [values, *_elsewhere(isolated, values, free)]
+    # what isolated trials have fitted waits at first: a walk seen from a distance says little of it
+    for view, moving in zip(_TOGETHER, (hidden, every), strict=True):
+        found = [_followed(problem, start, (view,), moving) for start in starts]
+        least = min(one.cost for one in found)
+        found = [one for one in found if one.cost <= max(_ENOUGH, _HOPEFUL * least)]
+        starts = [one.point.values for one in found]
+    # alike: where it began stays
+    best = found[0] if least > _BETTER * found[0].cost else min(found, key=lambda one: one.cost)
+    return solve(problem, problem.start(best.point.values), max_iterations=max_iterations, relative=relative)
+
+
+def _followed(problem: Problem, values: np.ndarray, views: Sequence[View], free: Sequence[int]) -> Solution:
+    """Where the search ends in the last of `views`, each begun where the one before ended."""
+    for view in views:
+        distant = problem.seen(view)
+        found = solve(distant, distant.start(values), free=free, **_NEAR)
+        values = found.point.values
+    return found
+
+
+def _elsewhere(isolated: Problem, values: np.ndarray, free: Sequence[int]) -> list[np.ndarray]:
+    """Where else the isolated trials lead, from each of the places that parameters offer: those of `free` that only
+    the same trials show are fitted to these, the others stay."""
+    structure, found = isolated.structure, []
+    shown = {j: frozenset(t.name for t in isolated.trials if structure.moves(j, t)) for j in free}
+    for index in free:
+        parameter = structure.parameters[index]
+        trials = [t for t in isolated.trials if t.name in shown[index]]
+        if not trials or not parameter.elsewhere:
+            continue
+        problem = isolated.over(trials)
+        alike = [j for j in free if shown[j] and shown[j] <= shown[index]]
+        for place in parameter.elsewhere:
+            start = np.where(np.arange(len(values)) == index, place, values)
+            end = _followed(problem, start, (_PLACES,), alike).point.values
+            known = (values, *found)
+            if all(abs(end[index] - other[index]) > _SAME * parameter.step_scale for other in known):
+                found.append(end)
+    return found

@@ -1,0 +1,217 @@
+"""Fitting a structure to trials: several starts, equal effort, and whether they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lacuna.estimation.afar import solve_from_afar
+from lacuna.estimation.noise import NoiseFloor, estimate_noise
+from lacuna.estimation.problem import PLAIN, Point, Problem
+from lacuna.estimation.solve import ENOUGH, RELATIVE, Solution, cost_of, solve
+from lacuna.estimation.structure import Structure
+from lacuna.system import Channels, System, Trial
+
+_SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
+_OPEN = 0.1  # scales
+_CONVERGED = 1e-4  # of the cost: half of it of the RMS error, which is then the same to four digits
+_CONVERGED_ITERATIONS, _ROUNDS = 40, 5
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A structure fitted to trials. `starts_agreeing` of `starts` ended at the best cost: the certificate
+    that what is left is not the optimiser's failure."""
+
+    problem: Problem
+    solution: Solution
+    starts: int
+    starts_agreeing: int
+
+    @property
+    def structure(self) -> Structure:
+        return self.problem.structure
+
+    @property
+    def theta(self) -> dict[str, float]:
+        return self.structure.theta(self.solution.point.values)
+
+    @property
+    def cost(self) -> float:
+        return self.solution.cost
+
+    @property
+    def at_bound(self) -> np.ndarray:
+        """Of each free parameter whether a bound stopped it, shape (P,): whether it would reach the bound for less than
+        a search ends at, the others following. A search seldom ends on a bound to the last digit."""
+        free = list(self.solution.free)
+        values, scales = self.solution.point.values, self.structure.scales()[free]
+        normal = self.solution.normal * np.outer(scales, scales)
+        known = np.eye(len(free)) / _OPEN**2  # where the data leave a parameter open, it is near within this
+        covariance = np.linalg.inv(normal + known) * np.outer(scales, scales)
+        variance = np.diag(covariance)
+        from_below = variance.copy()
+        for index, floor in self.structure.ordered:
+            if index in free and floor in free and values[floor] > self.structure.parameters[index].lower:
+                i, j = free.index(index), free.index(floor)
+                from_below[i] = variance[i] + variance[j] - 2.0 * covariance[i, j]
+        lower, upper = (bound[free] for bound in self.structure.bounds(values))
+        below, above = values[free] - lower, upper - values[free]
+        return (below**2 <= 2.0 * ENOUGH * from_below) | (above**2 <= 2.0 * ENOUGH * variance)
+
+    def predictions(self) -> list[Channels]:
+        return self.problem.predict_all(self.solution.point)
+
+    def residuals(self) -> dict[str, Channels]:
+        """Measured minus predicted by trial name and channel, in the channels' units."""
+        return {
+            t.name: {c: t.channels[c] - p[c] for c in t.channels}
+            for t, p in zip(self.problem.trials, self.predictions(), strict=True)
+        }
+
+    def scaled_residuals(self) -> list[Channels]:
+        """Measured minus predicted in standard deviations of the floor, one mapping a trial."""
+        return self.problem.scaled(self.predictions())
+
+
+def fit(
+    structure: Structure,
+    trials: Sequence[Trial],
+    floor: NoiseFloor,
+    *,
+    starts: Sequence[np.ndarray] = (),
+    max_iterations: int = 20,
+    relative: float = RELATIVE,
+    from_afar: bool = False,
+) -> Fit:
+    """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best. `from_afar`:
+    see `solve_from_afar`."""
+    problem = Problem(structure, trials, floor)
+    vectors = list(starts) or [structure.start()]
+    options = {"max_iterations": max_iterations, "relative": relative}
+    if from_afar:
+        solutions = [solve_from_afar(problem, v, **options) for v in vectors]
+    else:
+        solutions = [solve(problem, problem.start(v), **options) for v in vectors]
+    return best_of(problem, solutions)
+
+
+def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
+    best = min(solutions, key=lambda s: s.cost)
+    margin = max(1.0, _SAME_COST * best.cost)
+    agreeing = sum(s.cost < best.cost + margin for s in solutions)
+    return Fit(problem, best, len(solutions), agreeing)
+
+
+def refit_on(
+    fitted: Fit,
+    trials: Sequence[Trial],
+    *,
+    near: Sequence[Fit] = (),
+    max_iterations: int = 20,
+    relative: float = RELATIVE,
+) -> Fit:
+    """The same structure fitted to other trials, from where it stands. `near`: fits that know the nuisances of all of
+    these trials; without them these begin at their means."""
+    problem = fitted.problem.over(trials)
+    values = fitted.solution.point.values
+    known = {
+        trial.name: nuisances
+        for one in near
+        for trial, nuisances in zip(one.problem.trials, one.solution.point.nuisances, strict=True)
+    }
+    start = Point(values, tuple(known[t.name] for t in trials)) if near else problem.start(values)
+    solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
+    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def converged(fitted: Fit) -> Fit:
+    """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
+    follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
+    problem, solution = fitted.problem.seen(PLAIN), fitted.solution
+    before = np.inf
+    for _ in range(_ROUNDS):
+        solution = solve(problem, solution.point, max_iterations=_CONVERGED_ITERATIONS, relative=0.1 * _CONVERGED)
+        if before - solution.cost < _CONVERGED * solution.cost:
+            break
+        before = solution.cost
+    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
+    """The same structure and trials against another floor, by a few steps with the derivatives that there are."""
+    point = fitted.solution.point
+    problem = Problem(fitted.structure, fitted.problem.trials, floor, fitted.problem.view)
+    pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
+    known = [s.reweighed(new / old) for s, (new, old) in zip(fitted.solution.sensitivities, pairs, strict=True)]
+    solution = solve(problem, point, max_iterations=max_iterations, sensitivities=known)
+    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def evaluate_on(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+    """The fitted parameters on other trials: only the trials' own nuisances are estimated."""
+    problem = fitted.problem.over(trials)
+    start = problem.start(fitted.solution.point.values)
+    if not any(problem.nuisances):
+        empty = np.zeros((0, 0))
+        solution = Solution(start, cost_of(problem, start), True, 0, (), empty, ())
+    else:
+        solution = solve(problem, start, free=(), max_iterations=4)
+    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def spread_starts(structure: Structure, around: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    """`around` and count - 1 vectors drawn over all that is plausible, within the bounds; deterministic.
+
+    A parameter lies anywhere in its plausible range, or as its prior has it, or else within a few scales of `around`;
+    an effect has any size that fits begin at, of either sign where the bounds allow it.
+    """
+    draw = np.random.default_rng(seed)
+    return [around, *(_drawn(structure, around, draw) for _ in range(count - 1))]
+
+
+def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) -> np.ndarray:
+    values = around + 2 * structure.scales() * draw.standard_normal(len(around))
+    for index, parameter in enumerate(structure.parameters):
+        if parameter.plausible is not None:
+            values[index] = draw.uniform(*parameter.plausible)
+        elif parameter.prior_sd is not None:
+            values[index] = parameter.value + parameter.prior_sd * draw.standard_normal()
+    for effect in (structure.system.effects[name] for name in structure.effects):
+        for name, parameter in zip(effect.size_names, effect.parameters, strict=False):
+            factor = draw.uniform(min(effect.start_factors), max(effect.start_factors))
+            sign = draw.choice((-1.0, 1.0)) if parameter.lower < 0.0 < parameter.upper else 1.0
+            size = effect.absent + sign * factor * (parameter.value - effect.absent)
+            values[structure.names.index(name)] = size
+    lower, upper = structure.bounds(values)
+    return structure.lifted(np.clip(values, lower, upper))
+
+
+def fit_base(
+    system: System, trials: Sequence[Trial], *, starts: int = 1, seed: int = 0, max_iterations: int = 30
+) -> Fit:
+    """Fit the base model, then take the noise floor again from what repeats differ by in the residual, and refit."""
+    floor = estimate_noise(system, trials)
+    structure = Structure(system)
+    first = fit(
+        structure,
+        trials,
+        floor,
+        starts=spread_starts(structure, structure.start(), starts, seed),
+        max_iterations=max_iterations,
+        from_afar=True,
+    )
+    sharper = estimate_noise(system, trials, first.residuals())
+    again = fit(structure, trials, sharper, starts=[first.solution.point.values], max_iterations=10)
+    return Fit(again.problem, again.solution, first.starts, first.starts_agreeing)
+
+
+def starting_point(fitted: Fit, structure: Structure) -> np.ndarray:
+    """The vector of `structure` that continues from `fitted`: what both have in common keeps its value."""
+    return structure.values(structure.theta(structure.start()) | _common(fitted, structure))
+
+
+def _common(fitted: Fit, structure: Structure) -> dict[str, float]:
+    return {name: value for name, value in fitted.theta.items() if name in structure.names}

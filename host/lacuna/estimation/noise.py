@@ -1,0 +1,215 @@
+"""The noise floor of a system's trials, taken from the repeats.
+
+Run-to-run spread is often several times the sensor's noise, so a residual is structure only where it
+exceeds what repeats of the same condition differ by. Two numbers a channel describe that spread: a standard
+deviation, and a timing jitter for records that jump (a snap-through 10 ms later is a huge residual, and
+means nothing). A third, the correlation time, says how many samples carry one independent piece of
+information.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
+from scipy.ndimage import median_filter
+from scipy.optimize import brentq
+
+from lacuna.estimation.autocorrelation import correlation_samples
+from lacuna.system import Channels, System, Trial
+
+# Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
+_SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
+_SHIFT_WEIGHTS /= _SHIFT_WEIGHTS.sum()
+_LONGEST_JITTER_S = 0.5
+_MOVING_SIGMAS = 6.0
+_WINDOW_S = 0.05
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Spread of one channel in one experiment.
+
+    `sd` in the channel's unit, `jitter_s` of events in time, `samples_per_piece`: how many neighbouring
+    samples count as one independent observation. `repeats` is the number of pairs of repeats it came from;
+    0: the sensor's word only.
+    """
+
+    sd: float
+    jitter_s: float
+    samples_per_piece: float
+    repeats: int
+
+    @property
+    def per_piece(self) -> float:
+        """Standard deviation that a mean over n samples has, times sqrt(n)."""
+        return self.sd * self.samples_per_piece**0.5
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """`channels` by (experiment, channel)."""
+
+    channels: Mapping[tuple[str, str], ChannelNoise]
+
+    def sd(self, trial: Trial, channel: str) -> np.ndarray:
+        """Standard deviation of each sample of a trial, shape (n,): grows where the record moves fast."""
+        noise = self.channels[trial.experiment, channel]
+        if noise.jitter_s == 0:
+            return np.full(trial.time_s.shape, noise.sd)
+        return np.sqrt(noise.sd**2 + _shift_variance(trial, channel, noise.jitter_s, noise.sd))
+
+    def lowered_by(self, other: NoiseFloor) -> NoiseFloor:
+        """The lower of two floors for each channel: both are upper bounds, since a model that does not fit
+        adds its own differences to those between runs."""
+        return NoiseFloor({k: min(n, other.channels[k], key=lambda c: c.per_piece) for k, n in self.channels.items()})
+
+    def share_of(self, other: NoiseFloor) -> float:
+        """The smallest ratio of this floor to `other` among the channels."""
+        return min(n.per_piece / other.channels[k].per_piece for k, n in self.channels.items())
+
+    def samples_per_piece(self, trial: Trial, channel: str) -> float:
+        return self.channels[trial.experiment, channel].samples_per_piece
+
+
+def estimate_noise(
+    system: System, trials: Sequence[Trial], residuals: Mapping[str, Channels] | None = None
+) -> NoiseFloor:
+    """Noise floor of `trials` from the differences between repeats.
+
+    `residuals` by trial name and channel (measured minus predicted): what a fit that knows each trial's
+    nuisances leaves is a sharper basis than the measurements themselves, and what the model gets wrong
+    alike in all repeats cancels.
+    """
+    by_key: dict[tuple[str, str], list[tuple[Trial, Trial]]] = defaultdict(list)
+    solo: dict[tuple[str, str], list[Trial]] = defaultdict(list)
+    for trial in trials:
+        for channel in trial.channels:
+            solo[trial.experiment, channel].append(trial)
+    for first, second in repeat_pairs(trials):
+        for channel in first.channels.keys() & second.channels.keys():
+            by_key[first.experiment, channel].append((first, second))
+    channels = {}
+    for key, members in solo.items():
+        sensor = system.sensor_noise(*key)
+        if pairs := by_key.get(key):
+            channels[key] = _from_pairs(pairs, key[1], sensor, residuals)
+        else:
+            sd = max(sensor, float(np.median([_fast_noise(trial.channels[key[1]]) for trial in members])))
+            channels[key] = ChannelNoise(max(sd, _smallest(members, key[1])), 0.0, 1.0, 0)
+    return NoiseFloor(channels)
+
+
+def repeat_pairs(trials: Sequence[Trial]) -> Iterator[tuple[Trial, Trial]]:
+    """All pairs of trials with the same experiment and condition."""
+    groups: dict[object, list[Trial]] = defaultdict(list)
+    for trial in trials:
+        groups[trial.experiment, trial.condition].append(trial)
+    for members in groups.values():
+        yield from combinations(members, 2)
+
+
+def _from_pairs(
+    pairs: Sequence[tuple[Trial, Trial]],
+    channel: str,
+    sensor: float,
+    residuals: Mapping[str, Channels] | None,
+) -> ChannelNoise:
+    differences, moving = [], []
+    for first, second in pairs:
+        differences.append(_difference(first, second, channel, residuals))
+        also = np.interp(first.time_s, second.time_s, _moves(second, channel).astype(float)) > 0
+        moving.append(_moves(first, channel) | also)
+    everything = np.concatenate(differences)
+    still = ~np.concatenate(moving)
+    if still.sum() < 20:
+        still = np.ones_like(still)
+    sd = np.sqrt(np.nanmean(everything[still] ** 2))
+    sd = max(sd, sensor, _smallest([trial for pair in pairs for trial in pair], channel))
+    jitter_s = _jitter(pairs, channel, differences, moving, sd)
+    scaled = []
+    for (first, _), difference in zip(pairs, differences, strict=True):
+        variance = sd**2 + (_shift_variance(first, channel, jitter_s, sd) if jitter_s else 0.0)
+        scaled.append(difference / np.sqrt(variance))
+    return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
+
+
+def _difference(first: Trial, second: Trial, channel: str, residuals: Mapping[str, Channels] | None) -> np.ndarray:
+    """(first - second) / sqrt(2) on the first's time base: of the same variance as the noise of either."""
+    a, b = first.channels[channel], second.channels[channel]
+    if residuals is not None:
+        a, b = residuals[first.name][channel], residuals[second.name][channel]
+    known = np.isfinite(b)
+    if known.sum() < 2:
+        return np.full(a.shape, np.nan)
+    common = np.interp(first.time_s, second.time_s[known], b[known], left=np.nan, right=np.nan)
+    return (a - common) / np.sqrt(2)
+
+
+def _moves(trial: Trial, channel: str) -> np.ndarray:
+    """Where a record changes within the window by much more than its fast noise."""
+    samples = trial.channels[channel]
+    window = max(1, round(_WINDOW_S / _sample_period(trial)))
+    smooth = _smooth(samples)
+    change = np.abs(_shifted(smooth, window) - _shifted(smooth, -window))
+    return change > _MOVING_SIGMAS * max(_fast_noise(samples), 1e-12)
+
+
+def _jitter(pairs, channel, differences, moving, sd) -> float:
+    """The shift in time whose mean square effect explains what fast-moving samples differ by beyond `sd`."""
+    excess = float(np.nansum([np.nansum(d[m] ** 2 - sd**2) for d, m in zip(differences, moving, strict=True)]))
+    if excess <= 0 or not any(m.any() for m in moving):
+        return 0.0
+
+    def lacking(jitter_s: float) -> float:
+        explained = sum(
+            np.nansum(_shift_variance(first, channel, jitter_s, sd)[m])
+            for (first, _), m in zip(pairs, moving, strict=True)
+        )
+        return excess - explained
+
+    if lacking(_LONGEST_JITTER_S) > 0:
+        return _LONGEST_JITTER_S
+    return float(brentq(lacking, 0.0, _LONGEST_JITTER_S, xtol=1e-9))
+
+
+def _shift_variance(trial: Trial, channel: str, jitter_s: float, sd: float) -> np.ndarray:
+    """Mean square change of a record under a random shift in time, less what its own noise adds."""
+    samples = _smooth(trial.channels[channel])
+    known = np.isfinite(samples)
+    if known.sum() < 2:
+        return np.zeros(samples.shape)
+    total = np.zeros(samples.shape)
+    for node, weight in zip(_SHIFT_NODES, _SHIFT_WEIGHTS, strict=True):
+        shifted = np.interp(trial.time_s + node * jitter_s, trial.time_s[known], samples[known])
+        total += weight * (shifted - samples) ** 2
+    return np.nan_to_num(np.maximum(total - sd**2, 0.0))
+
+
+def _smooth(samples: np.ndarray) -> np.ndarray:
+    return median_filter(samples, size=3, mode="nearest")
+
+
+def _fast_noise(samples: np.ndarray) -> float:
+    """Standard deviation of white noise in a smooth record, from second differences; robust against jumps."""
+    bends = np.diff(samples[np.isfinite(samples)], 2)
+    return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6)) if len(bends) else 0.0
+
+
+def _smallest(trials: Sequence[Trial], channel: str) -> float:
+    """A floor that keeps noise-free records from infinite weights: 1e-4 of the channel's spread."""
+    spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
+    return 1e-4 * spread or 1e-12
+
+
+def _sample_period(trial: Trial) -> float:
+    return float(np.median(np.diff(trial.time_s)))
+
+
+def _shifted(samples: np.ndarray, by: int) -> np.ndarray:
+    index = np.clip(np.arange(len(samples)) + by, 0, len(samples) - 1)
+    return samples[index]

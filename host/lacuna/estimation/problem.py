@@ -1,0 +1,274 @@
+"""Residuals of many trials and their derivatives, computed on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.signal import lfilter
+
+from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.structure import Structure
+from lacuna.system import Channels, Parameter, Trial
+
+LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivatives
+SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
+_OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
+_FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max(1, len(os.sched_getaffinity(0))))
+
+
+def in_parallel(function: Callable, items: Iterable) -> list:
+    """`[function(x) for x in items]` on all cores, by threads: simulations release the GIL."""
+    return list(_pool().map(function, items))
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a problem stands: the structure's vector, shape (P,), and each trial's nuisances, shape (q,) each."""
+
+    values: np.ndarray
+    nuisances: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How far derivatives step, in the parameters' units, in the form of a `Point`."""
+
+    structure: np.ndarray
+    nuisances: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class View:
+    """How closely residuals are looked at.
+
+    `blur`: time constant of a low-pass that they go through first, as a share of the trial's duration (0: none).
+    `raised`: factor of the floor's standard deviation. Residuals beyond `soft_limit` standard deviations are
+    compressed (asinh).
+    """
+
+    blur: float = 0.0
+    raised: float = 1.0
+    soft_limit: float = SOFT_LIMIT
+
+
+SHARP = View()
+PLAIN = View(soft_limit=1e6)  # plain least squares: what an RMS error measures
+
+
+class Problem:
+    """The residuals of `trials` under a structure, weighted by a noise floor.
+
+    A residual is (predicted - measured) / sd / sqrt(samples per independent piece), so that half its sum of
+    squares is a log-likelihood in independent pieces of information, not in samples. Beyond `view.soft_limit`
+    standard deviations it is compressed (asinh), so that a jump at a slightly wrong time does not outweigh
+    everything else.
+    """
+
+    def __init__(self, structure: Structure, trials: Sequence[Trial], floor: NoiseFloor, view: View = SHARP):
+        self.structure, self.view = structure, view
+        self.trials = tuple(trials)
+        self.floor = floor
+        self.nuisances = tuple(structure.nuisances(t) for t in trials)
+        self._weighing = [_weighing(t, floor) for t in trials]
+        self._prior = structure.prior_precision()
+        self._own = [structure.own(t) for t in trials]
+
+    def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
+        """The structure's vector `values` (default its start), nuisances at their means or, the first ones of each
+        trial, as `known`. An effect's own parameters of a trial begin at the best of a few values."""
+        start = self.structure.start() if values is None else np.asarray(values, float)
+        nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
+        for mine, given in zip(nuisances, known or (), strict=False):
+            mine[: len(given)] = given
+        own = [(i, len(ps) - k - 1) for i, ps in enumerate(self.nuisances) for k in range(len(self._own[i]))]
+        in_parallel(lambda job: self._scan(start, nuisances, *job), own)
+        return Point(start, tuple(nuisances))
+
+    def _scan(self, values: np.ndarray, nuisances: list[np.ndarray], index: int, k: int) -> None:
+        """Set nuisance `k` of trial `index` to the best of `_OWN_STARTS` values over its range."""
+        parameter = self.nuisances[index][k]
+        tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
+        tried[:, k] = np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False)
+        found = self._simulate([(values, mine) for mine in tried], index, coarse=True)
+        costs = [float(np.sum(self._weigh(prediction, index) ** 2)) for prediction in found]
+        nuisances[index] = tried[int(np.argmin(costs))]
+
+    def seen(self, view: View) -> Problem:
+        """The same problem looked at in another way."""
+        other = copy(self)
+        other.view = view
+        return other
+
+    def over(self, trials: Sequence[Trial]) -> Problem:
+        """The same problem with other trials."""
+        return Problem(self.structure, trials, self.floor, self.view)
+
+    def predict(self, point: Point, index: int, *, coarse: bool = False) -> Channels:
+        """Channels of trial `index`."""
+        return self._simulate([(point.values, point.nuisances[index])], index, coarse=coarse)[0]
+
+    def predict_all(self, point: Point) -> list[Channels]:
+        return in_parallel(lambda i: self.predict(point, i), range(len(self.trials)))
+
+    def residuals(self, point: Point) -> list[np.ndarray]:
+        """One vector a trial, channels one after the other, weighted."""
+        coarse = self.view.raised > 1.0
+        return in_parallel(lambda i: self._weigh(self.predict(point, i, coarse=coarse), i), range(len(self.trials)))
+
+    def prior_cost(self, point: Point) -> float:
+        """Minus log of the priors on the nuisances and on the learnt curves."""
+        cost = 0.5 * self.prior_shift(point) @ self.prior_precision @ self.prior_shift(point)
+        for values, parameters in zip(point.nuisances, self.nuisances, strict=True):
+            cost += 0.5 * sum(((v - p.value) / p.step_scale) ** 2 for v, p in zip(values, parameters, strict=True))
+        return float(cost)
+
+    def prior_shift(self, point: Point) -> np.ndarray:
+        """How far the structure's vector is from the mean of its prior."""
+        return point.values - self.structure.prior_mean()
+
+    @property
+    def prior_precision(self) -> np.ndarray:
+        """Of the structure's vector, shape (P, P); a raised floor makes it weaker in proportion."""
+        return self._prior / self.view.raised**2
+
+    def first_steps(self) -> Steps:
+        """A tenth of the largest step."""
+        share = 0.1 * LARGEST_STEP
+        return Steps(
+            share * self.structure.scales(),
+            tuple(np.array([share * p.step_scale for p in ps]) for ps in self.nuisances),
+        )
+
+    def tuned_steps(self, steps: Steps, free: Sequence[int], squares: Sequence[np.ndarray]) -> Steps:
+        """Steps that change the residuals by a few standard deviations in all: wide enough to drown the
+        integrator's own error, narrow enough for the derivative to be one. `squares`: of each trial the square
+        norms of its derivatives, by the free parameters and by its nuisances."""
+        scales, p = self.structure.scales(), len(free)
+        structure = steps.structure.copy()
+        structure[list(free)] = _tuned(sum(s[:p] for s in squares), scales[list(free)])
+        nuisances = tuple(
+            _tuned(s[p:], np.array([parameter.step_scale for parameter in ps]))
+            for s, ps in zip(squares, self.nuisances, strict=True)
+        )
+        return Steps(structure, nuisances)
+
+    def jacobians(self, point: Point, free: Sequence[int], steps: Steps) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For each trial the derivatives of its residuals, shapes (n, len(free)) and (n, q), by absolute steps."""
+
+        def blocks(i: int) -> tuple[np.ndarray, np.ndarray]:
+            values, nuisances = point.values, point.nuisances[i]
+            moving = [k for k, j in enumerate(free) if self.structure.moves(j, self.trials[i])]
+            by_structure = [
+                _stepped(values, free[k], self.structure.parameters[free[k]], steps.structure[free[k]]) for k in moving
+            ]
+            by_nuisance = [
+                _stepped(nuisances, k, parameter, steps.nuisances[i][k])
+                for k, parameter in enumerate(self.nuisances[i])
+            ]
+            moved = [*((v, nuisances) for v, _ in by_structure), *((values, n) for n, _ in by_nuisance)]
+            changes = self.changes(i, (values, nuisances), moved, coarse=True)
+            changes /= np.array([step for _, step in (*by_structure, *by_nuisance)])
+            structure = np.zeros((len(changes), len(free)))
+            structure[:, moving] = changes[:, : len(moving)]
+            return structure, changes[:, len(moving) :]
+
+        return in_parallel(blocks, range(len(self.trials)))
+
+    def changes(
+        self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple], *, coarse: bool = False
+    ) -> np.ndarray:
+        """By what the residuals of a trial change, shape (n, len(moved)), from `here` to each of `moved` nearby:
+        values and the trial's nuisances."""
+        first, *others = self._simulate([here, *moved], index, coarse=coarse, alike=True)
+        reference = self._weigh(first, index)
+        changes = np.empty((len(others), len(reference)))
+        for row, prediction in zip(changes, others, strict=True):
+            row[:] = self._weigh(prediction, index) - reference
+        return changes.T
+
+    def scaled(self, predictions: Sequence[Channels]) -> list[Channels]:
+        """(measured - predicted) / sd for each trial and channel, neither compressed nor thinned; NaN where missing."""
+        return [
+            {c: (t.channels[c] - p[c]) / self.floor.sd(t, c) for c in t.channels}
+            for t, p in zip(self.trials, predictions, strict=True)
+        ]
+
+    def slopes(self, point: Point) -> list[np.ndarray]:
+        """What a unit of each prediction changes its residual by, one vector a trial, shapes as `residuals`."""
+        return in_parallel(lambda i: self._slope(self.predict(point, i), i), range(len(self.trials)))
+
+    def _simulate(
+        self, places: Sequence[tuple[np.ndarray, np.ndarray]], index: int, *, coarse: bool, alike: bool = False
+    ) -> list[Channels]:
+        """Channels of a trial at each of `places`, values and the trial's nuisances."""
+        thetas = [self.structure.theta(values) for values, _ in places]
+        corrections = [self.structure.corrections(theta) for theta in thetas]
+        for theta, (_, nuisances) in zip(thetas, places, strict=True):
+            theta |= {p.name: float(v) for p, v in zip(self.nuisances[index], nuisances, strict=True)}
+        how = {"coarse": coarse, "corrections": corrections, "alike": alike}
+        return self.structure.system.predict_many(thetas, self.structure.effects, self.trials[index], **how)
+
+    def _weigh(self, prediction: Channels, index: int) -> np.ndarray:
+        _, _, thinning, keep = self._weighing[index]
+        z, weight = self._deviations(prediction, index) / self.view.raised, thinning[keep]
+        if self.view.blur:
+            z, weight = self._blurred(z, weight, index)
+        limit = self.view.soft_limit
+        return limit * np.arcsinh(z / limit) * weight
+
+    def _blurred(self, z: np.ndarray, weight: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Each channel through a low-pass, and as many samples of it as it then has anything to say."""
+        keep = self._weighing[index][3].reshape(len(self.trials[index].channels), -1)
+        samples = keep.shape[1] * self.view.blur
+        decay, every = np.exp(-1.0 / samples), max(1, round(samples / 4))
+        ends = np.cumsum(keep.sum(axis=1))[:-1]
+        found, weights = [], []
+        for z_, w_ in zip(np.split(z, ends), np.split(weight, ends), strict=True):
+            found.append(lfilter([1.0 - decay], [1.0, -decay], z_)[every - 1 :: every])
+            weights.append(w_[every - 1 :: every] * np.sqrt(every))
+        return np.concatenate(found), np.concatenate(weights)
+
+    def _slope(self, prediction: Channels, index: int) -> np.ndarray:
+        _, weight, thinning, keep = self._weighing[index]
+        return (weight * thinning)[keep] / np.hypot(1.0, self._deviations(prediction, index) / self.view.soft_limit)
+
+    def _deviations(self, prediction: Channels, index: int) -> np.ndarray:
+        """Residuals in standard deviations, uncompressed."""
+        measured, weight, _, keep = self._weighing[index]
+        predicted = np.concatenate([prediction[c] for c in self.trials[index].channels])
+        z = ((predicted - measured) * weight)[keep]
+        return np.where(np.isfinite(z), z, _FAILED)
+
+
+def _weighing(trial: Trial, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
+    measured = np.concatenate([trial.channels[c] for c in trial.channels])
+    weight = np.concatenate([1.0 / floor.sd(trial, c) for c in trial.channels])
+    thinning = np.concatenate(
+        [np.full(v.shape, floor.samples_per_piece(trial, c) ** -0.5) for c, v in trial.channels.items()]
+    )
+    return measured, weight, thinning, np.isfinite(measured)
+
+
+def _stepped(values: np.ndarray, index: int, parameter: Parameter, step: float) -> tuple[np.ndarray, float]:
+    """`values` with one entry moved by `step`, inwards where a bound is near."""
+    if values[index] + step > parameter.upper:
+        step = -step
+    moved = values.copy()
+    moved[index] += step
+    return moved, step
+
+
+def _tuned(square_norm: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    ideal = 3.0 / np.sqrt(np.maximum(square_norm, 1e-300))
+    return np.clip(ideal, SMALLEST_STEP * scales, LARGEST_STEP * scales)

@@ -1,0 +1,115 @@
+"""The last steps of a fit, with derivatives good enough to say how well its parameters are known.
+
+While a fit is far away, small steps of one parameter at a time do. At its end they do not: parameters that act almost
+alike (both frictions and the wall's place) are told apart by the little that is left of their derivatives once the
+others are taken out, and that is then mostly the simulation's own error, which passes for information. Here every step
+goes along a principal direction of what is known and is one standard deviation long, nuisances following, so that the
+residuals change by as much in the least certain direction as in the surest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.problem import Point, Problem, in_parallel
+from lacuna.estimation.sensitivity import Sensitivity
+from lacuna.estimation.solve import Solution, solve
+
+_ROUNDS = 6
+_STEPS = 20  # a round: cheap beside its derivatives
+_ENOUGH = 1.0  # log-likelihood: after a round that gains less, derivatives from where it began still hold
+# Of the square of what a step should change. Less: it was too short, and its derivative is mostly error. More: it met a
+# jump (a foot that slips a sample sooner).
+_FORETOLD = (0.5, 4.0)
+_LONGEST = 1.0  # scales that a derivative may step, where the data leave a direction open
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """Where derivatives step. `structure`, shape (P, P): in the free parameters, a direction a column. Of each trial:
+    `following`, shape (q, P), what its nuisances do meanwhile, and `spread`, shape (q,), by how much each moves alone.
+    """
+
+    structure: np.ndarray
+    following: tuple[np.ndarray, ...]
+    spread: tuple[np.ndarray, ...]
+
+
+def settle(fitted: Fit) -> Fit:
+    """The fit at its optimum, with derivatives and a normal matrix to be trusted. A round costs P simulations of all
+    trials; there are one to six, two as a rule. A fit that is stopped by a bound stays as it is: the model is wrong."""
+    problem = fitted.problem
+    for _ in range(_ROUNDS):
+        if fitted.at_bound.any():
+            break
+        solution = fitted.solution
+        along = _directions(problem, solution)
+        taken = _derivatives(problem, solution.point, solution.free, along)
+        options = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
+        here = solve(problem, solution.point, max_iterations=0, **options)
+        ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
+        trusted = _as_foretold(along, solution.normal, here.normal)
+        converged = trusted and here.cost - ahead.cost < _ENOUGH
+        # The steps' own corrections would bring the simulation's error back in.
+        fitted = replace(fitted, solution=replace(here, point=ahead.point, cost=ahead.cost, converged=converged))
+        if converged:
+            break
+    return fitted
+
+
+def _directions(problem: Problem, solution: Solution) -> _Directions:
+    size = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
+    values, vectors = np.linalg.eigh(solution.normal / np.outer(size, size))
+    structure = vectors / np.sqrt(np.maximum(values, 1e-15)) / size[:, None]
+    scales = problem.structure.scales()[list(solution.free)]
+    structure /= np.maximum(1.0, np.abs(structure / scales[:, None]).max(axis=0) / _LONGEST)
+    structure *= _room(problem, solution, structure)
+    following, spread = [], []
+    for one, parameters in zip(solution.sensitivities, problem.nuisances, strict=True):
+        p = one.structure
+        own = one.gram[p:, p:] + np.diag([n.step_scale**-2.0 for n in parameters])
+        following.append(-np.linalg.solve(own, one.gram[p:, :p]) @ structure)
+        spread.append(np.sqrt(np.diag(np.linalg.inv(own))))
+    return _Directions(structure, tuple(following), tuple(spread))
+
+
+def _room(problem: Problem, solution: Solution, directions: np.ndarray) -> np.ndarray:
+    """What to multiply each direction by so that its step stays within the bounds, -1 to 1: the other way round where
+    there is more room."""
+    free = list(solution.free)
+    values = solution.point.values[free]
+    lower, upper = (bound[free] for bound in problem.structure.bounds(solution.point.values))
+
+    def share(ways: np.ndarray) -> np.ndarray:
+        gaps = np.where(ways < 0.0, (values - lower)[:, None], (upper - values)[:, None])
+        return np.minimum(1.0, (gaps / np.maximum(np.abs(ways), 1e-300)).min(axis=0))
+
+    ahead, back = share(directions), share(-directions)
+    return np.where(ahead >= back, ahead, -back)
+
+
+def _as_foretold(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether steps along the directions changed the residuals about as much as they were meant to."""
+    meant, seen = (np.einsum("pk,pq,qk->k", along.structure, normal, along.structure) for normal in (before, after))
+    whole = meant > 0.5  # others stopped short of a standard deviation, because the data leave them open
+    return bool(((seen > _FORETOLD[0] * meant) & (seen < _FORETOLD[1] * meant))[whole].all())
+
+
+def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:
+    """Of every trial by the free parameters and by its nuisances, from differences along the directions."""
+    values = np.tile(point.values, (len(free), 1))
+    values[:, list(free)] += along.structure.T
+    back = np.linalg.inv(along.structure)
+
+    def of_trial(i: int) -> Sensitivity:
+        nuisances, follow, spread = point.nuisances[i], along.following[i], along.spread[i]
+        both = zip(values, nuisances + follow.T, strict=True)
+        alone = ((point.values, nuisances + step) for step in np.diag(spread))
+        changes = problem.changes(i, (point.values, nuisances), [*both, *alone])
+        own = changes[:, len(free) :] / spread
+        return Sensitivity.of((changes[:, : len(free)] - own @ follow) @ back, own)
+
+    return in_parallel(of_trial, range(len(problem.trials)))

@@ -1,0 +1,228 @@
+"""Bounded Levenberg-Marquardt for a `Problem`: the structure's vector and every trial's nuisances together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from threadpoolctl import ThreadpoolController
+
+from lacuna.estimation.problem import Point, Problem, Steps, in_parallel
+from lacuna.estimation.sensitivity import Sensitivity
+
+_blas = ThreadpoolController()  # linear algebra keeps to one thread: the cores are shared among trials
+ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
+RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
+_NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
+_REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
+_LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
+_TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
+_FORETOLD = 0.5  # of what it promised: a small step that kept so much of it ends the search with old derivatives too
+_OLDEST = 8  # steps that derivatives serve at most
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where a minimisation ended: cost is minus the log posterior; `normal` the Gauss-Newton matrix, shape
+    (P, P), of the free parameters with the nuisances eliminated, in the order of `free`."""
+
+    point: Point
+    cost: float
+    converged: bool
+    iterations: int
+    free: tuple[int, ...]
+    normal: np.ndarray
+    sensitivities: tuple[Sensitivity, ...]
+
+    @property
+    def jacobians(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each trial's residuals by the free parameters and by its nuisances, shapes (n, P) and (n, q)."""
+        return [s.dense() for s in self.sensitivities]
+
+
+@dataclass
+class _Linearised:
+    """Blocks of the Gauss-Newton system: structure first, then the trials' nuisances one after the other."""
+
+    normal: np.ndarray
+    gradient: np.ndarray
+
+
+def cost_of(problem: Problem, point: Point) -> float:
+    return 0.5 * sum(float(r @ r) for r in problem.residuals(point)) + problem.prior_cost(point)
+
+
+@_blas.wrap(limits=1, user_api="blas")
+def solve(
+    problem: Problem,
+    start: Point,
+    *,
+    free: Sequence[int] | None = None,
+    max_iterations: int = 20,
+    sensitivities: Sequence[Sensitivity] | None = None,
+    relative: float = RELATIVE,
+) -> Solution:
+    """Minimise the cost from `start` over the parameters `free` (indices; default all) and all nuisances.
+
+    Derivatives are taken anew only where the last ones, corrected after every step by what it showed (Broyden
+    1965), no longer predict what a step does. With `sensitivities` given (of `free`, from somewhere near) they are
+    never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
+    """
+    free = tuple(range(len(problem.structure.names)) if free is None else free)
+    lower, upper, scale = _limits(problem, start, free)
+    point = _allowed(problem, _unpack(start, free, np.clip(_pack(start, free), lower, upper)))
+    x = _pack(point, free)
+    residuals = problem.residuals(point)
+    cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
+    damping, converged, iteration = _LAMBDA_START, False, 0
+    steps = problem.first_steps()
+    keep = sensitivities is not None
+    if sensitivities is None:
+        sensitivities = _sensitivities(problem, point, free, steps)
+    age = 0  # steps since the derivatives were taken
+    while iteration < max_iterations:
+        iteration += 1
+        system = _linearise(problem, point, free, residuals, sensitivities)
+        accepted = False
+        lower, upper, _ = _limits(problem, point, free)
+        while damping < _LAMBDA_MOST:
+            reach = _REACH * scale
+            step, promise = _step(system, x, np.maximum(lower, x - reach), np.minimum(upper, x + reach), scale, damping)
+            if promise < max(ENOUGH, relative * cost):
+                break
+            trial_point = _allowed(problem, _unpack(point, free, x + step))
+            step = _pack(trial_point, free) - x
+            trial_residuals = problem.residuals(trial_point)
+            trial_cost = 0.5 * sum(float(r @ r) for r in trial_residuals) + problem.prior_cost(trial_point)
+            ratio = (cost - trial_cost) / promise
+            if trial_cost < cost:
+                accepted = True
+                damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
+                break
+            damping = max(damping, 1e-6) * 8
+            if age and not keep:
+                break
+        if accepted:
+            gain = cost - trial_cost
+            corrected = _corrected(sensitivities, step, scale, residuals, trial_residuals, len(free))
+            x, point, residuals, cost = x + step, trial_point, trial_residuals, trial_cost
+            enough = gain < max(ENOUGH, relative * cost)
+            if keep or (ratio > _TRUSTED and age < _OLDEST and not enough):
+                sensitivities, age = corrected, age + 1
+                continue
+            if enough and (age == 0 or ratio > _FORETOLD):
+                converged = True
+                break
+        elif age == 0:
+            converged = promise < max(ENOUGH, relative * cost)
+            break
+        if keep:
+            break
+        steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
+        sensitivities, age = _sensitivities(problem, point, free, steps), 0
+    system = _linearise(problem, point, free, residuals, sensitivities)
+    return Solution(point, cost, converged, iteration, free, _eliminate(system.normal, len(free)), tuple(sensitivities))
+
+
+def _sensitivities(problem: Problem, point: Point, free, steps: Steps) -> tuple[Sensitivity, ...]:
+    return tuple(in_parallel(lambda block: Sensitivity.of(*block), problem.jacobians(point, free, steps)))
+
+
+def _corrected(sensitivities, step, scale, before, after, p: int) -> tuple[Sensitivity, ...]:
+    found, at = [], p
+    for one, old, new in zip(sensitivities, before, after, strict=True):
+        q = one.gram.shape[0] - p
+        own = slice(at, at + q)
+        both = [np.concatenate([v[:p], v[own]]) for v in (step, scale)]
+        found.append(one.corrected(*both, new - old))
+        at += q
+    return tuple(found)
+
+
+def _allowed(problem: Problem, point: Point) -> Point:
+    return Point(problem.structure.lifted(point.values), point.nuisances)
+
+
+def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    lower, upper = problem.structure.bounds(point.values)
+    scale = problem.structure.scales()
+    nuisances = [p for ps in problem.nuisances for p in ps]
+    return (
+        np.concatenate([lower[list(free)], [max(p.lower, p.value - _NUISANCE_SDS * p.step_scale) for p in nuisances]]),
+        np.concatenate([upper[list(free)], [min(p.upper, p.value + _NUISANCE_SDS * p.step_scale) for p in nuisances]]),
+        np.concatenate([scale[list(free)], [p.step_scale for p in nuisances]]),
+    )
+
+
+def _pack(point: Point, free: tuple[int, ...]) -> np.ndarray:
+    return np.concatenate([point.values[list(free)], *point.nuisances])
+
+
+def _unpack(point: Point, free: tuple[int, ...], x: np.ndarray) -> Point:
+    values = point.values.copy()
+    values[list(free)] = x[: len(free)]
+    nuisances, at = [], len(free)
+    for old in point.nuisances:
+        nuisances.append(x[at : at + len(old)])
+        at += len(old)
+    return Point(values, tuple(nuisances))
+
+
+def _linearise(problem, point, free, residuals, sensitivities) -> _Linearised:
+    p = len(free)
+    size = p + sum(len(n) for n in point.nuisances)
+    normal, gradient = np.zeros((size, size)), np.zeros(size)
+    prior = problem.prior_precision
+    normal[:p, :p] = prior[np.ix_(free, free)]
+    gradient[:p] = (prior @ problem.prior_shift(point))[list(free)]
+    gradients = in_parallel(lambda pair: pair[1].gradient(pair[0]), zip(residuals, sensitivities, strict=True))
+    at = p
+    for one, change, nuisance, parameters in zip(
+        sensitivities, gradients, point.nuisances, problem.nuisances, strict=True
+    ):
+        q = len(nuisance)
+        own = slice(at, at + q)
+        normal[:p, :p] += one.gram[:p, :p]
+        gradient[:p] += change[:p]
+        if q:
+            spread = np.array([n.step_scale for n in parameters])
+            means = np.array([n.value for n in parameters])
+            normal[:p, own] = one.gram[:p, p:]
+            normal[own, :p] = one.gram[p:, :p]
+            normal[own, own] = one.gram[p:, p:] + np.diag(spread**-2.0)
+            gradient[own] = change[p:] + (nuisance - means) / spread**2
+        at += q
+    return _Linearised(normal, gradient)
+
+
+def _step(system, x, lower, upper, scale, damping) -> tuple[np.ndarray, float]:
+    """A damped step within the bounds and the decrease of the quadratic model that it promises."""
+    diagonal = np.diag(system.normal)
+    ridge = damping * np.maximum(diagonal, 1e-6 / scale**2) + 1e-9 / scale**2
+    stopped = np.zeros(len(x), bool)
+    step = np.zeros(len(x))
+    for _ in range(8):  # those that would cross a bound stop there, the others are solved again
+        active = ~stopped
+        if not active.any():
+            break
+        units = scale[active]
+        matrix = (system.normal[np.ix_(active, active)] + np.diag(ridge[active])) * np.outer(units, units)
+        push = -system.gradient[active] - system.normal[np.ix_(active, stopped)] @ step[stopped]
+        step[active] = units * np.linalg.lstsq(matrix, push * units, rcond=1e-14)[0]
+        crossing = active & ((x + step < lower) | (x + step > upper))
+        if not crossing.any():
+            break
+        step[crossing] = np.clip(x + step, lower, upper)[crossing] - x[crossing]
+        stopped |= crossing
+    step = np.clip(x + step, lower, upper) - x
+    promise = -(system.gradient @ step + 0.5 * step @ system.normal @ step)
+    return step, float(promise)
+
+
+def _eliminate(normal: np.ndarray, p: int) -> np.ndarray:
+    """The normal matrix of the first p unknowns with the others marginalised (Schur complement)."""
+    if normal.shape[0] == p:
+        return normal.copy()
+    rest = normal[p:, p:]
+    return normal[:p, :p] - normal[:p, p:] @ np.linalg.solve(rest, normal[p:, :p])

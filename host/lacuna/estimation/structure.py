@@ -1,0 +1,151 @@
+"""What is fitted: the base model, some effects of the library, and curves learnt at some sites, as one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from lacuna.system import Correction, CorrectionSite, Parameter, System, Theta, Trial
+
+_TABLE_INTERVALS = 64  # at least
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The base model of a system plus `effects` plus corrections at `sites`; the order of the fitted vector
+    is base, effects, corrections."""
+
+    system: System
+    effects: tuple[str, ...] = ()
+    sites: tuple[str, ...] = ()
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        found = list(self.system.parameters)
+        for name in self.effects:
+            effect = self.system.effects[name]
+            found += [replace(p, name=effect.full_name(p)) for p in effect.parameters]
+        for name in self.sites:
+            found += _knot_parameters(self.system.correction_sites[name])
+        return tuple(found)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        """What varies from run to run, with the effects' own parameters of this trial last."""
+        return (*self.system.nuisances(trial), *self.own(trial))
+
+    def own(self, trial: Trial) -> tuple[Parameter, ...]:
+        """The effects' parameters of which this trial has its own value."""
+        return tuple(
+            replace(p, name=effect.full_name(p))
+            for effect in (self.system.effects[name] for name in self.effects)
+            if not effect.experiments or trial.experiment in effect.experiments
+            for p in effect.own
+        )
+
+    @property
+    def base_size(self) -> int:
+        return len(self.system.parameters)
+
+    def start(self) -> np.ndarray:
+        """Start of the base, effects absent (their size at its null, other parameters typical), corrections zero."""
+        values = self.theta(np.array([p.value for p in self.parameters]))
+        for name in self.effects:
+            effect = self.system.effects[name]
+            values |= dict.fromkeys(effect.size_names, effect.absent)
+        return self.values(values)
+
+    def prior_mean(self) -> np.ndarray:
+        return np.array([p.value for p in self.parameters])
+
+    def bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the parameters lie between, the others being as in `values`."""
+        lower, upper = np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
+        for index, floor in self.ordered:
+            lower[index] = max(lower[index], values[floor])
+        return lower, upper
+
+    def lifted(self, values: np.ndarray) -> np.ndarray:
+        """`values` with those raised that are below the one that they cannot be below."""
+        values = values.copy()
+        for index, floor in self.ordered:
+            values[index] = max(values[index], values[floor])
+        return values
+
+    @cached_property
+    def ordered(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of indices: the first parameter cannot be below the second."""
+        pairs = [(p.name, p.at_least) for p in self.parameters if p.at_least in self.names]
+        return tuple((self.names.index(name), self.names.index(floor)) for name, floor in pairs)
+
+    def scales(self) -> np.ndarray:
+        return np.array([p.step_scale for p in self.parameters])
+
+    def theta(self, values: np.ndarray) -> dict[str, float]:
+        return dict(zip(self.names, map(float, values), strict=True))
+
+    def values(self, theta: Theta) -> np.ndarray:
+        """The vector for `theta`; what it lacks stands at the start."""
+        if not self.names:
+            return np.zeros(0)
+        return np.array([theta.get(p.name, p.value) for p in self.parameters])
+
+    def corrections(self, theta: Theta) -> tuple[Correction, ...]:
+        """The learnt curves, knots interpolated by a natural cubic spline onto a uniform table."""
+        return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
+
+    def prior_precision(self) -> np.ndarray:
+        """Precision of the prior around the parameters' starts, shape (P, P): what was known of each, and for learnt
+        curves knots within 10 scales of zero and bending within 3 scales a knot."""
+        precision = np.diag([p.prior_sd**-2.0 if p.prior_sd else 0.0 for p in self.parameters])
+        for name in self.sites:
+            site = self.system.correction_sites[name]
+            bend = np.diff(np.eye(site.knots), 2, axis=0)
+            block = (np.eye(site.knots) / 10**2 + bend.T @ bend / 3**2) / site.scale**2
+            for row in range(len(site.rows)):
+                at = self.names.index(_knot_name(site, row, 0))
+                precision[at : at + site.knots, at : at + site.knots] = block
+        return precision
+
+    def moves(self, index: int, trial) -> bool:
+        """Whether parameter `index` can change a trial at all."""
+        if index < self.base_size:
+            return self.system.matters(self.names[index], trial)
+        owner = self.names[index].split(".")
+        experiments = (
+            self.system.correction_sites[owner[1]].experiments
+            if owner[0] == "correction"
+            else self.system.effects[owner[0]].experiments
+        )
+        return not experiments or trial.experiment in experiments
+
+
+def _knot_name(site: CorrectionSite, row: int, knot: int) -> str:
+    return f"correction.{site.name}.{row}_{knot}"
+
+
+def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
+    far = 50 * site.scale
+    return [
+        Parameter(_knot_name(site, row, knot), site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
+        for row in range(len(site.rows))
+        for knot in range(site.knots)
+    ]
+
+
+def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
+    each = max(_TABLE_INTERVALS // (site.knots - 1), 2)  # intervals of the table between two knots
+    at = np.linspace(0, 1, each * (site.knots - 1) + 1)
+    knots = np.linspace(0, 1, site.knots)
+    rows = [
+        CubicSpline(knots, [theta[_knot_name(site, row, k)] for k in range(site.knots)], bc_type="natural")(at)
+        for row in range(len(site.rows))
+    ]
+    return Correction(site.name, np.array(rows))

@@ -1,0 +1,154 @@
+"""How well a fit knows its parameters: intervals, correlations, and what the data cannot determine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.problem import Point
+from lacuna.estimation.solve import solve
+
+_UNDETERMINED = 3.0  # a direction whose standard deviation exceeds this many scales is not determined
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter of a fit. `lower` and `upper` bound its interval; `at_bound` and `implausible` are
+    words of warning: the first that the search was stopped, the second that the model is probably wrong."""
+
+    name: str
+    unit: str
+    value: float
+    sd: float
+    lower: float
+    upper: float
+    at_bound: bool
+    implausible: bool
+    determined: bool
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """`covariance`, shape (P, P), in the order of `estimates`; `undetermined`: combinations of parameters, as
+    {name: weight}, that the data leave open."""
+
+    estimates: tuple[Estimate, ...]
+    covariance: np.ndarray
+    undetermined: tuple[dict[str, float], ...]
+
+    def correlations(self, above: float = 0.9) -> list[tuple[str, str, float]]:
+        """Pairs of parameters more correlated than `above`, strongest first."""
+        sd = np.sqrt(np.diag(self.covariance))
+        matrix = self.covariance / np.outer(sd, sd)
+        names = [e.name for e in self.estimates]
+        pairs = [
+            (names[i], names[j], float(matrix[i, j]))
+            for i in range(len(names))
+            for j in range(i)
+            if abs(matrix[i, j]) > above
+        ]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+
+def uncertainty(fitted: Fit, *, confidence: float = 0.9, dispersion: float | None = None) -> Uncertainty:
+    """Quadratic intervals of all fitted parameters.
+
+    `dispersion` inflates the covariance where the residual exceeds the floor; by default it is the mean
+    weighted square residual, at least 1, so that a model that does not fit does not claim to know its
+    parameters well.
+    """
+    structure, solution = fitted.structure, fitted.solution
+    scales = structure.scales()[list(solution.free)]
+    normal = solution.normal * np.outer(scales, scales)
+    values, vectors = np.linalg.eigh(0.5 * (normal + normal.T))
+    floor = _UNDETERMINED**-2.0
+    open_ = values < floor
+    inverse = (vectors / np.maximum(values, 1e-6)) @ vectors.T
+    dispersion = _dispersion(fitted) if dispersion is None else dispersion
+    covariance = dispersion * inverse * np.outer(scales, scales)
+    half = norm.ppf(0.5 + confidence / 2)
+    loose = (vectors[:, open_] ** 2).sum(axis=1) > 0.1
+    at_bound = fitted.at_bound
+    estimates = []
+    for k, index in enumerate(solution.free):
+        parameter = structure.parameters[index]
+        value, sd = float(solution.point.values[index]), float(np.sqrt(covariance[k, k]))
+        sane = parameter.plausible or (-np.inf, np.inf)
+        estimates.append(
+            Estimate(
+                parameter.name,
+                parameter.unit,
+                value,
+                sd,
+                max(parameter.lower, value - half * sd),
+                min(parameter.upper, value + half * sd),
+                at_bound=bool(at_bound[k]),
+                implausible=not sane[0] <= value <= sane[1],
+                determined=not bool(loose[k]),
+            )
+        )
+    names = [structure.names[i] for i in solution.free]
+    undetermined = tuple(
+        {n: round(float(w), 3) for n, w in zip(names, vectors[:, k], strict=True) if abs(w) > 0.2}
+        for k in np.flatnonzero(open_)
+    )
+    return Uncertainty(tuple(estimates), covariance, undetermined)
+
+
+def profile_interval(
+    fitted: Fit, name: str, *, confidence: float = 0.9, max_iterations: int = 8
+) -> tuple[float, float]:
+    """Profile-likelihood interval of one parameter: how far it can move, all others refitted, before the
+    likelihood ratio forbids it. Costs about 10 refits; for parameters whose cost is not a parabola."""
+    structure, solution = fitted.structure, fitted.solution
+    index = structure.names.index(name)
+    position = solution.free.index(index)
+    limit = 0.5 * chi2.ppf(confidence, 1) * _dispersion(fitted)
+    marginal = np.linalg.pinv(solution.normal, hermitian=True)[position, position]
+    sd = float(np.sqrt(max(marginal, 1e-12 * structure.scales()[index] ** 2)))
+    others = tuple(i for i in solution.free if i != index)
+    parameter = structure.parameters[index]
+    ends = []
+    for sign, bound in ((-1, parameter.lower), (1, parameter.upper)):
+        ends.append(_walk_out(fitted, index, others, sign * sd, bound, limit, max_iterations))
+    return ends[0], ends[1]
+
+
+def _walk_out(fitted, index, others, stride, bound, limit, max_iterations) -> float:
+    """Step outwards until the cost has risen by `limit`, then interpolate the square root of the rise,
+    which is straight where the cost is a parabola."""
+    here, rise, point = float(fitted.solution.point.values[index]), 0.0, fitted.solution.point
+    for _ in range(8):
+        ahead = here + stride
+        ahead = min(ahead, bound) if stride > 0 else max(ahead, bound)
+        moved = point.values.copy()
+        moved[index] = ahead
+        solution = solve(fitted.problem, Point(moved, point.nuisances), free=others, max_iterations=max_iterations)
+        next_rise = max(solution.cost - fitted.cost, rise + 1e-12)
+        if next_rise >= limit:
+            share = (np.sqrt(limit) - np.sqrt(rise)) / (np.sqrt(next_rise) - np.sqrt(rise))
+            return float(here + share * (ahead - here))
+        if ahead == bound:
+            return bound
+        here, rise, point = ahead, next_rise, solution.point
+    return here
+
+
+def effective_samples(fitted: Fit) -> float:
+    """Independent pieces of information in the fitted trials."""
+    floor = fitted.problem.floor
+    return sum(
+        np.isfinite(v).sum() / floor.samples_per_piece(t, c)
+        for t in fitted.problem.trials
+        for c, v in t.channels.items()
+    )
+
+
+def _dispersion(fitted: Fit) -> float:
+    residuals: Sequence[np.ndarray] = fitted.problem.residuals(fitted.solution.point)
+    freedom = max(1.0, effective_samples(fitted) - len(fitted.solution.free))
+    return max(1.0, sum(float(r @ r) for r in residuals) / freedom)

@@ -1,0 +1,250 @@
+"""What a system has to say about itself so that it can be fitted and diagnosed.
+
+A `System` is a model with named parameters, a library of effects that the model may lack, and trials:
+measured records with the experiment that made them. The engine knows nothing else; the robot is one system,
+`docs/adding-your-own-system.md` shows another.
+
+Every parameter of the base model has a plain name (`body_damping_Ns_m`), every parameter of an effect the
+name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+Theta = Mapping[str, float]
+Channels = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number to be estimated.
+
+    `value` is where the search starts; `lower` and `upper` bound it. `plausible` is the narrower range in
+    which a sane value lies (None: nothing is known): a fit that leaves it is evidence against the model,
+    not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
+    a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
+    deviation of its spread. `prior_sd`: standard deviation of what was known about it beforehand, around
+    `value`; None: nothing was. `at_least` names another parameter that it cannot be below. `elsewhere`: values at
+    which fits from afar begin as well, where trials that isolate the parameter fit at several places alike.
+    """
+
+    name: str
+    unit: str
+    value: float
+    lower: float
+    upper: float
+    plausible: tuple[float, float] | None = None
+    scale: float | None = None
+    source: str = ""
+    prior_sd: float | None = None
+    at_least: str | None = None
+    elsewhere: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.lower < self.upper:
+            raise ValueError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
+        if not self.lower <= self.value <= self.upper:
+            raise ValueError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
+
+    @property
+    def step_scale(self) -> float:
+        """`scale`, or where none is given a tenth of |value|, or of the range for a value of 0."""
+        if self.scale is not None:
+            return self.scale
+        return 0.1 * (abs(self.value) or min(self.upper - self.lower, 1e6))
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Something real that the base model leaves out.
+
+    The first `sizes` of `parameters` size the effect: it vanishes where all of them equal `absent` (0
+    unless said otherwise); the others only shape it. They have local names (`force_N`); in `theta` they
+    appear as `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits begin at the typical
+    sizes times each of `start_factors` (and with the other sign, where the bounds allow it). `enters` names
+    the term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it
+    can show at all (empty: all). `own` are parameters that every trial has its own value of (a phase): they
+    are fitted trial by trial, from the best of several values over their range. `frequency` names the
+    parameter that is one, in Hz: fits begin at the peaks of the residual's spectrum, since from anywhere else
+    they would not find it.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    enters: str
+    experiments: tuple[str, ...] = ()
+    confusable_with: tuple[str, ...] = ()
+    equation: str = ""
+    source: str = ""
+    sizes: int = 1
+    absent: float = 0.0
+    start_factors: tuple[float, ...] = (0.1, 0.4, 1.2)
+    own: tuple[Parameter, ...] = ()
+    frequency: str | None = None
+
+    def full_name(self, parameter: Parameter) -> str:
+        return f"{self.name}.{parameter.name}"
+
+    @property
+    def size_names(self) -> tuple[str, ...]:
+        """The full names of the parameters that size the effect."""
+        return tuple(self.full_name(p) for p in self.parameters[: self.sizes])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One measured record.
+
+    `channels` maps a channel's name to its samples, shape (n,), unit in the name; NaN where a sample is
+    missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise
+    floor comes from them. `session_order` is the trial's place in the day, None if not known. `payload` is
+    the system's own.
+    """
+
+    name: str
+    experiment: str
+    condition: Hashable
+    time_s: np.ndarray
+    channels: Channels
+    session_order: int | None = None
+    payload: Any = None
+
+
+@dataclass(frozen=True)
+class CorrectionSite:
+    """A term of an equation that may be replaced by "the model's term plus a curve learnt from data".
+
+    The curve is a function of `variable` between `lower` and `upper` (constant beyond), a spline through as many
+    `knots`; one curve for each of `rows`, where it differs by direction, actuator or the like. `scale` is the change of
+    the term that matters, in `unit`. Example: site `body_spring`, term "force of the body's spring", variable
+    "displacement (m)", unit N.
+    """
+
+    name: str
+    term: str
+    variable: str
+    unit: str
+    lower: float
+    upper: float
+    scale: float
+    rows: tuple[str, ...] = ("",)
+    experiments: tuple[str, ...] = ()
+    knots: int = 9
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A learnt curve at a site: `table` holds its values on a uniform grid from the site's lower to its
+    upper end.
+
+    Shape (rows of the site, n). Interpolate linearly.
+    """
+
+    site: str
+    table: np.ndarray
+
+
+@dataclass(frozen=True)
+class CandidateExperiment:
+    """An experiment that could be run next: `trial` is what `predict` gets; its channels hold NaN, one for
+    each sample that would be taken. `settings` is what a person or a rig needs to run it."""
+
+    experiment: str
+    settings: Mapping[str, Any]
+    trial: Trial
+
+
+class System(Protocol):
+    """Derive from this class and fill in the first five; the rest have defaults that say "nothing special".
+
+    `predict` is called from several threads at once: it must not change the system, and is fast when it
+    releases the GIL.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]  # of the base model, those that are to be fitted
+    effects: Mapping[str, Effect]
+    trials: tuple[Trial, ...]
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        """Simulate a trial freely (from its initial state and inputs, never from measured outputs).
+
+        `theta` holds every base parameter, those of the active `effects`, and this trial's nuisances under
+        their own names. Returns the same channels and shapes as `trial.channels`; NaN where the simulation
+        failed. `coarse` allows a cheaper simulation, good enough for derivatives; otherwise the
+        integrator's error must be well under the noise, or it will be taken for structure.
+        """
+        ...
+
+    def predict_many(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Sequence[Correction]] = (),
+        alike: bool = False,
+    ) -> list[Channels]:
+        """`predict` for each of `thetas`, with its own `corrections` where there are some. Derive it where simulating
+        many at once is cheaper. `alike`: all are near the first and are to be compared with it, as for derivatives; so
+        let errors of the integrator be alike, too, where that can be had."""
+        corrections = corrections or [()] * len(thetas)
+        return [
+            self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)
+            for theta, learnt in zip(thetas, corrections, strict=True)
+        ]
+
+    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+        """Named quantities, shape (n,) each, on which a residual may depend: "displacement", "direction of
+        motion", "velocity", "command", "time since the last switch", "position in the pipe" ..."""
+        return {}
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        """What varies from run to run in this trial: fitted for each trial, with a Gaussian prior of mean
+        `value` and standard deviation `scale`."""
+        return ()
+
+    def matters(self, parameter: str, trial: Trial) -> bool:
+        """False if this base parameter cannot change this trial: saves a simulation per derivative."""
+        return True
+
+    def isolates(self, trial: Trial) -> bool:
+        """Whether a trial shows a few parameters by themselves. Fits from afar begin with such trials: in one where
+        everything acts together, and small errors add up, they would lose their way."""
+        return True
+
+    def spare(self) -> Collection[tuple[str, Hashable]]:
+        """(experiment, condition) of trials that are never fitted: explanations are judged by how well they predict
+        them. Choose conditions between others, so that what is fitted still shows every parameter."""
+        return ()
+
+    def accuracy(self, experiment: str, channel: str) -> float:
+        """RMS error, in the channel's unit, up to which a prediction is good enough whatever the noise is. 0: only the
+        noise counts."""
+        return 0.0
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound.
+        0: not known."""
+        return 0.0
+
+    @property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        return {}
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return ()

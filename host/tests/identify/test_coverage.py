@@ -1,0 +1,137 @@
+"""Do 90 % intervals contain the truth nine times in ten? On data of the virtual robot, whose equations are the paper's
+but whose code is not the model's. A set is a day at the bench: a specimen of its own, with its own stiffness curves,
+parameters some percent off the nominal ones where the fit starts, and noise.
+
+`pytest -s` prints the tables that docs/characterisation.md shows.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from bifa.data import Dataset, Trial
+from bifa.identify.identification import Identification, identify
+from bifa.pipe_robot.unmeasured import PRIOR_SD
+from virtual_robot import gait
+from virtual_robot.sealed import specimen
+from virtual_robot.trials import Lab, Plan
+
+SETS = 60
+REPEATS = 2
+STEP_S = 9.0  # of a step response, which is at rest afterwards
+KNOWN = (*PRIOR_SD, "supply_positive_psi", "supply_negative_psi")
+
+LARGE = (
+    Plan("static_loading", "static_large_0psi", "body", 0.0, 0.008),
+    Plan("static_loading", "static_large_8.5psi", "body", 8.5, 0.008),
+    Plan("step_response", "step_large_8.5psi", "body", 8.5),
+)
+WHOLE = (
+    *LARGE,
+    Plan("static_loading", "static_small_0psi", "head", 0.0, 0.008),
+    Plan("static_loading", "static_small_8.5psi", "head", 8.5, 0.008),
+    Plan("step_response", "step_small_8.5psi", "head", 8.5),
+    *(Plan("anchor_pull", f"anchor_{psi:g}psi", "head", psi, 0.020) for psi in (0.0, 5.0, 8.5)),
+    Plan("locomotion", "walk_baseline", gait=gait.BASELINE, cycles=2),
+)
+
+
+def measured(plans: Iterable[Plan], seed: int) -> tuple[Dataset, dict[str, float]]:
+    """A day at the bench with a robot whose friction differs by 1 % from run to run; and the robot's parameters."""
+    random = np.random.default_rng(seed)
+    truth, curves = specimen(np.random.default_rng([seed, 1]))
+    lab = Lab(truth, curves)
+    trials = [
+        Trial(f"{plan.name}_{repeat}.csv", columns=lab.run(plan, 0.0, random), repeat=repeat, **plan.entry())
+        for repeat in range(1, REPEATS + 1)
+        for plan in plans
+    ]
+    known = {name: truth[name] for name in KNOWN}
+    return Dataset(path=None, name=f"robot {seed}", known=known, trials=tuple(map(_shortened, trials))), truth
+
+
+def _shortened(trial: Trial) -> Trial:
+    if trial.experiment != "step_response":
+        return trial
+    keep = trial.time_s < STEP_S
+    return replace(trial, columns={name: values[keep] for name, values in trial.columns.items()})
+
+
+@dataclass
+class Coverage:
+    """`scores`: by parameter, how far each set's estimate is from the truth, in its own standard deviations; `hits`:
+    whether its interval contains the truth; `errors`: RMS error over noise floor, the worst channel of each set."""
+
+    scores: dict[str, list[float]]
+    hits: dict[str, list[bool]]
+    errors: list[float]
+
+    @property
+    def share(self) -> float:
+        return float(np.mean(list(self.hits.values())))
+
+    def add(self, found: Identification, truth: dict[str, float]) -> None:
+        for name, interval in found.intervals.items():
+            self.scores.setdefault(name, []).append((interval.value - truth[name]) / interval.sd)
+            self.hits.setdefault(name, []).append(interval.covers(truth[name]))
+        self.errors.append(max(found.error.values()))
+
+    def __str__(self) -> str:
+        lines = [f"{'parameter':22s} {'covered':>8s} {'mean error':>11s} {'its spread':>11s}   [sd]"]
+        for name, scores in self.scores.items():
+            lines.append(
+                f"{name:22s} {np.mean(self.hits[name]):8.2f} {np.mean(scores):11.2f} {np.std(scores, ddof=1):11.2f}"
+            )
+        lines.append(f"{'all':22s} {self.share:8.3f}   of 90 % intervals, {len(self.errors)} data sets")
+        lines.append(f"RMS error over the noise floor, worst channel of the worst set: {max(self.errors):.2f}")
+        return "\n".join(lines)
+
+
+def coverage(plans: Iterable[Plan], seeds: Iterable[int]) -> Coverage:
+    found = Coverage({}, {}, [])
+    for seed in seeds:
+        dataset, truth = measured(plans, seed)
+        found.add(identify(dataset), truth)
+    return found
+
+
+def assert_nine_in_ten(found: Coverage) -> None:
+    """What chance makes of 90 % intervals that are right, once in a thousand on either side: of all of them together,
+    and once in ten thousand too few of one parameter."""
+    count = sum(map(len, found.hits.values()))
+    low, high = binom.ppf((1e-3, 1 - 1e-3), count, 0.9) / count
+    assert low <= found.share <= high
+    for name, hits in found.hits.items():
+        assert sum(hits) >= binom.ppf(1e-4, len(hits), 0.9), name
+
+
+def test_intervals_contain_the_truth_nine_times_in_ten():
+    """The large actuator alone."""
+    found = coverage(LARGE, range(SETS))
+    print(found)
+    assert set(found.hits) == {
+        f"body_{name}" for name in ("damping_Ns_m", "area_N_psi", "alpha_n_per_s", "alpha_s_per_s")
+    }
+    assert_nine_in_ten(found)
+    assert max(found.errors) < 1.1
+
+
+def test_the_error_of_a_whole_day_is_within_a_tenth_of_the_noise_floor():
+    found = identify(measured(WHOLE, 0)[0])
+    for (experiment, channel), error in found.error.items():
+        print(f"{experiment:15s} {channel:21s} {error:.2f}")
+    assert len(found.error) == 11
+    assert max(found.error.values()) < 1.1
+    assert found.fit.solution.converged
+
+
+@pytest.mark.soak
+def test_intervals_of_the_whole_robot_contain_the_truth_nine_times_in_ten():
+    found = coverage(WHOLE, range(SETS))
+    print(found)
+    assert len(found.hits) == 11
+    assert_nine_in_ten(found)
+    assert max(found.errors) < 1.1

@@ -1,0 +1,128 @@
+"""Stiffness and area from static loading, on data whose curve is not the model's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from independent_lab import Lab
+
+from bifa.data import Dataset
+from bifa.identify.static import fit_static
+from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.motion import imposed_motion
+from bifa.pipe_robot.stiffness import fit_stiffness
+from bifa.robot import nominal
+
+
+def bench(lab, actuator, pressures=(0.0, 4.0, 8.0), repeats=3) -> Dataset:
+    trials = [lab.static(actuator, p, repeat=r) for p in pressures for r in range(1, repeats + 1)]
+    trials = tuple(replace(trial, file=f"{i}.csv") for i, trial in enumerate(trials))
+    return Dataset(path=None, name="static", known={}, trials=trials)
+
+
+@pytest.mark.parametrize("actuator", ["large", "small"])
+def test_the_curve_of_an_independent_actuator_comes_back(actuator):
+    lab = Lab().with_seed(5)
+    truth = getattr(lab, actuator)
+    fit = fit_static(bench(lab, actuator), actuator)
+    x = np.linspace(*fit.stiffness.covered_m, 200)
+    error = fit.stiffness.force(x) - [truth.spring(v) for v in x]
+    assert np.abs(error).max() < 0.1  # N, of a noise of 0.12 N a sample
+    assert fit.stiffness.residual_N == pytest.approx(lab.force_noise, rel=0.1)
+    assert fit.area_N_psi.value == pytest.approx(truth.area, rel=5e-4)
+    assert fit.stiffness.unstable_m() == pytest.approx(truth.unstable, abs=2e-5)
+
+
+def test_the_interval_of_the_area_contains_the_truth_as_often_as_it_says():
+    hits = 0
+    draws = 60
+    for seed in range(draws):
+        lab = Lab().with_seed(100 + seed)
+        hits += fit_static(bench(lab, "small", (0.0, 8.0)), "small").area_N_psi.covers(lab.small.area)
+    assert 0.80 <= hits / draws <= 0.99  # 90 % intervals; binomial spread of 60 draws: 4 %
+
+
+@pytest.mark.parametrize("half_width_N", [0.0, 4.0])
+def test_hysteresis_is_averaged_out_and_its_size_reported(half_width_N):
+    curve = nominal().body_stiffness
+    stroke = 0.0538
+    x = np.r_[np.linspace(0, stroke, 900), np.linspace(stroke, 0, 500)]  # the branches have unequal counts
+    loading = np.arange(len(x)) < 900
+    force = curve.force(x) + np.where(loading, half_width_N, -half_width_N)
+    fit = fit_stiffness(x, force, loading)
+    middle = np.linspace(0.001, stroke - 0.001, 100)
+    assert np.abs(fit.force(middle) - curve.force(middle)).max() < 0.02 + 0.02 * half_width_N
+
+
+def test_the_continuation_is_honest_where_the_bare_polynomial_was_off_by_a_third():
+    """Fitted to the static range alone, degree 15 gave -67.6 N at -5 mm where the truth was -104.2 N."""
+    curve = nominal().body_stiffness
+    rng = np.random.default_rng(3)
+    x = np.r_[np.linspace(0, 0.0538, 1350), np.linspace(0.0538, 0, 1350)]
+    rest = np.array([-5.35e-3, 57.27e-3, 57.86e-3])  # under vacuum, at 6.5 psi, at 8.5 psi
+    fit = fit_stiffness(
+        x,
+        curve.force(x) + 0.15 * rng.standard_normal(x.size),
+        np.arange(x.size) < 1350,
+        reach_m=(rest[0], rest[-1]),
+    )
+    outside = np.array([-5e-3, -3e-3, -1e-3, 55e-3, 57e-3])
+    assert (np.abs(fit.force(outside) - curve.force(outside)) < 3 * fit.force_sd(outside)).all()
+    assert (fit.slope(np.linspace(fit.lower_m, 0, 50)) > -1e-6).all()
+
+    pinned = fit.with_equilibria(rest, curve.force(rest), [0.5, 0.5, 0.5])
+    error = pinned.force(outside) - curve.force(outside)
+    assert (np.abs(error) < 3 * pinned.force_sd(outside)).all()
+    assert np.abs(error).max() < 2.0  # N, of 104
+    assert (pinned.force_sd(outside) <= fit.force_sd(outside) + 1e-9).all()
+
+
+def test_shapes_are_a_unit_coordinate_of_the_posterior():
+    fit = fit_static(bench(Lab().with_seed(1), "large", (0.0,), 2), "large").stiffness
+    shapes, told = fit.shapes()
+    assert shapes.T @ shapes == pytest.approx(fit.covariance, rel=1e-6, abs=1e-9)
+    assert 8 <= told.sum() < 16  # the continuation is not told by static loading
+    for kind in (told, ~told):
+        assert (np.diff(np.linalg.norm(shapes[kind], axis=1)) <= 1e-12).all()
+
+
+def test_a_single_pressure_leaves_the_area_open():
+    assert fit_static(bench(Lab().with_seed(1), "large", (0.0,)), "large").area_N_psi is None
+
+
+@pytest.mark.parametrize(("pressures", "names"), [((4.0,), "stiffness curve of the large"), ((), "0 psi")])
+def test_too_little_data_says_which_parameter_cannot_be_had(pressures, names):
+    with pytest.raises(TooLittleDataError, match=names):
+        fit_static(bench(Lab().with_seed(1), "large", pressures), "large")
+
+
+def test_a_static_test_that_did_not_move_is_refused():
+    with pytest.raises(TooLittleDataError, match="moved by"):
+        fit_stiffness(np.full(500, 1e-3), np.zeros(500), np.ones(500, bool))
+
+
+@settings(max_examples=30, deadline=None)
+@given(rate=st.floats(0.5, 20.0), noise=st.floats(0.0, 5e-6), dwell=st.integers(0, 100), seed=st.integers(0, 99))
+def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, seed):
+    half = 50.0 / rate
+    time = np.arange(0.0, 2 * half + dwell * 0.02, 0.02)
+    true = 1e-3 * rate * np.clip(np.minimum(time, 2 * half - (time - dwell * 0.02)), 0, half)
+    measured = true + noise * np.random.default_rng(seed).standard_normal(len(time))
+    smooth, direction = imposed_motion(time, measured)
+    assert np.abs(smooth - true).max() < max(5 * noise, 2e-3 * rate * 0.02)  # two samples' travel at a short rest
+    moving = np.gradient(true, time)
+    clear = (np.abs(moving) > 0.9e-3 * rate) & (np.arange(len(time)) > 30) & (np.arange(len(time)) < len(time) - 30)
+    turn = np.abs(time - half) < 0.3 + dwell * 0.02
+    assert (direction[clear & ~turn] == np.sign(moving[clear & ~turn])).all()
+
+
+def test_the_shipped_curve_and_the_fitted_one_are_the_same_form():
+    """The monomial coefficients go into a model file and give the same forces there."""
+    from bifa.robot.stiffness import StiffnessCurve
+
+    fit = fit_static(bench(Lab().with_seed(2), "small"), "small").stiffness
+    curve = StiffnessCurve(tuple(fit.monomial()), fit.lower_m, fit.upper_m)
+    x = np.linspace(fit.lower_m, fit.upper_m, 300)
+    assert curve.force(x) == pytest.approx(fit.force(x), abs=1e-8)

@@ -1,0 +1,152 @@
+"""Fitting on a system whose truth is known: values, intervals, bounds, floors."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import norm
+from toy import SENSOR_SD_MM, hide
+
+from lacuna.estimation.autocorrelation import correlation_samples
+from lacuna.estimation.fit import fit_base
+from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.solve import solve
+from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import profile_interval, uncertainty
+from lacuna.system import Parameter, System, Trial
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    system = hide({"sensor_gain.gain": 0.0}, seed=1)
+    return fit_base(system, system.trials)
+
+
+def test_residual_of_the_right_model_is_the_floor(fitted):
+    squares = [np.mean(c["position_mm"] ** 2) for c in fitted.scaled_residuals()]
+    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.05)
+
+
+def test_floor_is_the_sensors_noise(fitted):
+    for noise in fitted.problem.floor.channels.values():
+        assert noise.sd == pytest.approx(SENSOR_SD_MM, rel=0.1)
+
+
+def test_intervals_contain_the_truth_and_agree_with_the_profile(fitted):
+    estimates = {e.name: e for e in uncertainty(fitted).estimates}
+    draw = np.random.default_rng(1)  # as `hide` draws its specimen
+    mass = np.exp(0.05 * draw.standard_normal())
+    stiffness = 40 * np.exp(0.05 * draw.standard_normal())
+    for name, truth in (("mass_kg", mass), ("stiffness_N_m", stiffness)):
+        assert abs(estimates[name].value - truth) < 4 * estimates[name].sd
+        assert estimates[name].determined
+    low, high = profile_interval(fitted, "stiffness_N_m")
+    assert high - low == pytest.approx(estimates["stiffness_N_m"].upper - estimates["stiffness_N_m"].lower, rel=0.5)
+
+
+def test_a_parameter_that_the_data_cannot_see_is_said_to_be_undetermined():
+    system = hide({}, seed=2)
+    blind = Structure(system, ("sensor_gain",))
+    floor = estimate_noise(system, system.trials)
+    from lacuna.estimation.fit import fit
+
+    found = uncertainty(fit(blind, system.trials, floor))
+    assert found.undetermined or found.correlations(above=0.99)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3))
+def test_a_fit_never_leaves_its_bounds_nor_gets_worse(shift):
+    system = hide({"coulomb.force_N": 0.1}, seed=3, repeats=1)
+    structure = Structure(system)
+    problem = Problem(structure, system.trials[:2], estimate_noise(system, system.trials))
+    lower, upper = structure.bounds(structure.start())
+    start = np.clip(structure.start() + np.array(shift) * structure.scales(), lower, upper)
+    begun = solve(problem, problem.start(start), max_iterations=0)
+    ended = solve(problem, problem.start(start), max_iterations=3)
+    assert ended.cost <= begun.cost
+    assert np.all(ended.point.values >= lower)
+    assert np.all(ended.point.values <= upper)
+
+
+class Block(System):
+    """A block on a table holds at most `holding_N`, then slides; what slides at once shows no static friction."""
+
+    name, effects = "block on a table", {}
+    parameters = (
+        Parameter("holding_N", "N", 3.0, 0.0, 9.0, scale=0.5, at_least="sliding_N"),
+        Parameter("sliding_N", "N", 3.0, 0.0, 9.0, scale=0.5),
+    )
+
+    def __init__(self, holding_N, sliding_N):
+        draw, self.trials = np.random.default_rng(4), ()
+        for repeat in range(2):
+            trial = Trial(f"pull {repeat}", "pull", "pull", np.linspace(0.0, 1.0, 101), {})
+            force = self.predict({"holding_N": holding_N, "sliding_N": sliding_N}, (), trial)["force_N"]
+            measured = {"force_N": force + 0.05 * draw.standard_normal(101)}
+            self.trials += (Trial(trial.name, "pull", "pull", trial.time_s, measured),)
+
+    def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
+        static = max(theta["holding_N"], theta["sliding_N"])
+        return {"force_N": np.where(trial.time_s < 0.2, static, theta["sliding_N"])}
+
+
+@pytest.mark.parametrize("start", [(0.5, 5.0), (2.0, 2.0), (8.0, 1.0)])
+def test_static_friction_comes_back_from_below_the_kinetic_one(start):
+    system = Block(holding_N=4.0, sliding_N=3.0)
+    problem = Problem(Structure(system), system.trials, estimate_noise(system, system.trials))
+    found = solve(problem, problem.start(np.array(start)))
+    assert found.point.values == pytest.approx([4.0, 3.0], abs=0.05)
+
+
+def test_correlated_noise_counts_for_less():
+    draw = np.random.default_rng(0)
+    white = [draw.standard_normal(2000) for _ in range(4)]
+    coloured = []
+    for trace in white:
+        slow = np.zeros_like(trace)
+        for i in range(1, len(trace)):
+            slow[i] = 0.9 * slow[i - 1] + trace[i]
+        coloured.append(slow)
+    assert correlation_samples(white) == pytest.approx(1.0, abs=0.3)
+    assert correlation_samples(coloured) == pytest.approx(19.0, rel=0.3)  # (1 + 0.9) / (1 - 0.9)
+
+
+def test_a_trace_that_is_offset_as_a_whole_is_one_piece():
+    traces = [np.full(400, sign) for sign in (1.0, -1.0, 1.0)]
+    assert correlation_samples(traces) > 100
+
+
+def test_the_jitter_of_events_is_the_standard_deviation_of_their_times():
+    jitter_s, repeats = 0.02, 30
+    late_s = jitter_s * norm.ppf((np.arange(repeats) + 0.5) / repeats)
+    time_s = np.linspace(0.0, 4.0, 401)
+    draw = np.random.default_rng(7)
+    trials = [
+        Trial(f"rise {k}", "rise", "rise", time_s, {"position_mm": 100 * np.clip(time_s - 1.5 - late, 0, 1)})
+        for k, late in enumerate(late_s)
+    ]
+    for trial in trials:
+        trial.channels["position_mm"] += SENSOR_SD_MM * draw.standard_normal(len(time_s))
+    noise = estimate_noise(hide({}, seed=1), trials).channels["rise", "position_mm"]
+    assert noise.jitter_s == pytest.approx(np.std(late_s, ddof=1), rel=0.05)
+    assert noise.sd == pytest.approx(SENSOR_SD_MM, rel=0.1)
+
+
+def test_jumps_at_slightly_different_times_are_not_noise_of_the_whole_record():
+    system = hide({}, seed=4, repeats=2, sizes=(1.0,))
+    draw = np.random.default_rng(4)
+    for trial in system.trials:
+        late = 3.0 + 0.02 * draw.standard_normal()
+        trial.channels["position_mm"][:] = 50.0 * (trial.time_s > late) + 0.1 * draw.standard_normal(len(trial.time_s))
+    for noise in estimate_noise(system, system.trials).channels.values():
+        assert noise.sd < 1.0
+        assert noise.jitter_s > 0
+
+
+def test_parameters_are_checked():
+    with pytest.raises(ValueError, match="not below"):
+        Parameter("k", "N/m", 1.0, 2.0, 1.0)
+    with pytest.raises(ValueError, match="outside"):
+        Parameter("k", "N/m", 3.0, 0.0, 1.0)

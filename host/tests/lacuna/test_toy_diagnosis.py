@@ -1,0 +1,141 @@
+"""The engine on a small system whose truth is known."""
+
+import json
+
+import numpy as np
+import pytest
+from toy import ToySystem, hide
+
+from lacuna.diagnosis.diagnose import TooLittleDataError, diagnose
+from lacuna.diagnosis.record import as_record
+
+SIZES = {
+    "coulomb": {"coulomb.force_N": 0.1},
+    "delay": {"delay.delay_s": 0.01},
+    "cubic_spring": {"cubic_spring.stiffness_N_m3": 2000.0},
+    "quadratic_drag": {"quadratic_drag.drag_Ns2_m2": 2.0},
+    "asymmetric_friction": {"asymmetric_friction.difference_N": -0.15},
+}
+
+
+@pytest.mark.parametrize("effect", SIZES)
+def test_names_a_hidden_effect_and_its_size(effect):
+    found = diagnose(hide(SIZES[effect], seed=11))
+    assert found.verdict == "identified"
+    assert [e.name for e in found.effects] == [effect]
+    ((name, size),) = SIZES[effect].items()
+    assert found.effects[0].parameters[name.split(".")[1]] == pytest.approx(size, rel=0.1)
+    assert found.after.held_out <= 1.2 * found.floor.held_out
+    assert found.before.held_out > 1.5 * found.after.held_out
+
+
+def test_names_two_effects_together():
+    found = diagnose(hide(SIZES["coulomb"] | SIZES["delay"], seed=12))
+    assert {e.name for e in found.effects} == {"coulomb", "delay"}
+
+
+def test_says_none_on_noise_of_any_colour():
+    for seed, correlation in ((20, 0.0), (21, 0.9)):
+        found = diagnose(hide({}, seed=seed, noise_correlation=correlation))
+        assert found.verdict == "none", found.signature.text
+        assert found.effects == ()
+
+
+def test_an_effect_that_the_base_absorbs_is_not_named():
+    found = diagnose(hide({"sensor_gain.gain": 0.05}, seed=13))
+    assert found.verdict == "none"
+
+
+@pytest.mark.parametrize("withheld", ["delay", "cubic_spring"])
+def test_says_unexplained_when_the_cause_is_not_in_the_library(withheld):
+    found = diagnose(hide(SIZES[withheld], seed=14, withhold=[withheld]))
+    assert found.verdict == "unexplained"
+    assert found.signature.experiments
+    assert found.effects == ()
+
+
+def test_a_learnt_curve_takes_the_place_of_a_withheld_spring():
+    found = diagnose(hide(SIZES["cubic_spring"], seed=15, withhold=["cubic_spring"]))
+    assert [site.name for site, _ in found.learnt] == ["spring"]
+    gap_before = found.before.held_out - found.floor.held_out
+    assert found.after.held_out - found.floor.held_out < 0.5 * gap_before
+
+
+def test_a_system_without_terms_to_learn_at_learns_nothing(monkeypatch):
+    monkeypatch.setattr(ToySystem, "correction_sites", {})
+    found = diagnose(hide({}, seed=16, repeats=6, drift=0.02))
+    assert found.verdict == "unexplained"
+    assert found.learnt == ()
+
+
+def test_a_drift_over_the_session_is_seen():
+    found = diagnose(hide({}, seed=16, repeats=6, drift=0.02))
+    assert found.verdict == "unexplained"
+    assert "order of the session" in found.signature.depends_on
+
+
+def test_final_trials_inform_nothing():
+    system = hide(SIZES["delay"], seed=17)
+    found = diagnose(system)
+    draw = np.random.default_rng(0)
+    final = {t.name for t in found.split.final}
+    for trial in system.trials:
+        if trial.name in final:
+            trial.channels["position_mm"][:] = draw.standard_normal(len(trial.time_s))
+    again = diagnose(system)
+    assert [e.parameters for e in again.effects] == [e.parameters for e in found.effects]
+
+
+def test_record_has_the_agreed_form():
+    record = json.loads(json.dumps(as_record(diagnose(hide(SIZES["coulomb"], seed=18)))))
+    assert record["format"] == 2
+    assert record["verdict"] == "identified"
+    assert set(record["effects"][0]) == {
+        "name",
+        "form",
+        "parameters",
+        "interval_90",
+        "probability",
+        "share_of_gap",
+        "confusable_with",
+    }
+    assert set(record["error"]) == {"unit", "before", "after", "noise_floor"}
+    assert set(record["error"]["before"]) == {
+        "fitted",
+        "held_out",
+        "held_out_conditions",
+        "by_experiment",
+    }
+    assert set(record["next_experiment"]) == {"separates", "experiment", "settings"}
+    assert set(record["held_out"]) == {"repeats", "conditions"}
+    assert record["held_out"]["repeats"]
+    assert set(record["remainder"]) == {
+        "matters",
+        "share_of_gap",
+        "times_floor",
+        "experiments",
+        "depends_on",
+        "learnt",
+        "text",
+    }
+
+
+def test_too_little_data_is_refused():
+    system = hide({}, seed=19, repeats=1, sizes=(1.0,))
+    with pytest.raises(TooLittleDataError):
+        diagnose(system)
+
+
+def test_a_dask_cluster_comes_to_the_same_verdict():
+    distributed = pytest.importorskip("distributed")
+    from bifa.cluster import cluster
+
+    system = hide(SIZES["coulomb"], seed=11)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as workers,
+        cluster(workers.scheduler_address) as (executor, count),
+    ):
+        there = as_record(diagnose(system, executor=executor))
+    assert count == 2
+    here = as_record(diagnose(system))
+    assert {**there, "seconds": 0} == {**here, "seconds": 0}

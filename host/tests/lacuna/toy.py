@@ -1,0 +1,232 @@
+"""A mass on a spring that hides something: a small system with which the engine can be tried and tested.
+
+    m x'' = u(t - delay) - k x - k3 x^3 - (1 + wobble) b x' - c |x'| x' - f sign(x') - r sin(2 pi x / pitch)
+
+The base model knows m, k and b only; everything else is an effect, of which `hide` puts some into the
+measurements. The ripple `r` is in no library: it plays the part of what nobody thought of. Damping wobbles
+from run to run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from lacuna.system import (
+    CandidateExperiment,
+    Channels,
+    Correction,
+    CorrectionSite,
+    Effect,
+    Parameter,
+    System,
+    Theta,
+    Trial,
+)
+
+SAMPLE_S = 0.01
+STEPS_PER_SAMPLE = 8
+RIPPLE_PITCH_M = 0.06
+WOBBLE_SD = 0.02
+SENSOR_SD_MM = 0.2
+
+_BASE = (
+    Parameter("mass_kg", "kg", 1.0, 0.2, 5.0, plausible=(0.8, 1.25), scale=0.1),
+    Parameter("stiffness_N_m", "N/m", 40.0, 5.0, 200.0, plausible=(30.0, 52.0), scale=4.0),
+    Parameter("damping_Ns_m", "N s/m", 2.0, 0.05, 20.0, plausible=(1.0, 4.0), scale=0.3),
+)
+
+
+def _effect(name: str, parameter: Parameter, enters: str, equation: str, **more) -> Effect:
+    return Effect(name, (parameter,), enters, equation=equation, source="textbook", **more)
+
+
+_EFFECTS = {
+    e.name: e
+    for e in (
+        _effect("coulomb", Parameter("force_N", "N", 0.3, 0.0, 3.0, scale=0.1), "friction", "F = f sign(x')"),
+        _effect(
+            "cubic_spring",
+            Parameter("stiffness_N_m3", "N/m^3", 4000.0, -2e4, 4e4, scale=1000.0),
+            "spring",
+            "F = k3 x^3",
+        ),
+        _effect(
+            "quadratic_drag",
+            Parameter("drag_Ns2_m2", "N s^2/m^2", 4.0, 0.0, 40.0, scale=1.0),
+            "friction",
+            "F = c |x'| x'",
+        ),
+        _effect("delay", Parameter("delay_s", "s", 0.03, 0.0, 0.2, scale=0.01), "input", "u(t - delay)"),
+        _effect("sensor_gain", Parameter("gain", "1", 0.05, -0.3, 0.3, scale=0.02), "sensor", "y = (1 + gain) x"),
+        _effect(
+            "asymmetric_friction",
+            Parameter("difference_N", "N", 0.3, -2.0, 2.0, scale=0.1),
+            "friction",
+            "F = d if x' > 0",
+        ),
+    )
+}
+
+
+@numba.njit(nogil=True, cache=True)
+def _acceleration(x, v, u, p, table, lower, upper):
+    spring = p[1] * x + p[4] * x**3 + p[8] * np.sin(2 * np.pi * x / RIPPLE_PITCH_M)
+    if len(table) > 1:
+        at = min(max((x - lower) / (upper - lower), 0.0), 1.0) * (len(table) - 1)
+        k = min(int(at), len(table) - 2)
+        spring += table[k] + (at - k) * (table[k + 1] - table[k])
+    smooth_sign = np.tanh(v / 2e-3)
+    friction = p[2] * v + p[3] * smooth_sign + p[5] * abs(v) * v + p[7] * 0.5 * (1 + smooth_sign)
+    return (u - spring - friction) / p[0]
+
+
+@numba.njit(nogil=True, cache=True)
+def _simulate(force, p, table, lower, upper):
+    """Position at each sample, m. `p`: mass, stiffness, damping, coulomb, cubic, drag, delay, asymmetry, ripple."""
+    h = SAMPLE_S / STEPS_PER_SAMPLE
+    out = np.empty(len(force))
+    x, v = 0.0, 0.0
+    for i in range(len(force)):
+        out[i] = x
+        for s in range(STEPS_PER_SAMPLE):
+            t = i * SAMPLE_S + s * h - p[6]
+            at = t / SAMPLE_S
+            u = 0.0
+            if at >= 0:
+                k = min(int(at), len(force) - 2)
+                u = force[k] + (at - k) * (force[k + 1] - force[k])
+            a1 = _acceleration(x, v, u, p, table, lower, upper)
+            xm, vm = x + 0.5 * h * v, v + 0.5 * h * a1
+            a2 = _acceleration(xm, vm, u, p, table, lower, upper)
+            x, v = x + h * vm, v + h * a2
+    return out
+
+
+@dataclass(frozen=True)
+class ToySystem(System):
+    """`trials` as measured; `effects` the library on offer."""
+
+    trials: tuple[Trial, ...]
+    effects: Mapping[str, Effect]
+    name: str = "mass on a spring"
+    parameters: tuple[Parameter, ...] = _BASE
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Trial,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        return {"position_mm": _position_mm(theta, trial.payload, corrections)}
+
+    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+        position = prediction["position_mm"]
+        velocity = np.gradient(position, trial.time_s)
+        return {
+            "position": position,
+            "velocity": velocity,
+            "direction of motion": np.sign(velocity),
+            "force": trial.payload,
+        }
+
+    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+        return (Parameter("wobble", "1", 0.0, -0.5, 0.5, scale=WOBBLE_SD),)
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        return SENSOR_SD_MM
+
+    @property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        site = CorrectionSite("spring", "force of the spring", "position (m)", "N", -0.08, 0.08, 0.2, experiments=())
+        return {site.name: site}
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return tuple(
+            CandidateExperiment(
+                experiment,
+                {"force_N": size},
+                _trial(experiment, size, 0, None, np.full(len(_force(experiment, size)), np.nan)),
+            )
+            for experiment in ("steps", "sweep")
+            for size in (0.5, 4.0)
+        )
+
+
+def _position_mm(theta: Theta, force: np.ndarray, corrections: Sequence[Correction] = ()) -> np.ndarray:
+    p = np.array(
+        [
+            theta["mass_kg"],
+            theta["stiffness_N_m"],
+            theta["damping_Ns_m"] * (1 + theta.get("wobble", 0.0)),
+            theta.get("coulomb.force_N", 0.0),
+            theta.get("cubic_spring.stiffness_N_m3", 0.0),
+            theta.get("quadratic_drag.drag_Ns2_m2", 0.0),
+            theta.get("delay.delay_s", 0.0),
+            theta.get("asymmetric_friction.difference_N", 0.0),
+            theta.get("ripple.force_N", 0.0),
+        ]
+    )
+    table = corrections[0].table[0] if corrections else np.zeros(1)
+    return 1e3 * (1 + theta.get("sensor_gain.gain", 0.0)) * _simulate(force, p, table, -0.08, 0.08)
+
+
+def _force(experiment: str, size: float) -> np.ndarray:
+    time = np.arange(0, 6, SAMPLE_S)
+    if experiment == "steps":
+        return size * (((time > 0.5) & (time < 2)).astype(float) - ((time > 3) & (time < 4.5)))
+    return size * np.sin(2 * np.pi * (0.2 + 0.2 * time) * time) * (time > 0.2)
+
+
+def _trial(experiment, size, repeat, order, position_mm) -> Trial:
+    force = _force(experiment, size)
+    return Trial(
+        f"{experiment}_{size:g}N_{repeat}",
+        experiment,
+        size,
+        np.arange(len(force)) * SAMPLE_S,
+        {"position_mm": position_mm},
+        order,
+        force,
+    )
+
+
+def hide(
+    effects: Mapping[str, float],
+    *,
+    seed: int = 0,
+    repeats: int = 3,
+    sizes: Sequence[float] = (1.0, 2.0),
+    withhold: Sequence[str] = (),
+    drift: float = 0.0,
+    noise_correlation: float = 0.0,
+) -> ToySystem:
+    """Measure a mass on a spring that has `effects`, as {full parameter name: size}.
+
+    `withhold` takes effects out of the library that is offered; `drift` is the relative change of the
+    stiffness over the session; `noise_correlation` between neighbouring samples of the sensor's noise.
+    """
+    draw = np.random.default_rng(seed)
+    truth = {
+        "mass_kg": 1.0 * np.exp(0.05 * draw.standard_normal()),
+        "stiffness_N_m": 40 * np.exp(0.05 * draw.standard_normal()),
+        "damping_Ns_m": 2 * np.exp(0.1 * draw.standard_normal()),
+    }
+    plan = [(e, s, r) for r in range(repeats) for e in ("steps", "sweep") for s in sizes]
+    trials = []
+    for order, (experiment, size, repeat) in enumerate(plan):
+        run = truth | dict(effects) | {"wobble": WOBBLE_SD * draw.standard_normal()}
+        run["stiffness_N_m"] *= 1 + drift * order / len(plan)
+        clean = _position_mm(run, _force(experiment, size))
+        noise = SENSOR_SD_MM * draw.standard_normal(len(clean))
+        for i in range(1, len(noise)):
+            noise[i] = noise_correlation * noise[i - 1] + np.sqrt(1 - noise_correlation**2) * noise[i]
+        trials.append(_trial(experiment, size, repeat + 1, order, clean + noise))
+    library = {name: e for name, e in _EFFECTS.items() if name not in withhold}
+    return ToySystem(tuple(trials), library)

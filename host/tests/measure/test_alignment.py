@@ -1,0 +1,124 @@
+"""An instrument's clock is lined up with the Uno's by the mark in the strobe, lost samples and all."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bifa.link.uno import MARK_PAUSE
+from bifa.measure.alignment import AlignmentError, align, align_after_restart
+
+PERIOD_S = 0.01
+MARKED = 4711
+FIRST = MARKED - MARK_PAUSE - 60  # the first sample of the stream
+NUMBERS = np.arange(FIRST, MARKED + 3000)
+STROBES_S = PERIOD_S * NUMBERS
+
+
+def has_strobe(numbers):
+    return (numbers < MARKED - MARK_PAUSE) | (numbers >= MARKED)
+
+
+def instrument(strobes_s, offset_s, drift, jitter_s=0.0, seed=1):
+    random = np.random.default_rng(seed)
+    return (strobes_s - offset_s) / (1 + drift) + jitter_s * random.standard_normal(len(strobes_s))
+
+
+def edges_from(start_s, offset_s=12.0, drift=1e-3, jitter_s=0.0, seed=1):
+    """Edges that an instrument sees which starts at `start_s` of the Uno's clock, and the numbers of their samples."""
+    seen = NUMBERS[has_strobe(NUMBERS) & (start_s <= STROBES_S)]
+    return instrument(PERIOD_S * seen, offset_s, drift, jitter_s, seed), seen
+
+
+def is_paired_rightly(clock, edges_s, numbers, within_s):
+    return np.abs(clock.to_uno(edges_s) - PERIOD_S * numbers).max() < within_s
+
+
+@given(
+    start=st.floats(0.0, 55.0) | st.integers(0, 55),  # samples before the mark's pause at which it starts; on a sample
+    offset_s=st.floats(-1e4, 1e4),
+    drift=st.floats(-5e-3, 5e-3),
+    jitter_s=st.sampled_from([0.0, 2e-5, 3e-4]),
+    seed=st.integers(0, 1000),
+    lost=st.sets(st.integers(0, 2999), max_size=300),
+)
+def test_an_edge_never_pairs_one_off(start, offset_s, drift, jitter_s, seed, lost):
+    edges_s, numbers = edges_from(PERIOD_S * (FIRST + start), offset_s, drift, jitter_s, seed)
+    received = np.delete(np.arange(len(NUMBERS)), sorted(lost))
+    clock = align(edges_s, STROBES_S[received], NUMBERS[received], MARKED)
+    assert is_paired_rightly(clock, edges_s, numbers, 1e-6 + 5 * jitter_s)
+    assert clock.rate == pytest.approx(1 + drift, abs=1e-7 + 0.02 * jitter_s)
+
+
+@settings(deadline=None)
+@given(
+    lost=st.sets(st.integers(0, 3000), max_size=40),
+    start=st.integers(0, 62),
+    drift=st.floats(-5e-3, 5e-3),
+)
+def test_whatever_edges_are_lost_they_pair_rightly_or_a_repeat_is_asked_for(lost, start, drift):
+    edges_s, numbers = edges_from(PERIOD_S * (FIRST + start), drift=drift)
+    keep = np.delete(np.arange(len(edges_s)), sorted(i for i in lost if i < len(edges_s)))
+    beside = {numbers[numbers < MARKED].size - 1, numbers[numbers < MARKED].size}
+    if lost & beside or numbers[0] >= MARKED:
+        with pytest.raises(AlignmentError, match="repeat"):
+            align(edges_s[keep], STROBES_S, NUMBERS, MARKED)
+    else:
+        clock = align(edges_s[keep], STROBES_S, NUMBERS, MARKED)
+        assert is_paired_rightly(clock, edges_s, numbers, 1e-6)
+
+
+def test_edges_after_samples_stopped_and_clocks_of_a_millisecond_are_taken():
+    edges_s, numbers = edges_from(0.0, drift=3e-3)
+    clock = align(np.round(edges_s, 3), STROBES_S[:1500], NUMBERS[:1500], MARKED)
+    assert is_paired_rightly(clock, edges_s, numbers, 2e-4)
+    assert clock.rms_s < 4e-4
+
+
+@pytest.mark.parametrize("beside", [-1, 0])
+def test_an_edge_that_is_lost_beside_the_pause_asks_for_a_repeat(beside):
+    edges_s, numbers = edges_from(0.0)
+    after = int(np.flatnonzero(numbers == MARKED)[0])
+    with pytest.raises(AlignmentError, match=r"longest gap is 12\.0 periods.*repeat"):
+        align(np.delete(edges_s, after + beside), STROBES_S, NUMBERS, MARKED)
+
+
+def test_an_instrument_that_starts_too_late_for_the_mark_asks_for_a_repeat():
+    edges_s, _ = edges_from(PERIOD_S * (MARKED - 5))
+    with pytest.raises(AlignmentError, match=r"longest gap is 1\.0 periods.*repeat"):
+        align(edges_s, STROBES_S, NUMBERS, MARKED)
+
+
+def test_two_pauses_ask_for_a_repeat():
+    edges_s, _ = edges_from(0.0)
+    once_more = np.delete(edges_s, slice(500, 500 + MARK_PAUSE))
+    with pytest.raises(AlignmentError, match=r"2 pauses.*repeat"):
+        align(once_more, STROBES_S, NUMBERS, MARKED)
+
+
+def test_a_restart_is_a_mark_too_and_lost_edges_are_none():
+    numbers = np.arange(1, 900)
+    before_s = np.arange(-4.0037, -1.6, PERIOD_S)
+    edges_s = instrument(np.concatenate([before_s, PERIOD_S * numbers]), 3.0, -2e-3)
+    edges_s = np.delete(edges_s, [len(before_s) + 100, len(before_s) + 101])
+    clock = align_after_restart(edges_s, PERIOD_S * numbers[200:700], numbers[200:700])
+    assert clock.rate == pytest.approx(1 - 2e-3, abs=1e-9)
+    assert clock.offset_s == pytest.approx(3.0, abs=1e-8)
+    with pytest.raises(AlignmentError, match="no pause"):
+        align_after_restart(edges_s[len(before_s) :], PERIOD_S * numbers, numbers)
+
+
+def test_nothing_to_line_up_is_said():
+    with pytest.raises(AlignmentError, match="is D10 wired"):
+        align(np.arange(3) * 0.01, STROBES_S, NUMBERS, MARKED)
+    edges_s, _ = edges_from(0.0)
+    with pytest.raises(AlignmentError, match="did not record at the same time"):
+        align(edges_s, STROBES_S, NUMBERS + 10_000, MARKED)
+    with pytest.raises(AlignmentError, match="are the instrument's times in seconds"):
+        align(1e3 * edges_s, STROBES_S, NUMBERS, MARKED)
+
+
+def test_edges_that_scatter_are_refused():
+    edges_s, _ = edges_from(0.0, jitter_s=2.5e-3)
+    with pytest.raises(AlignmentError, match=r"check the sync wiring|repeat"):
+        align(np.sort(edges_s), STROBES_S, NUMBERS, MARKED)

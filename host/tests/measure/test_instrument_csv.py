@@ -1,0 +1,146 @@
+"""A lab's own instrument: its CSV lined up with the Uno's telemetry, and every way in which that can fail."""
+
+import numpy as np
+import pytest
+
+from bifa.link import Uno
+from bifa.link.uno import MARK_PAUSE
+from bifa.measure.instrument_csv import InstrumentFileError, import_trial
+from bifa.measure.plan import PlannedTrial
+from bifa.rig import open_rig
+
+PULL = PlannedTrial("anchor_pull", None, 8.5, 20.0)
+OFFSET_S, DRIFT = 37.2, 4e-5  # instrument = OFFSET_S + (1 + DRIFT) * (Uno's time)
+RESTART_S = 1.6  # of silence before the Uno's time 0
+MARKED = 130
+
+
+def has_strobe(numbers):
+    return (numbers < MARKED - MARK_PAUSE) | (numbers >= MARKED)
+
+
+def own(uno_s):
+    return OFFSET_S + (1 + DRIFT) * np.asarray(uno_s)
+
+
+@pytest.fixture(params=["marked", "restarted"])
+def files(tmp_path, request):
+    """An instrument that ran through a restart of the Uno: 3 s of edges, silence, 8 s of edges; the pull at 4 s. With a
+    mark in the strobe, or as telemetry was before there were marks."""
+    numbers = np.arange(1, 800)
+    if request.param == "marked":
+        numbers = numbers[has_strobe(numbers)]
+    edges = np.concatenate([np.arange(-3.0 - RESTART_S, -RESTART_S, 0.01), numbers * 0.01])
+    (tmp_path / "pull.sync.csv").write_text("sync_time_s\n" + "\n".join(f"{t:.6f}" for t in own(edges)))
+    machine = np.arange(-2.0, 7.5, 0.02)
+    pulled = 20.0 * np.clip(machine - 4.0, 0.0, 2.0)
+    force = np.minimum(5.0 * pulled, 28.0)
+    write(tmp_path / "pull.csv", {"time_s": own(machine), "displacement_mm": pulled, "force_N": force})
+    uno = np.arange(100, 790) * 0.01
+    pressure = np.where(uno < 5.0, 8.5, 7.5)  # a mark in the Uno's time: 1 s into the pull
+    telemetry = {"time_s": uno, "sequence": np.arange(100, 790)}
+    telemetry |= {f"pressure_{c}_psi": pressure for c in ("body", "head", "tail")}
+    if request.param == "marked":
+        telemetry["strobe"] = has_strobe(telemetry["sequence"])
+    write(tmp_path / "telemetry_1.csv", telemetry)
+    return tmp_path
+
+
+def write(path, columns):
+    rows = zip(*columns.values(), strict=True)
+    path.write_text(",".join(columns) + "\n" + "\n".join(",".join(f"{v:.6f}" for v in row) for row in rows))
+
+
+def test_the_two_records_are_brought_onto_one_clock(files):
+    dataset, clock = import_trial(files / "pull.csv", files, PULL, files / "out")
+    (trial,) = dataset.trials
+    assert clock.rate == pytest.approx(1 / (1 + DRIFT), abs=1e-7)
+    assert clock.rms_s < 1e-5
+    began = trial.time_s[np.flatnonzero(trial.columns["displacement_mm"] > 0.05)[0]]
+    dropped = trial.time_s[np.flatnonzero(trial.columns["pressure_psi"] < 8.0)[0]]
+    assert dropped - began == pytest.approx(1.0, abs=0.021)  # one sample of the machine
+    assert trial.extra["clock_error_s"] < 1e-4
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_a_step_takes_its_commands_from_the_telemetry(files):
+    uno = np.arange(100, 790) * 0.01
+    camera = np.arange(-2.0, 7.9, 0.01)
+    write(files / "cam.csv", {"time_s": own(camera), "displacement_mm": 50.0 * (camera > 3.0)})
+    (files / "pull.sync.csv").rename(files / "cam.sync.csv")
+    telemetry = {"time_s": uno, "sequence": np.arange(100, 790), "command_body": (uno >= 2.5) * 1.0}
+    telemetry |= {f"pressure_{c}_psi": uno for c in ("body", "head", "tail")}
+    telemetry["strobe"] = has_strobe(telemetry["sequence"])
+    write(files / "telemetry_1.csv", telemetry)
+    planned = PlannedTrial("step_response", "large", 8.5)
+    dataset, _ = import_trial(files / "cam.csv", files / "telemetry_1.csv", planned, files / "out")
+    columns = dataset.trials[0].columns
+    switched = columns["time_s"][np.flatnonzero(columns["command"])[0]]
+    moved = columns["time_s"][np.flatnonzero(columns["displacement_mm"] > 25.0)[0]]
+    assert moved - switched == pytest.approx(0.5, abs=0.011)
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "message"),
+    [
+        ("pull.csv", "time_s,displacement_mm\n1,2\n2,3\n3,4\n", "force_N"),
+        ("pull.csv", "time_s,displacement_mm,force_N\n1,2,3\n2,x,4\n3,4,5\n", "line 3, column displacement_mm"),
+        ("pull.csv", "", "lacks the column time_s"),
+        ("pull.csv", "time_s,displacement_mm,force_N\n", "0 samples"),
+        ("pull.csv", "time_s,displacement_mm,force_N\n1,2,3\n2,3,4\n", "do not overlap"),
+        (
+            "pull.sync.csv",
+            "sync_time_s\n" + "\n".join(f"{0.01 * i:.2f}" for i in range(300)),
+            "(no|not show the) pause",
+        ),
+        ("telemetry_1.csv", "time_s,sequence\n1,2\n2,3\n", "pressure_body_psi"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named(files, file, text, message):
+    (files / file).write_text(text)
+    with pytest.raises(InstrumentFileError, match=message):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+    assert not (files / "out").exists()
+
+
+def test_missing_files_are_named(files):
+    (files / "pull.sync.csv").unlink()
+    with pytest.raises(InstrumentFileError, match=r"pull\.sync\.csv"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+@pytest.mark.uno
+def test_the_first_edge_after_a_restart_is_sample_1():
+    with open_rig("virtual") as rig, Uno(rig.transport, rig.clock) as uno:
+        rig.clock.sleep(0.5)
+        rig.instruments.start()
+        rig.clock.sleep(0.3)
+        rig.transport.reset()
+        uno.connect()
+        uno.stream(True)
+        samples = []
+        while not samples or samples[-1].sequence < 200:
+            samples += uno.samples(0.1)
+        edges = rig.instruments.stop()["sync_time_s"]
+        since = edges[np.flatnonzero(np.diff(edges) > 0.015)[-1] + 1 :]
+        stopped_s = rig.clock.now() - uno.clock_relation.offset_s  # on the Uno's clock, to its bound
+        expected = int(np.floor(stopped_s / 0.01))
+        assert samples[0].time_us == samples[0].sequence * 10_000
+        assert uno.clock_relation.bound_s < 0.004
+        assert abs(len(since) - expected) <= (0 if 0.2 < stopped_s / 0.01 % 1 < 0.8 else 1)
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_samples_lost_about_the_mark_ask_for_another_recording(files):
+    lines = (files / "telemetry_1.csv").read_text().splitlines()
+    (files / "telemetry_1.csv").write_text("\n".join(line for line in lines if f",{MARKED}.000000," not in line))
+    with pytest.raises(InstrumentFileError, match=r"lost on the link.*record again"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+def test_edges_that_do_not_fit_the_uno_are_refused(files):
+    rng = np.random.default_rng(0)
+    edges = np.concatenate([np.arange(-5.0, -2.0, 0.01), np.sort(np.arange(1, 800) * 0.01 + 0.008 * rng.random(799))])
+    (files / "pull.sync.csv").write_text("sync_time_s\n" + "\n".join(f"{t:.6f}" for t in own(edges)))
+    with pytest.raises(InstrumentFileError, match=r"pull\.sync\.csv"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")

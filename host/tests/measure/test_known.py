@@ -1,0 +1,44 @@
+"""What a data set says is known comes from the rig or from the person, and from nowhere else."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from bifa.link.units import set_point_psi
+from bifa.measure.known import known_of, parse_known
+from bifa.rig import SerialRig, open_rig
+from bifa.robot.parameters import ParameterError
+
+
+def test_a_serial_port_declares_nothing():
+    assert known_of(SerialRig, {}) == {}
+
+
+def test_what_the_person_measured_comes_before_what_the_rig_declares():
+    rig = SimpleNamespace(known={"head_mass_kg": 0.175, "tail_mass_kg": 0.175})
+    assert known_of(rig, parse_known(["head_mass_kg=0.182"])) == {"head_mass_kg": 0.182, "tail_mass_kg": 0.175}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("head_mass_kg", "NAME=VALUE"),
+        ("head_mass=0.2", "no parameter 'head_mass'; it has head_mass_kg"),
+        ("head_mass_kg=heavy", "must be a number"),
+        ("head_mass_kg=nan", "outside its range 0.02 to 1 kg"),
+        ("head_mass_kg=350", "outside its range 0.02 to 1 kg"),
+    ],
+)
+def test_what_cannot_be_known_is_refused(text, told):
+    with pytest.raises(ParameterError, match=told):
+        parse_known([text])
+
+
+@pytest.mark.uno
+def test_the_virtual_lab_has_weighed_its_own_robot_and_read_its_gauge():
+    with open_rig("virtual", parameters={"head_mass_kg": 0.2}) as rig:
+        assert known_of(rig, {}) == {
+            "head_mass_kg": 0.2,
+            "tail_mass_kg": rig.truth["tail_mass_kg"],
+            "supply_positive_psi": pytest.approx(set_point_psi(8.5), abs=1e-4),
+        }

@@ -1,0 +1,189 @@
+"""Sessions on the virtual bench: the real firmware, instruments with clocks of their own, interruptions."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bifa.data import DatasetError, read_dataset
+from bifa.errors import BifaError
+from bifa.link import Uno
+from bifa.link.uno import PRESSURES_AFTER_S
+from bifa.measure.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
+from bifa.measure.plan import BRISK, EXPERIMENTS, PlannedTrial, session
+from bifa.measure.recording import Recording
+from bifa.measure.session import run_session
+from bifa.rig import open_rig
+
+PLAN = (
+    PlannedTrial("step_response", "small", 8.5),
+    PlannedTrial("static_loading", "small", 4.0, 20.0),
+    PlannedTrial("anchor_pull", None, 8.5, 40.0),
+    PlannedTrial("locomotion", gait=BRISK, cycles=1),
+)
+
+
+def run(rig, folder, trials=PLAN, **more):
+    return run_session(rig, folder, trials, name="a day", known={}, provenance={"by": "a test"}, **more)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench") / "day"
+    with open_rig("virtual", profile="ideal", seed=3) as rig:
+        run(rig, folder)
+        return read_dataset(folder), dict(rig.truth)
+
+
+@pytest.mark.parametrize("planned", PLAN, ids=lambda planned: planned.experiment)
+def test_a_port_without_instruments_is_told_so_before_anything_moves(planned):
+    with pytest.raises(BifaError, match="this port has no instruments"):
+        record_trial(SimpleNamespace(instruments=None), None, planned)
+
+
+@pytest.mark.uno
+def test_every_experiment_is_recorded_as_the_format_wants_it(recorded):
+    dataset, _ = recorded
+    assert [trial.experiment for trial in dataset.trials] == [planned.experiment for planned in PLAN]
+    assert [trial.session_order for trial in dataset.trials] == [1, 2, 3, 4]
+    for trial in dataset.trials:
+        assert trial.rate_hz == pytest.approx(trial.nominal_rate_hz, rel=0.01)
+        assert trial.extra["clock_error_s"] < 1e-4
+
+
+@pytest.mark.uno
+def test_the_set_point_is_noted_as_the_converter_makes_it(recorded):
+    """8.5 psi is 267.8 counts, and the Uno rounds down: a fit that took 8.5 would find a sensor out of calibration."""
+    pull = recorded[0].of("anchor_pull")[0]
+    assert pull.pressure_psi == 8.5
+    assert pull.columns["pressure_psi"].mean() == pytest.approx(pull.extra["set_point_psi"], abs=0.01)
+    assert pull.extra["set_point_psi"] < 8.48
+
+
+@pytest.mark.uno
+def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(recorded):
+    """The actuator snaps when its pressure does: an instrument that was off by a sample would show it."""
+    dataset, _ = recorded
+    step = dataset.of("step_response")[0]
+    switches = step.extra["switch_time_s"]
+    assert switches[1] - switches[0] == pytest.approx(STEP_DOWN_S - STEP_UP_S)
+    changes = step.time_s[np.flatnonzero(np.diff(step.columns["command"])) + 1]
+    assert 0.0 < step.extra["switch_error_s"] <= 0.0026
+    since = changes - switches - PRESSURES_AFTER_S  # the row is the pressures', the command the strobe's before
+    assert ((since >= 0.0) & (since <= 0.0101)).all()
+    rising = (step.time_s > switches[0]) & (step.time_s < switches[1])
+    speed = np.gradient(step.columns["displacement_mm"], step.time_s)
+    snap = step.time_s[rising][np.argmax(speed[rising])]
+    dip = step.time_s[rising][np.argmin(np.gradient(np.gradient(step.columns["pressure_psi"]))[rising])]
+    assert abs(snap - dip) < 0.05
+
+
+@pytest.mark.uno
+def test_a_static_loading_is_the_spring_less_the_pressure_force(recorded):
+    dataset, truth = recorded
+    static = dataset.of("static_loading")[0]
+    mean_force = static.columns["force_N"].mean()
+    assert mean_force == pytest.approx(-truth["small_area_N_psi"] * 4.0, abs=1.5)
+    assert static.columns["displacement_mm"].max() > 29.0
+    assert static.columns["pressure_psi"].mean() == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.uno
+def test_the_same_seed_gives_the_same_bytes(tmp_path):
+    for folder in ("once", "again"):
+        with open_rig("virtual", profile="realistic", seed=5) as rig:
+            run(rig, tmp_path / folder, PLAN[2:])
+    names = sorted(path.name for path in (tmp_path / "once").iterdir())
+    assert len(names) == 3
+    for name in names:
+        assert (tmp_path / "once" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+
+
+@pytest.mark.uno
+def test_an_interrupted_session_goes_on_and_is_never_written_over(tmp_path):
+    plan = PLAN[1:3]
+    with open_rig("virtual", profile="ideal", seed=4) as rig:
+
+        def interrupt(event):
+            if event.number == 2 and event.share > 0.3:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run(rig, tmp_path / "day", plan, on_event=interrupt)
+        rig.clock.sleep(0.01)
+        assert not any(rig.uno.pin(pin) for pin in range(4, 10))  # all six valves
+        assert len(read_dataset(tmp_path / "day.partial").trials) == 1
+        seen = []
+        dataset = run(rig, tmp_path / "day", plan, on_event=seen.append)
+        assert seen[0].skipped
+        assert len(dataset.trials) == 2
+        with pytest.raises(DatasetError, match="never overwritten"):
+            run(rig, tmp_path / "day", plan)
+
+
+def test_a_rig_without_instruments_says_what_to_do():
+    class Bare:
+        instruments = None
+
+    from bifa.measure.recording import Recording
+
+    with pytest.raises(BifaError, match="--instrument"):
+        Recording(Bare(), None)
+
+
+def test_a_session_holds_45_trials_and_spreads_the_repeats():
+    trials = session()
+    assert len(trials) == 45
+    assert len({trial.file for trial in trials}) == 45
+    assert {trial.experiment for trial in trials} == set(EXPERIMENTS)
+    assert [trial.repeat for trial in trials] == sorted(trial.repeat for trial in trials)
+    assert len(session(quick=True)) < 20
+
+
+def first_strobe_s(rig):
+    """When the board's first strobe rises, on the bench's own clock: nobody has counted yet."""
+    rig.instruments.start()
+    clock = rig.instruments._clock
+    rig.clock.sleep(0.05)
+    return true_s(clock, rig.instruments.stop()["sync_time_s"])[0]
+
+
+def true_s(clock, own_s):
+    return clock.start_s + (own_s - clock.offset_s) / (1.0 + clock.drift)
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize("seed", range(4))
+def test_every_edge_is_the_sample_that_the_uno_says(seed):
+    """Ten starts of the instrument a millisecond apart, so that some fall onto a sample; judged by the bench's time."""
+    with open_rig("virtual", profile="realistic", seed=seed) as rig, Uno(rig.transport, rig.clock) as uno:
+        first_s = first_strobe_s(rig)
+        uno_rate = rig.world.clock_hz / 16e6
+        uno.connect()
+        for _ in range(10):
+            rig.clock.sleep(0.001)
+            with Recording(rig, uno) as tape:
+                clock = rig.instruments._clock
+                tape.wait(0.5)
+            edges_s = tape.record["sync_time_s"]
+            truth_s = 0.01 + (true_s(clock, edges_s) - first_s) * uno_rate
+            assert tape.clock.to_uno(edges_s) == pytest.approx(truth_s, abs=2e-4)
+
+
+@pytest.mark.uno
+def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_said():
+    with open_rig("virtual", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
+        stop, tries = rig.instruments.stop, []
+
+        def deaf():
+            record = stop()
+            tries.append(len(record["sync_time_s"]))
+            return record | {"sync_time_s": record["sync_time_s"][30:]}
+
+        rig.instruments.stop = deaf
+        uno.connect()
+        with pytest.raises(
+            BifaError, match=r"anchor_8\.5psi.*3 times over: the sync edges do not show the pause.*repeat"
+        ):
+            record_trial(rig, uno, PLAN[2])
+        assert len(tries) == 3

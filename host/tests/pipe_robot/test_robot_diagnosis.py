@@ -1,0 +1,55 @@
+"""A few of the sealed data sets of `make blind`: the whole trial takes hours, these few some minutes."""
+
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from bifa.data import read_dataset
+from bifa.identify.completed import completed_model
+from bifa.identify.start import prepare
+from lacuna.diagnosis.diagnose import diagnose
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    """Draws a data set of 45 trials; returns its diagnosis and, after the verdict, what the label says."""
+
+    def draw(*options):
+        folder = tmp_path / "set"
+        command = [sys.executable, "-m", "virtual_robot.sealed", "--out", str(folder), *options]
+        subprocess.run(command, check=True)
+        found = diagnose(prepare(read_dataset(folder)))
+        return found, tomllib.loads((tmp_path / "set.sealed.toml").read_text())["effects"]
+
+    return draw
+
+
+def test_finds_nothing_in_a_robot_without_an_effect(sealed):
+    found, _ = sealed("--seed", "41", "--none")
+    assert found.verdict == "none"
+    assert found.after.held_out < 1.1 * found.floor.held_out
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter"),
+    [("hysteresis", "force_N"), ("supply_sag", "resistance_s"), ("choked_flow", "saturation_s_per_psi")],
+)
+def test_names_sizes_and_adds_an_effect_that_nobody_declared(sealed, effect, parameter):
+    found, truth = sealed("--seed", "42", "--effect", effect, "--size", "0.6")
+    assert found.verdict == "identified"
+    assert [e.name for e in found.effects] == [effect]
+    assert found.effects[0].parameters[parameter] == pytest.approx(truth[effect][parameter], rel=0.1)
+    assert found.before.held_out > 1.5 * found.floor.held_out
+    assert found.after.held_out < 1.1 * found.floor.held_out
+    model = completed_model(found.final)
+    assert model.effects[effect][parameter] == pytest.approx(found.effects[0].parameters[parameter], rel=0.02)
+    assert f"{effect}.{parameter}" in model.covariance.names
+
+
+def test_names_both_of_two_effects(sealed):
+    found, truth = sealed("--seed", "4000", "--pair")
+    assert found.verdict == "identified"
+    assert {e.name for e in found.effects} == set(truth)
+    assert found.after.held_out < 1.2 * found.floor.held_out

@@ -1,0 +1,207 @@
+"""The robot as a system of the engine: predictions, what matters where, nuisances, candidates, corrections."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from independent_lab import BASELINE, Lab
+
+from bifa.data import Dataset
+from bifa.identify.start import prepare
+from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.library import engine_effects
+from bifa.robot import ParameterError
+from lacuna.estimation.afar import solve_from_afar
+from lacuna.estimation.fit import spread_starts
+from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.structure import Structure
+from lacuna.system import Correction
+
+
+def numbered(trials) -> tuple:
+    return tuple(replace(trial, file=f"{i:02d}.csv", session_order=i) for i, trial in enumerate(trials))
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return Lab().with_seed(4)
+
+
+@pytest.fixture(scope="module")
+def dataset(lab):
+    trials = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
+    trials += [lab.step(which, 8.5) for which in ("large", "small")]
+    trials += [lab.anchor(p) for p in (0.0, 8.5)]
+    trials += [lab.walk(BASELINE, 8.0)]
+    known = {"head_mass_kg": lab.head_mass, "tail_mass_kg": lab.tail_mass}
+    known |= {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
+    return Dataset(path=None, name="small day", known=known, trials=numbered(trials))
+
+
+@pytest.fixture(scope="module")
+def system(dataset):
+    return prepare(dataset)
+
+
+@pytest.fixture(scope="module")
+def theta(system):
+    return {p.name: p.value for p in system.parameters}
+
+
+def test_statics_alone_give_the_areas(system, theta, lab):
+    assert theta["body_area_N_psi"] == pytest.approx(lab.large.area, rel=0.002)
+    assert theta["small_area_N_psi"] == pytest.approx(lab.small.area, rel=0.002)
+    assert set(system.fitted).isdisjoint({"head_mass_kg", "supply_positive_psi"})  # the lab knows them
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_fit_finds_the_robot_from_anywhere_plausible(system, lab, seed):
+    structure = Structure(system)
+    problem = Problem(structure, system.trials, estimate_noise(system, system.trials))
+    _, start = spread_starts(structure, structure.start(), 2, seed)
+    found = structure.theta(solve_from_afar(problem, start, max_iterations=20, relative=1e-3).point.values)
+    truth = {
+        "body_damping_Ns_m": (lab.large.damping, 0.02),
+        "body_alpha_n_per_s": (lab.large.fast, 0.02),
+        "body_alpha_s_per_s": (lab.large.slow, 0.02),
+        "small_damping_Ns_m": (lab.small.damping, 0.05),
+        "small_alpha_n_per_s": (lab.small.fast, 0.02),
+        "small_alpha_s_per_s": (lab.small.slow, 0.02),
+        "mu_k": (lab.mu_k, 0.05),
+        "wall_offset_m": (lab.wall_offset, 0.02),
+    }
+    for name, (value, tolerance) in truth.items():
+        assert found[name] == pytest.approx(value, rel=tolerance), name
+
+
+def test_predictions_have_the_shape_of_the_measurements(system, theta):
+    for trial in system.trials:
+        prediction = system.predict(theta, (), trial)
+        assert prediction.keys() == trial.channels.keys()
+        for channel, measured in trial.channels.items():
+            assert prediction[channel].shape == measured.shape
+            assert np.isfinite(prediction[channel]).all()
+
+
+def test_what_travelled_to_another_process_predicts_the_same(system, theta):
+    travelled = pickle.loads(pickle.dumps(system))
+    for trial, arrived in zip(system.trials, travelled.trials, strict=True):
+        there = travelled.predict(theta, ("hysteresis",), arrived)
+        for channel, values in system.predict(theta, ("hysteresis",), trial).items():
+            assert np.array_equal(values, there[channel])
+
+
+def test_a_prediction_never_looks_at_what_was_measured(dataset, system, theta):
+    """Outputs replaced by rubbish: the same predictions."""
+    outputs = ("force_N", "pressure", "displacement_head", "displacement_tail")
+    rubbish = []
+    for trial in dataset.trials:
+        hidden = {
+            name: np.zeros_like(values)
+            if name.startswith(outputs) or (name == "displacement_mm" and trial.experiment == "step_response")
+            else values
+            for name, values in trial.columns.items()
+        }
+        rubbish.append(replace(trial, columns=hidden))
+    from bifa.pipe_robot.inputs import inputs_of
+
+    for trial, changed in zip(system.trials, rubbish, strict=True):
+        blind = replace(trial, payload=inputs_of(changed))
+        for channel, values in system.predict(theta, (), trial).items():
+            assert np.array_equal(values, system.predict(theta, (), blind)[channel])
+
+
+def test_what_is_said_not_to_matter_does_not(system, theta):
+    for trial in system.trials:
+        reference = system.predict(theta, (), trial)
+        for parameter in system.parameters:
+            if "_shape_" in parameter.name or system.matters(parameter.name, trial):
+                continue
+            moved = theta | {parameter.name: parameter.value + 0.01 * parameter.step_scale}
+            for channel, values in system.predict(moved, (), trial).items():
+                assert np.allclose(values, reference[channel], atol=1e-6), (parameter.name, trial.name)
+
+
+def test_mu_s_can_be_found_by_derivatives(system, theta):
+    """The peak of a pull lies between samples; a prediction that jumped would have no slope there."""
+    pull = next(t for t in system.trials if t.experiment == "anchor_pull" and t.payload.pressure_psi > 0)
+    slopes = []
+    for mu_s in np.linspace(0.44, 0.52, 41):
+        force = [system.predict(theta | {"mu_s": mu_s + d}, (), pull)["force_N"] for d in (-1e-4, 1e-4)]
+        slopes.append(np.abs(force[1] - force[0]).sum())
+    assert min(slopes) > 0.0
+
+
+@pytest.mark.parametrize("effect", sorted(engine_effects()))
+def test_effects_act_where_they_are_said_to(system, theta, effect):
+    parameters = system.effects[effect].parameters
+    active = theta | {f"{effect}.{p.name}": p.value for p in parameters}
+    for trial in system.trials:
+        without, with_ = system.predict(theta, (), trial), system.predict(active, (effect,), trial)
+        change = max(np.abs(with_[c] - without[c]).max() for c in without)
+        if trial.experiment not in system.effects[effect].experiments:
+            assert change < 1e-2, trial.name  # mm, N or psi: a tenth of the noise
+    shown = [t for t in system.trials if t.experiment in system.effects[effect].experiments]
+    assert any(
+        not np.allclose(system.predict(active, (effect,), t)[c], system.predict(theta, (), t)[c])
+        for t in shown
+        for c in t.channels
+    )
+
+
+def test_repeats_share_a_condition_and_friction_may_wobble(system):
+    nuisances = {t.experiment: [p.name for p in system.nuisances(t)] for t in system.trials}
+    assert nuisances["static_loading"] == []
+    assert nuisances["step_response"] == ["switch_late_s"], "the command column tells it to a sample, nothing else does"
+    assert nuisances["locomotion"] == ["friction_scale"]
+    assert nuisances["anchor_pull"] == ["friction_scale", "slip_late_s"]
+
+
+def test_regressors_have_a_value_for_every_sample(system, theta):
+    for trial in system.trials:
+        named = system.regressors(trial, system.predict(theta, (), trial))
+        assert "time" in named
+        assert "place in the session" in named
+        for name, values in named.items():
+            assert values.shape == trial.time_s.shape, name
+            assert np.isfinite(values).all(), name
+
+
+def test_candidates_can_be_predicted(system, theta):
+    found = {c.experiment for c in system.candidate_experiments()}
+    assert found == {"static_loading", "step_response", "anchor_pull", "locomotion"}
+    for candidate in system.candidate_experiments():
+        assert all(np.isnan(values).all() for values in candidate.trial.channels.values())
+    cheap = next(c for c in system.candidate_experiments() if c.experiment == "anchor_pull")
+    assert all(np.isfinite(v).all() for v in system.predict(theta, (), cheap.trial).values())
+
+
+def test_a_learnt_spring_adds_its_force(system, theta):
+    trial = system.trials[0]
+    site = system.correction_sites["body_spring"]
+    constant = Correction(site.name, np.full((1, 33), 2.5))
+    plain, more = (system.predict(theta, (), trial, corrections=c)["force_N"] for c in ((), (constant,)))
+    assert more - plain == pytest.approx(2.5, abs=1e-9)
+
+
+def test_the_identified_model_predicts_what_the_system_does(system, theta):
+    from bifa.simulate import static_loading
+
+    model = system.model_at(theta)
+    trial = system.trials[0]
+    inputs = trial.payload
+    path = (inputs.displacement_m - model.body_stiffness.contracted_m) * 1e3
+    record = static_loading(model, "large", inputs.time_s, path, inputs.pressure_psi)
+    assert record["force_N"] == pytest.approx(system.predict(theta, (), trial)["force_N"], abs=1e-9)
+
+
+def test_an_empty_data_set_is_refused():
+    with pytest.raises(TooLittleDataError, match="no trials"):
+        prepare(Dataset(path=None, name="empty", known={}, trials=()))
+
+
+def test_knowledge_of_what_the_model_does_not_have_is_refused(dataset):
+    with pytest.raises(ParameterError, match="colour"):
+        prepare(replace(dataset, known=dataset.known | {"colour": 3.0}))
