@@ -1,28 +1,75 @@
-"""A dask cluster as a `concurrent.futures.Executor`, for those who outgrow one machine."""
+"""A dask cluster as a `concurrent.futures.Executor`, for those who outgrow one machine.
+
+Both ends unpickle what the other sends: whoever answers at the address can run code here, and whoever reaches the
+scheduler can run code there. With TLS both have to show a certificate of your own authority.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 
 from bifa.errors import BifaError
+
+HELP = (
+    "Address of a dask scheduler, to use its workers. Both ends run what the other sends (pickle): only one that you "
+    "trust, and over a network only with TLS (tls://...)."
+)
+CA_HELP = "For --dask tls://...: the authority's certificate (PEM) that the cluster's must be signed by."
+CERT_HELP = "For --dask tls://...: the certificate (PEM) that this computer shows."
+KEY_HELP = "For --dask tls://...: the key of --dask-cert."
 
 
 class ClusterError(BifaError):
     """The cluster cannot be used; the text says what to do."""
 
 
+@dataclass(frozen=True)
+class Tls:
+    """The three PEM files that distributed asks for; where all are None, its own configuration counts
+    (`distributed.comm.tls` in dask's YAML files or `DASK_DISTRIBUTED__COMM__TLS__...`)."""
+
+    ca: Path | None = None
+    cert: Path | None = None
+    key: Path | None = None
+
+    def security(self):
+        """As distributed wants it; None leaves it to its configuration. Raises ClusterError."""
+        files = {"--dask-ca": self.ca, "--dask-cert": self.cert, "--dask-key": self.key}
+        given = [name for name, file in files.items() if file is not None]
+        if not given:
+            return None
+        if missing := [name for name in files if name not in given]:
+            raise ClusterError(f"TLS needs {', '.join(files)} together: {', '.join(missing)} is missing")
+        for name, file in files.items():
+            if not file.is_file():
+                raise ClusterError(f"{name} {file}: no such file")
+        from distributed.security import Security
+
+        return Security(
+            tls_ca_file=str(self.ca),
+            tls_client_cert=str(self.cert),
+            tls_client_key=str(self.key),
+            require_encryption=True,
+        )
+
+
 @contextmanager
-def cluster(address: str) -> Iterator[tuple[Executor, int]]:
+def cluster(address: str, tls: Tls = Tls()) -> Iterator[tuple[Executor, int]]:
     """The cluster whose scheduler is at `address`, and how many threads it has. Raises ClusterError."""
     try:
         from distributed import Client
     except ImportError:
         raise ClusterError("--dask needs the package distributed: pip install 'bifa[dask]'") from None
+    security = tls.security()
+    if security is not None and not address.startswith("tls://"):
+        raise ClusterError(f"with --dask-ca, --dask-cert and --dask-key the address begins with tls://, not {address}")
     try:
-        client = Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
+        client = Client(address, timeout="10s", security=security)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:  # also a certificate that does not fit
         raise ClusterError(
             f"no dask scheduler answers at {address}: {error}; start one with `dask scheduler`"
         ) from None

@@ -1,5 +1,7 @@
 """What holds for every test: properties are checked on the same examples every time, and never against the clock."""
 
+import os
+import random
 import signal
 import threading
 from collections.abc import Callable
@@ -20,6 +22,14 @@ if threading.current_thread() is threading.main_thread():
 def figure(record_property) -> Callable[[str], None]:
     """figure("text"): a line shown at the end of the run, whichever process the test ran in."""
     return partial(record_property, "figure")
+
+
+def pytest_collection_modifyitems(items) -> None:
+    """In another order where BIFA_TEST_ORDER is set, to a seed: the files shuffled, and the tests in each."""
+    if seed := os.environ.get("BIFA_TEST_ORDER"):
+        draw = random.Random(seed)
+        of_file = {item.path: draw.random() for item in items}
+        items.sort(key=lambda item: (of_file[item.path], draw.random()))
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

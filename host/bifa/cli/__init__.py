@@ -10,6 +10,7 @@ import sys
 import typer
 
 from bifa.errors import BifaError
+from bifa.printable import printable
 
 app = typer.Typer(
     name="bifa",
@@ -37,5 +38,5 @@ def main() -> None:
         # A rig that another package offers cannot know BifaError; it marks its errors.
         if not isinstance(error, BifaError) and not getattr(error, "for_the_user", False):
             raise
-        typer.echo(f"error: {error}", err=True)
+        typer.echo(f"error: {printable(str(error))}", err=True)
         sys.exit(2)

@@ -21,11 +21,10 @@ def register(app: typer.Typer) -> None:
         A malformed data set ends with status 2 and names file, line and column. What is well-formed but
         doubtful (a clipped sensor, a clock that jumps, missing repeats) is listed as a warning, status 0.
         """
-        from rich.console import Console
-
         from bifa.data import read_dataset
         from bifa.data.check import check_dataset
-        from bifa.data.plots import plot_dataset
+        from bifa.report.datasets import plot_dataset
+        from bifa.screen import Console
 
         console = Console()
         with console.status("reading"):

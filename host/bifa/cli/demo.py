@@ -16,12 +16,12 @@ def register(app: typer.Typer) -> None:
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Draws the robot, its undeclared effect and all noise.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/demo"),
+    seed: Annotated[int, typer.Option(min=0, help="Of the robot, its undisclosed effect and all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Only walk two gaits and compare their speeds.")] = False,
-    rerun: Annotated[list[str], typer.Option(help="Run this stage again although it is up to date.")] = [],  # noqa: B006
+    rerun: Annotated[list[str], typer.Option(help="Run this stage again even if it is up to date.")] = [],  # noqa: B006
 ) -> None:
-    """Characterise a virtual robot that has an effect nobody declared, find that effect, optimise, walk, compare.
+    """Characterise a virtual robot with an undisclosed effect, find the effect, optimise the gait, walk, compare.
 
     With --quick: walk the paper's baseline gait and an optimised one on the nominal robot.
     """
@@ -36,7 +36,6 @@ def demo(
 def _walk_two_gaits(out: Path, seed: int, rerun: list[str]) -> None:
     import json
 
-    from rich.console import Console
     from rich.table import Table
 
     from bifa.campaign.progress import stage_progress
@@ -46,6 +45,7 @@ def _walk_two_gaits(out: Path, seed: int, rerun: list[str]) -> None:
     from bifa.rig import open_rig
     from bifa.robot import nominal
     from bifa.robot.gait import BASELINE, Gait
+    from bifa.screen import Console
 
     gaits = {
         "baseline": ("baseline gait, 5.7 s", BASELINE),

@@ -19,8 +19,7 @@ def doctor(
 
     Ends with status 1 where something necessary is missing.
     """
-    from rich.console import Console
-
+    from bifa.screen import Console
     from bifa.toolchain.checks import MISSING, run_checks
 
     colours = {"ok": "green", "missing": "red", "optional": "yellow"}

@@ -35,31 +35,32 @@ def register(app: typer.Typer) -> None:
 
 
 def experiment(
-    name: Annotated[Experiment, typer.Argument(help="Which experiment; `all` is the paper's section IV, and walks.")],
-    out: Annotated[Path, typer.Option(help="Folder of the data set, new, or of an interrupted session.")],
-    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+    name: Annotated[Experiment, typer.Argument(help="Which experiment; `all`: the paper's section IV, and walks.")],
+    out: Annotated[Path, typer.Option(help="Folder of the data set: a new one, or that of an interrupted session.")],
+    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
     actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed, mm/s.")] = None,
-    gait: Annotated[list[Path] | None, typer.Option(help="Gait file to walk; otherwise two gaits.")] = None,
+    gait: Annotated[list[Path] | None, typer.Option(help="Gait file to walk; otherwise three built-in gaits.")] = None,
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk.")] = 5,
     inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
-    repeats: Annotated[int, typer.Option(min=1, help="How often each condition is run.")] = 3,
-    quick: Annotated[bool, typer.Option(help="Fewer conditions, faster, twice: to try things out.")] = False,
-    profile: Annotated[str | None, typer.Option(help="Of a virtual rig: ideal or realistic.")] = None,
+    repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
+    quick: Annotated[bool, typer.Option(help="Fewer conditions, faster, twice each: for a first try.")] = False,
+    profile: Annotated[str | None, typer.Option(help="Of a virtual rig: ideal, realistic or worn.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of a virtual rig: its noise.")] = None,
+    known: Annotated[list[str], typer.Option(help="What you measured: NAME=VALUE, as head_mass_kg=0.182.")] = [],  # noqa: B006
     instrument: Annotated[Path | None, typer.Option(help="CSV of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).")] = None,
 ) -> None:
     """Run a characterisation experiment and write what it measured as a data set.
 
     Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments have
-    clocks of their own and are lined up with the Uno's by its sampling strobe (D10); how well is noted with each
-    trial. An interrupted session goes on where it was when the command is given again. Ctrl-C leaves the valves off.
+    clocks of their own and are synchronised with the Uno's by its sampling strobe (D10); each trial notes how well.
+    Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
-    from rich.console import Console
-
-    from bifa.characterisation import plan
+    from bifa.measure import plan
+    from bifa.measure.known import parse_known
+    from bifa.screen import Console
 
     console = Console()
     gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
@@ -75,22 +76,26 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(console, instrument, telemetry, trials[0], out)
+        _import(console, instrument, telemetry, trials[0], out, parse_known(known))
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
-    _run(console, port, options, out, trials, name.value)
+    _run(console, port, options, out, trials, name.value, parse_known(known))
 
 
 def _load(path: Path):
-    from bifa.robot.gait import load_gait
+    from bifa.robot.gait import read_gait_file
 
-    return load_gait(path)
+    file = read_gait_file(path)
+    if file.others:
+        raise typer.BadParameter(f"{path}: an experiment sets {', '.join(file.others)} itself; remove it from the file")
+    return file.gait
 
 
-def _run(console, port, options, out, trials, name) -> None:
+def _run(console, port, options, out, trials, name, known) -> None:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from bifa.characterisation.session import provenance, run_session
+    from bifa.measure.known import known_of
+    from bifa.measure.session import provenance, run_session
     from bifa.rig import open_rig
 
     columns = (
@@ -107,34 +112,36 @@ def _run(console, port, options, out, trials, name) -> None:
             progress.update(task, description=event.planned.file, completed=event.number - 1 + event.share)
             if event.clock_error_s is not None:
                 errors.append(event.clock_error_s)
+            if event.misfit:
+                progress.console.print(f"[yellow]warning[/yellow] {event.misfit}", highlight=False)
 
         dataset = run_session(
             rig,
             out,
             trials,
             name=f"{name} on the bench",
-            known={},
+            known=known_of(rig, known),
             provenance=provenance(port, options),
             on_event=show,
         )
-    console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them recorded now.")
+    console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them just recorded.")
     if errors:
         console.print(
-            f"Instruments lined up with the Uno's clock to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
+            f"Instruments and Uno synchronised to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
         )
-    console.print(f"Look at it with: bifa check {out}   Fit the model with: bifa fit {out} --out model.toml")
+    console.print(f"Next: bifa check {out}, then bifa fit {out} --out model.toml")
 
 
-def _import(console, instrument, telemetry, planned, out) -> None:
-    from bifa.characterisation.instrument_csv import import_trial
+def _import(console, instrument, telemetry, planned, out, known) -> None:
+    from bifa.measure.instrument_csv import import_trial
 
     if telemetry is None:
         raise typer.BadParameter(
             "--instrument needs --telemetry: the Uno's record of the same time, from `bifa record`"
         )
-    dataset, clock = import_trial(instrument, telemetry, planned, out)
+    dataset, clock = import_trial(instrument, telemetry, planned, out, known)
     trial = dataset.trials[-1]
     console.print(
-        f"{out}: {trial.file}, {len(trial.time_s)} samples; lined up over {clock.edges} sync edges to "
+        f"{out}: {trial.file}, {len(trial.time_s)} samples; synchronised over {clock.edges} edges to "
         f"{1e3 * clock.rms_s:.2f} ms RMS, drift {1e6 * (clock.rate - 1):+.0f} ppm."
     )

@@ -1,4 +1,4 @@
-"""`bifa fit`: the model's parameters from a data set, with how well they are known."""
+"""`bifa fit`: the model's parameters from a data set, with their uncertainty."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,23 +18,22 @@ def register(app: typer.Typer) -> None:
 def fit(
     dataset: Annotated[Path, typer.Argument(help="Folder of the data set.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
-    model: Annotated[Path | None, typer.Option(help="Model to start from; otherwise the paper's nominal one.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the search; the same seed gives the same model.")] = 0,
+    model: Annotated[Path | None, typer.Option(help="Model to start from; the nominal one if left out.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for figures like the paper's Figs. 4, 5 and 6.")] = None,
 ) -> None:
     """Identify the model as the paper does (section IV): static loading, step responses, anchor pulls, then everything
-    together. Reports each parameter with its 90 % interval, what the data leave open, and the error in units of the
-    noise, and writes a model file for `bifa simulate` and `bifa optimize`.
+    together. Reports each parameter with its 90 % interval, what the data do not determine, and the error in units of
+    the noise, and writes a model file for `bifa simulate` and `bifa optimize`.
     """
     import time
 
-    from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from bifa.characterisation.identification import identify
-    from bifa.characterisation.report import print_report
     from bifa.data import read_dataset
+    from bifa.identify.identification import identify
+    from bifa.report.identification_tables import print_report
     from bifa.robot import load_model, save_model
+    from bifa.screen import Console
 
     console = Console()
     measured = read_dataset(dataset)
@@ -45,13 +44,12 @@ def fit(
         found = identify(
             measured,
             load_model(model) if model else None,
-            seed=seed,
             progress=lambda stage: progress.update(task, description=stage),
         )
     save_model(out, found.model)
     print_report(console, found)
     if figures is not None:
-        from bifa.characterisation.figures import draw
+        from bifa.report.identification import draw
 
         for path in draw(found, figures):
             console.print(f"figure: {path}")

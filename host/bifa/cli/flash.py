@@ -15,7 +15,7 @@ def register(app: typer.Typer) -> None:
 
 
 def flash(
-    port: Annotated[str | None, typer.Option(help="The Uno's serial port; found by itself if left out.")] = None,
+    port: Annotated[str | None, typer.Option(help="The Uno's serial port; detected if left out.")] = None,
     build_only: Annotated[bool, typer.Option("--build-only", help="Build the image, write nothing.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show PlatformIO's whole output.")] = False,
 ) -> None:
@@ -24,10 +24,9 @@ def flash(
     Vent the supplies first: while the bootloader runs, the valve pins float, and only the gates' pull-downs
     keep the valves off.
     """
-    from rich.console import Console
-
     from bifa.link import Uno
     from bifa.rig import open_rig
+    from bifa.screen import Console
     from bifa.toolchain import build_image, choose_port, project_folder, upload_image
 
     console = Console()

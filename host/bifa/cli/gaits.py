@@ -14,17 +14,17 @@ def register(app: typer.Typer) -> None:
 
 
 def gaits(
-    make: Annotated[bool, typer.Option("--make", help="Search them anew (minutes) and write them.")] = False,
+    make: Annotated[bool, typer.Option("--make", help="Search for them again (minutes) and write them.")] = False,
     model: Annotated[Path | None, typer.Option(help="Model to search on; the nominal one if left out.")] = None,
     folder: Annotated[Path | None, typer.Option(help="Where --make writes; the package itself if left out.")] = None,
     only: Annotated[list[str], typer.Option(help="Make only this one; may be repeated.")] = [],  # noqa: B006
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches.")] = 0,
 ) -> None:
     """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or make them anew."""
-    from rich.console import Console
     from rich.table import Table
 
     from bifa.gait import library
+    from bifa.screen import Console
 
     console = Console()
     if make:

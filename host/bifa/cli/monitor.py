@@ -14,7 +14,7 @@ def register(app: typer.Typer) -> None:
 
 
 def monitor(
-    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
     gait: Annotated[Path | None, typer.Option(help="Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after so long; otherwise Ctrl-C.")] = None,
@@ -23,25 +23,22 @@ def monitor(
 
     Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
     """
-    from rich.console import Console
-
     from bifa.link import Uno
-    from bifa.link.gait_file import read_gait_file
-    from bifa.live.ending import end_like_ctrl_c
     from bifa.live.monitor import watch
     from bifa.rig import open_rig
+    from bifa.robot.gait import read_gait_file
+    from bifa.screen import Console
 
-    parameters = read_gait_file(gait) if gait else {}
-    console = Console()
-    end_like_ctrl_c()
-    with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
-        with console.status("waiting for the Uno"):
-            uno.connect()
+    parameters = read_gait_file(gait).parameters if gait else {}
+
+    def begin(uno: Uno) -> None:
         if parameters:
             uno.upload(parameters)
         if run:
             uno.run()
+
+    with open_rig(port) as rig:
         try:
-            watch(uno, rig, console, seconds)
+            watch(Uno(rig.transport, rig.clock), rig.clock, Console(), seconds, begin)
         except KeyboardInterrupt:
             typer.echo("valves off")

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from bifa import cluster
+
 EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
 bifa optimize --out fast.toml --nominal --method cma   |
 bifa optimize --out paper.toml --nominal --method bo --evaluations 200   |
@@ -27,17 +29,21 @@ def optimize(
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="Of the search and of the draws.")] = 0,
     evaluations: Annotated[
-        int | None, typer.Option(min=20, help="Gaits to try in a run; 1000 for bo.", show_default=False)
+        int | None, typer.Option(min=20, help="Gaits to evaluate in a run; 1000 for bo.", show_default=False)
     ] = None,
     runs: Annotated[
-        int | None, typer.Option(min=1, max=20, help="Runs with seeds in a row; 3 for bo, else 1.", show_default=False)
+        int | None,
+        typer.Option(min=1, max=20, help="Runs, each with the next seed; 3 for bo, else 1.", show_default=False),
     ] = None,
     spread: Annotated[
         float | None,
         typer.Option(help="Relative sd of every parameter; left out: the model's covariance, or 0.02 without one."),
     ] = None,
     period: Annotated[tuple[float, float], typer.Option(help="Range of the period in s.")] = (2.0, 4.0),
-    dask: Annotated[str | None, typer.Option(help="Address of a dask scheduler, to use its workers.")] = None,
+    dask: Annotated[str | None, typer.Option(help=cluster.HELP)] = None,
+    dask_ca: Annotated[Path | None, typer.Option(help=cluster.CA_HELP)] = None,
+    dask_cert: Annotated[Path | None, typer.Option(help=cluster.CERT_HELP)] = None,
+    dask_key: Annotated[Path | None, typer.Option(help=cluster.KEY_HELP)] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for the figures; beside GAIT if left out.")] = None,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Only search.")] = False,
 ) -> None:
@@ -46,37 +52,47 @@ def optimize(
     By default what is maximised is the speed at the 10th percentile over the model's uncertainty, since the fastest
     nominal gait collapses under a 1 % change.
     """
-    from rich.console import Console
-
-    from bifa.gait import SearchError, Settings, optimise, paper_space, simulations
+    from bifa.gait import SearchError, Settings, paper_space, simulations
     from bifa.gait.library import provenance
     from bifa.robot import load_model, nominal, save_gait
+    from bifa.screen import Console
 
     console = Console()
     robot = load_model(model) if model else nominal()
     if not out.resolve().parent.is_dir():
-        raise SearchError(f"the folder {out.resolve().parent} does not exist; make it first")
+        raise SearchError(f"the folder {out.resolve().parent} does not exist; create it first")
     settings = [
         Settings(method, robust, seed + run, evaluations, spread, paper_space(period_s=period), refine=method != "bo")
         for run in range(runs or (3 if method == "bo" else 1))
     ]
-    with simulations(dask) as pool:
-        optima = []
-        for one in settings:
-            with search_progress(console) as progress:
-                optima.append(optimise(robot, pool, one, progress(f"seed {one.seed}")))
-            console.print(_line(optima[-1]), highlight=False)
-        best = max(optima, key=lambda o: o.quantile_mm_s if robust else o.nominal_mm_s)
+    with simulations(dask, tls=cluster.Tls(dask_ca, dask_cert, dask_key)) as pool:
+        best = _best(console, robot, pool, settings)
         save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
         console.print(_summary(best))
         console.print(f"gait: {out}", highlight=False)
         if not no_figures:
-            folder = figures or out.with_suffix("")
-            with console.status("figures: what changed and why, sensitivity, front, distribution"):
-                reasons = _figures(robot, pool, best, folder)
-            for sentence in reasons:
-                console.print(f"- {sentence}", highlight=False)
-            console.print(f"figures: {folder}", highlight=False)
+            _explain(console, robot, pool, best, figures or out.with_suffix(""))
+
+
+def _best(console, robot, pool, settings):
+    """The best optimum of one search after another, each with its line."""
+    from bifa.gait import optimise
+
+    optima = []
+    for one in settings:
+        with search_progress(console) as progress:
+            optima.append(optimise(robot, pool, one, progress(f"seed {one.seed}")))
+        console.print(_line(optima[-1]), highlight=False)
+    return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
+
+
+def _explain(console, robot, pool, best, folder: Path) -> None:
+    """Draw the figures into `folder` and print why the gait is faster."""
+    with console.status("figures: what changed and why, sensitivity, front, distribution"):
+        reasons = _figures(robot, pool, best, folder)
+    for sentence in reasons:
+        console.print(f"- {sentence}", highlight=False)
+    console.print(f"figures: {folder}", highlight=False)
 
 
 @contextmanager
@@ -124,10 +140,10 @@ def _summary(optimum):
 
 def _figures(robot, pool, optimum, folder: Path) -> list[str]:
     from bifa.gait import Settings, library, optimise
-    from bifa.gait import figures as draw
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
     from bifa.gait.sensitivity import front, sensitivity
+    from bifa.report import gaits as draw
     from bifa.robot import BASELINE
     from bifa.simulate import gait_rows, plant
 

@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
 
 def record(
     out: Annotated[Path, typer.Argument(help="New folder.")],
-    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
     gait: Annotated[Path | None, typer.Option(help="Gait to walk; otherwise the baseline.")] = None,
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk (with instruments).")] = 6,
     repeats: Annotated[int, typer.Option(min=1, help="Walks (with instruments).")] = 1,
@@ -28,21 +28,18 @@ def record(
     it comes. If the port vanishes, what was recorded is kept, and recording resumes when it is back. A command that is
     interrupted is resumed by giving it again.
     """
-    from rich.console import Console
-
-    from bifa.live.ending import end_like_ctrl_c
     from bifa.live.record import record_telemetry, record_walks
     from bifa.rig import open_rig
+    from bifa.screen import Console
 
     console = Console()
-    end_like_ctrl_c()
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None
         if has_instruments:
             try:
                 record_walks(rig, out, gait, cycles, repeats, console)
             except KeyboardInterrupt:
-                console.print(f"valves off; finished walks are kept in {out}: the same command goes on from there")
+                console.print(f"valves off; finished walks are kept in {out}; run the same command to resume")
                 raise typer.Exit(130) from None
     if not has_instruments:
         record_telemetry(lambda: open_rig(port), out, gait, seconds, console)

@@ -28,15 +28,15 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog=EPILOG)
     def rig(
-        profile: Annotated[str, typer.Option(help="ideal or realistic")] = "ideal",
+        profile: Annotated[str, typer.Option(help="ideal, realistic or worn")] = "ideal",
         effect: Annotated[
             list[str] | None, typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; may be given several times")
         ] = None,
-        sealed: Annotated[int | None, typer.Option(help="seed of a robot and an effect that nobody is told of")] = None,
+        sealed: Annotated[int | None, typer.Option(help="seed that draws a robot with an undisclosed effect")] = None,
         seed: Annotated[int, typer.Option(help="seed of noise, clocks and run-to-run variation")] = 0,
         firmware: Annotated[Path | None, typer.Option(help="ELF image instead of the one that is built")] = None,
         eeprom: Annotated[Path | None, typer.Option(help="file that keeps the EEPROM between runs")] = None,
-        link: Annotated[Path | None, typer.Option(help="symbolic link to the pty while it is served")] = None,
+        link: Annotated[Path | None, typer.Option(help="symbolic link to the pty for as long as it is served")] = None,
     ) -> None:
         """Offer the virtual robot, with the real firmware, as a serial port in real time.
 
@@ -44,9 +44,8 @@ def register(app: typer.Typer) -> None:
         """
         import signal
 
-        from rich.console import Console
-
         from bifa.rig import open_rig
+        from bifa.screen import Console
 
         for ending in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C

@@ -5,70 +5,79 @@ from typing import Annotated
 
 import typer
 
+EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --plot walk.png   |
+bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml   |
+bifa simulate --paper"""
+
 
 def register(app: typer.Typer) -> None:
-    """Offer the command `simulate`."""
+    """Add the command."""
+    app.command(epilog=EPILOG)(simulate)
 
-    @app.command(
-        epilog="Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --plot walk.png"
-        "   |   bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml"
-        "   |   bifa simulate --paper"
-    )
-    def simulate(
-        model: Annotated[Path | None, typer.Option(help="Model file; the nominal model if left out.")] = None,
-        gait: Annotated[Path | None, typer.Option(help="Gait file; the paper's baseline if left out.")] = None,
-        cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = 10,
-        inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
-        payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
-        obstacle: Annotated[
-            str | None,
-            typer.Option(help="tunnel, subtunnels or arcs (the paper's), 10 cm ahead.", show_default=False),
-        ] = None,
-        buckling: Annotated[float, typer.Option(help="N that push a ring of supports in; an assumption.")] = 27.0,
-        plot: Annotated[Path | None, typer.Option(help="Picture of commands, pressures, displacement.")] = None,
-        csv: Annotated[Path | None, typer.Option(help="All channels at 100 Hz, as a data set's locomotion.")] = None,
-        paper: Annotated[
-            bool,
-            typer.Option(
-                "--paper",
-                help="Tables: the paper's figures and obstacles beside the model's; --gait is its fastest.",
-            ),
-        ] = False,
-    ) -> None:
-        """Simulate a walk and say how far each cycle carried the robot.
 
-        The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
-        """
-        from rich.console import Console
+def simulate(
+    model: Annotated[Path | None, typer.Option(help="Model file; the nominal model if left out.")] = None,
+    gait: Annotated[Path | None, typer.Option(help="Gait file; the paper's baseline if left out.")] = None,
+    cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = 10,
+    inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
+    payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
+    obstacle: Annotated[
+        str | None,
+        typer.Option(help="tunnel, subtunnels or arcs (the paper's), 10 cm ahead.", show_default=False),
+    ] = None,
+    buckling: Annotated[float, typer.Option(help="Force that buckles a ring of supports, N (assumed).")] = 27.0,
+    plot: Annotated[Path | None, typer.Option(help="Picture of commands, pressures, displacement.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="All channels at 100 Hz, as a data set's locomotion.")] = None,
+    paper: Annotated[
+        bool,
+        typer.Option(
+            "--paper",
+            help="Compare the paper's figures and obstacles with the model's; --gait: its fastest gait.",
+        ),
+    ] = False,
+) -> None:
+    """Simulate a walk and print the advance of each cycle.
 
-        from bifa import robot
+    The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
+    """
 
-        console = Console()
-        chosen = robot.load_model(model) if model else robot.nominal()
-        steps = robot.load_gait(gait) if gait else robot.BASELINE
-        if paper:
-            _print_paper(console, chosen if model else None, steps if gait else None)
-            return
-        with console.status("simulating"):
-            from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
+    from bifa import robot
+    from bifa.screen import Console
 
-            chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
-            ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
-            place = {"inclination_deg": inclination} | ({"terrain": terrain(ahead, supports)} if ahead else {})
-            record = walk(chosen, steps, cycles, **place)
-            progress = speeds(chosen, gait_rows([steps]), cycles, 1e-6, **place)
-        _print_walk(console, chosen, steps, progress)
-        if ahead:
-            _print_passing(console, chosen, steps, ahead, supports, inclination)
-        if csv:
-            _write_csv(csv, record.columns)
-            console.print(f"channels: {csv}", highlight=False)
-        if plot:
-            from bifa.report.walks import Walk, draw_walks
+    console = Console()
+    chosen = robot.load_model(model) if model else robot.nominal()
+    file = robot.read_gait_file(gait) if gait else robot.GaitFile(robot.BASELINE)
+    if file.others:
+        console.print(f"not simulated: {', '.join(file.others)} (the Uno's; a model has its own supply pressure)")
+    if paper:
+        _print_paper(console, chosen if model else None, file.gait if gait else None)
+        return
+    chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
+    record, speed_mm_s = _walk(console, chosen, file.gait, cycles, inclination, obstacle, buckling)
+    if csv:
+        _write_csv(csv, record.columns)
+        console.print(f"channels: {csv}", highlight=False)
+    if plot:
+        from bifa.report.walks import Walk, draw_walks
 
-            title = f"{chosen.name}, {float(progress.speed_mm_s[0]):.1f} mm/s"
-            draw_walks([Walk(title, steps.period_s, record.columns)], plot, cycles)
-            console.print(f"picture: {plot}", highlight=False)
+        title = f"{chosen.name}, {speed_mm_s:.1f} mm/s"
+        draw_walks([Walk(title, file.gait.period_s, record.columns)], plot, cycles)
+        console.print(f"picture: {plot}", highlight=False)
+
+
+def _walk(console, model, gait, cycles, inclination, obstacle, buckling):
+    """Simulate and print the walk; its record, and the speed of the last cycle in mm/s."""
+    with console.status("simulating"):
+        from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
+
+        ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
+        place = {"inclination_deg": inclination} | ({"terrain": terrain(ahead, supports)} if ahead else {})
+        record = walk(model, gait, cycles, **place)
+        progress = speeds(model, gait_rows([gait]), cycles, 1e-6, **place)
+    _print_walk(console, model, gait, progress)
+    if ahead:
+        _print_passing(console, model, gait, ahead, supports, inclination)
+    return record, float(progress.speed_mm_s[0])
 
 
 def _print_walk(console, model, gait, progress) -> None:
@@ -113,7 +122,7 @@ def _print_paper(console, model, gait) -> None:
 
         pairs = [(model, gait or FAST)] if model else [(robot.nominal(), FAST), (robot.strong_push(), FAST_STRONG)]
         tables = [compare(*pair) for pair in pairs]
-    table = Table(title="The paper and the model; [red]red[/red]: does not fit", title_justify="left")
+    table = Table(title="The paper and the model; [red]red[/red]: they disagree", title_justify="left")
     for heading in ("", "paper", *(chosen.name for chosen, _ in pairs), "remark on the first"):
         table.add_column(heading)
     for rows in zip(*tables, strict=True):

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 EPILOG = """Examples:  bifa upload gait.toml   |   bifa upload gait.toml --save fast --run   |
-bifa upload gait.toml --port /dev/ttyACM0"""
+bifa upload gait.toml --run --seconds 60 --port /dev/ttyACM0"""
 
 
 def register(app: typer.Typer) -> None:
@@ -16,34 +16,38 @@ def register(app: typer.Typer) -> None:
 
 def upload(
     gait: Annotated[Path, typer.Argument(help="TOML file with period_s, psi12_deg, psi13_deg and the three duties.")],
-    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
     save: Annotated[str | None, typer.Option(help="Keep it on the Uno as a preset of this name.")] = None,
-    run: Annotated[bool, typer.Option("--run", help="Start walking; the Uno goes on when this command ends.")] = False,
+    run: Annotated[bool, typer.Option("--run", help="Then walk until Ctrl-C.")] = False,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="With --run: walk only for so long.")] = None,
 ) -> None:
     """Send a gait to the Uno and read it back; the parameters that the file does not name stay as they are.
 
-    Opening the port restarts an Uno: it stops walking, and comes back with its start preset.
+    Opening the port restarts an Uno: it stops walking, and comes back with its start preset. At the end of --run all
+    valves are off.
     """
-    from rich.console import Console
-
     from bifa.link import Uno
-    from bifa.link.gait_file import read_gait_file
-    from bifa.live.ending import end_like_ctrl_c
+    from bifa.live.walk import walk
     from bifa.rig import open_rig
+    from bifa.robot.gait import read_gait_file
+    from bifa.screen import Console
 
-    parameters = read_gait_file(gait)
+    if seconds is not None and not run:
+        raise typer.BadParameter("--seconds is for --run")
+    parameters = read_gait_file(gait).parameters
     console = Console()
-    end_like_ctrl_c()
     with open_rig(port) as rig:
-        uno = Uno(rig.transport, rig.clock)
         try:
-            with console.status("waiting for the Uno"):
+            with console.status("waiting for the Uno"), Uno(rig.transport, rig.clock) as uno:
                 hello = uno.connect()
-            uno.upload(parameters, save=save)
-            if run:
-                uno.run()
-        except BaseException:
-            uno.make_safe()
-            raise
-        done = ", ".join(["read back equal", *(["saved as " + save] if save else []), *(["walking"] if run else [])])
-        console.print(f"{gait.name} is on the Uno (firmware {hello.firmware}): {done}")
+                uno.upload(parameters, save=save)
+                done = ", ".join(["read back equal", *(["saved as " + save] if save else [])])
+                console.print(f"{gait.name} is on the Uno (firmware {hello.firmware}): {done}")
+                if run:
+                    console.print("walking; Ctrl-C ends" if seconds is None else f"walking for {seconds:g} s")
+                    walk(uno, rig.clock, seconds)
+        except KeyboardInterrupt:
+            if not run:
+                raise
+        if run:
+            console.print("valves off")

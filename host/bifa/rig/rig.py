@@ -1,6 +1,8 @@
 """What is at the other end of `--port`: an Uno on a serial port, or a whole rig that a package offers by name."""
 
+from collections.abc import Mapping
 from importlib.metadata import entry_points
+from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
 
 from bifa.errors import BifaError
@@ -18,11 +20,15 @@ class RigError(BifaError):
 
 @runtime_checkable
 class Rig(Protocol):
-    """A transport and a clock that belong together, and the bench's instruments where there are any."""
+    """A transport and a clock that belong together, and the bench's instruments where there are any.
+
+    `known`: what was measured directly of the robot on this rig, by the model's names (`head_mass_kg`); {}: nothing.
+    """
 
     transport: Transport
     clock: Clock
     instruments: Any | None
+    known: Mapping[str, float]
 
     def next_session_seed(self) -> int | None:
         """What makes the next session's key, and so every byte of it, repeatable; None where time is real anyway."""
@@ -39,6 +45,7 @@ class SerialRig:
     """An Uno on a serial port, in the computer's time; no instruments."""
 
     instruments = None
+    known: Mapping[str, float] = MappingProxyType({})
 
     def __init__(self, device: str) -> None:
         self.transport: Transport = SerialTransport(device)
@@ -88,7 +95,7 @@ def open_rig(port: str | None = None, **options: Any) -> Rig:
                 raise RigError(str(error)) from error
             raise
     if port is not None and "/" not in port and not port.upper().startswith("COM"):
-        raise RigError(f"there is no rig called {port!r} (there are: {', '.join(rigs) or 'none'}), and it is no device")
+        raise RigError(f"{port!r} is neither a rig (available: {', '.join(rigs) or 'none'}) nor a device")
     if options:
-        raise RigError(f"{', '.join(options)}: only a virtual rig takes that")
+        raise RigError(f"{', '.join(options)}: only a virtual rig takes these options")
     return SerialRig(port if port is not None else find_port())

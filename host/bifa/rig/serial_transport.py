@@ -1,5 +1,6 @@
 """A serial port as the link's transport."""
 
+import contextlib
 import time
 
 import serial
@@ -8,6 +9,7 @@ from bifa.link.transport import PortGoneError
 
 BAUD = 250_000
 RESET_PULSE_S = 0.05
+LONGEST_DRAIN_S = 0.5  # 12 kB at this baud rate
 
 
 class SerialTransport:
@@ -51,6 +53,10 @@ class SerialTransport:
 
     def close(self) -> None:
         """See Transport."""
+        deadline = time.monotonic() + LONGEST_DRAIN_S
+        with contextlib.suppress(serial.SerialException, OSError, TypeError):  # closed or gone: nothing to wait for
+            while self._port.out_waiting and time.monotonic() < deadline:
+                time.sleep(0.001)
         self._port.close()
 
     def _gone(self) -> PortGoneError:

@@ -16,7 +16,7 @@ def project_folder() -> Path:
     for folder in (Path(bifa.__file__).resolve().parents[2], here, *here.parents):
         if (folder / "platformio.ini").is_file() and (folder / "firmware").is_dir():
             return folder
-    raise ToolchainError("no platformio.ini and firmware/ here; go to a clone of the project")
+    raise ToolchainError("no platformio.ini and firmware/ here; run this in a clone of the repository")
 
 
 def platformio_program() -> Path:

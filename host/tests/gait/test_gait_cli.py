@@ -33,7 +33,7 @@ def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
     ("arguments", "words"),
     [
         (["--method", "sgd"], "'sgd' is not one of de, cma, bo"),
-        (["--spread", "0.9"], "spread = 0.9 is outside its range"),
+        (["--spread", "0.9"], "spread = 0.9 must be above 0"),
         (["--period", "0.1", "4"], "period_s: 0.1 to 4 must be a range within 0.5 to 60 s"),
         (["--period", "4", "2"], "must be a range"),
         (["--model", "nowhere.toml"], "nowhere.toml"),

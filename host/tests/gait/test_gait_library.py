@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
-from bifa.gait import library
+from bifa.gait import library, spread_of
 from bifa.gait.library import LibraryError
+from bifa.gait.objectives import distribution
 from bifa.robot import nominal
 from bifa.simulate import Supports, gait_rows, tunnel
 from bifa.simulate.passing import passing
@@ -20,9 +22,17 @@ def test_a_gait_walks_as_fast_as_its_file_says(name, runs, nominal_plant):
     entry.scenario.settings.space.point(entry.gait)  # within the scenario's space
 
 
-def test_what_is_required_of_the_fast_and_the_robust_gait():
-    assert library.load("fast").provenance["predicted_speed_mm_s"] >= 23.4
-    assert library.load("robust").provenance["predicted_10th_percentile_mm_s"] >= 21.8
+def test_the_fast_gait_is_as_fast_as_required():
+    assert library.load("fast").provenance["predicted_speed_mm_s"] >= 23.4  # which the test above measures
+
+
+def test_nine_robots_in_ten_reach_the_required_speed_with_the_robust_gait(runs):
+    """On robots that the search never met: more than one in ten below it, beyond what chance makes of 1 %, fails."""
+    entry, robots = library.load("robust"), 256
+    draws = spread_of(nominal()).plants(nominal(), robots, seed=2026)
+    speeds = distribution(runs, draws, gait_rows([entry.gait]), entry.scenario.settings.metric)[0]
+    assert np.sum(speeds < 21.8) <= binom.ppf(0.99, robots, 0.1)
+    assert entry.provenance["predicted_10th_percentile_mm_s"] == pytest.approx(np.quantile(speeds, 0.1), abs=0.15)
 
 
 def test_the_obstacle_gait_brings_head_and_tail_through():

@@ -28,7 +28,7 @@ def test_point_is_the_inverse_of_gaits():
 def test_errors_name_the_axis_and_the_range():
     with pytest.raises(SpaceError, match=r"period_s = 5.7 is outside 2 to 4 s"):
         paper_space().point(Gait(5.7, 0, 0, 0.5, 0.5, 0.5))
-    with pytest.raises(SpaceError, match="duty_head and duty_tail are searched as equal, and differ"):
+    with pytest.raises(SpaceError, match="duty_head and duty_tail are searched as one axis and must be equal"):
         paper_space().point(Gait(3.0, 0, 0, 0.5, 0.5, 0.6))
     with pytest.raises(SpaceError, match=r"period_s: 0.1 to 4 must be a range within 0.5 to 60 s"):
         paper_space(period_s=(0.1, 4.0))

@@ -1,13 +1,34 @@
 """Gait files."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from bifa.robot import BASELINE, Gait, GaitError, load_gait, save_gait
+from bifa.ranges import RANGES
+from bifa.robot import BASELINE, Gait, GaitError, load_gait, read_gait_file, save_gait
 
 
 def test_round_trip(tmp_path):
     save_gait(tmp_path / "g.toml", BASELINE, provenance={"made_by": "a test"})
     assert load_gait(tmp_path / "g.toml") == BASELINE
+    assert read_gait_file(tmp_path / "g.toml").others == {}
+
+
+def written(tmp_path, text: str):
+    path = tmp_path / "g.toml"
+    path.write_text(text)
+    return path
+
+
+BY_HAND = "".join(f"{name} = {value}\n" for name, value in BASELINE.as_dict().items())
+
+
+def test_other_parameters_of_the_uno_may_stand_beside_the_gait(tmp_path):
+    path = written(tmp_path, BY_HAND + "coupling_per_s = 5\npressure_psi = 7\n[provenance]\nby = 'me'\n")
+    file = read_gait_file(path)
+    assert file.others == {"coupling_per_s": 5.0, "pressure_psi": 7.0}
+    assert file.parameters == BASELINE.as_dict() | file.others
+    assert load_gait(path) == file.gait == BASELINE
 
 
 @pytest.mark.parametrize(
@@ -15,21 +36,33 @@ def test_round_trip(tmp_path):
     [
         ("period_s = 5.7", "period_s = 0.1", r"period_s = 0.1 is outside its range 0.5 to 60 s"),
         ("duty_head = 0.5", "duty_head = nan", "duty_head"),
-        ("duty_head = 0.5", "duty_heat = 0.5", "duty_heat"),
-        ("duty_head = 0.5\n", "", "duty_head"),
-        ("format = 1", "format = 9", "format 1"),
+        (
+            "duty_head = 0.5",
+            "duty_heat = 0.5",
+            "unknown key duty_heat; .* hold period_s, .*coupling_per_s",
+        ),
+        ("duty_head = 0.5", "duty_head = true", "duty_head"),
+        ("duty_head = 0.5", f"duty_head = 1{400 * '0'}", "duty_head"),
+        ("duty_head = 0.5\n", "", "duty_head is missing"),
+        ("period_s", "format = 9\nperiod_s", "format = 9.*format 1"),
         ("psi12_deg = 270.0", 'psi12_deg = "fast"', "psi12_deg"),
+        ("period_s", "pressure_psi = 15\nperiod_s", "pressure_psi = 15 is outside its range 0 to 14 psi"),
+        ("period_s = 5.7", "=", "cannot read"),
     ],
 )
-def test_a_bad_gait_is_refused(tmp_path, old, new, told):
-    save_gait(tmp_path / "g.toml", BASELINE)
-    text = (tmp_path / "g.toml").read_text()
-    assert old in text
-    (tmp_path / "g.toml").write_text(text.replace(old, new))
-    with pytest.raises(GaitError, match=told):
-        load_gait(tmp_path / "g.toml")
+def test_a_bad_gait_file_is_refused_by_file_and_key(tmp_path, old, new, told):
+    assert old in BY_HAND
+    path = written(tmp_path, BY_HAND.replace(old, new))
+    with pytest.raises(GaitError, match=told) as refused:
+        read_gait_file(path)
+    assert str(path) in str(refused.value)
 
 
-def test_a_gait_out_of_range_cannot_be_made():
-    with pytest.raises(GaitError, match="duty_tail"):
-        Gait(3.0, 0.0, 0.0, 0.5, 0.5, 1.2)
+@given(st.sampled_from(list(BASELINE.as_dict())), st.floats())
+def test_a_gait_out_of_range_cannot_be_made(name, value):
+    low, high, _ = RANGES[name]
+    if low <= value <= high:
+        assert Gait(**{**BASELINE.as_dict(), name: value}).as_dict()[name] == value
+    else:
+        with pytest.raises(GaitError, match=name):
+            Gait(**{**BASELINE.as_dict(), name: value})

@@ -87,7 +87,7 @@ def test_without_platformio_the_sentence_names_the_remedy(monkeypatch, tmp_path)
 def test_outside_a_clone_is_said(monkeypatch, tmp_path):
     monkeypatch.setattr(project.bifa, "__file__", str(tmp_path / "site-packages" / "bifa" / "__init__.py"))
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ToolchainError, match="go to a clone of the project"):
+    with pytest.raises(ToolchainError, match="in a clone of the repository"):
         project.project_folder()
 
 

@@ -5,7 +5,7 @@ import select
 import subprocess
 
 import pytest
-from unity_suites import run_limited, unproven
+from unity_suites import finding, run_limited, unproven
 
 
 def report(*suites):
@@ -50,3 +50,26 @@ def test_a_hanging_chip_is_stopped_with_all_its_processes(tmp_path):
 
 def test_the_status_of_platformio_is_passed_on():
     assert run_limited(["sh", "-c", "exit 3"], limit_s=60) == 3
+
+
+ADDRESS = """=================================================================
+==20153==ERROR: AddressSanitizer: global-buffer-overflow on address 0x55da83e46782 at pc 0x55da83e41c51
+READ of size 1 at 0x55da83e46782 thread T0
+    #0 0x55da83e41c50 in bifa::flash_byte(void const*) lib/flash/flash.h:30
+    #1 0x55da83e41c50 in bifa::sine(unsigned short) lib/cpg/sine.h:22
+"""
+UNDEFINED = """lib/cpg/sine.h:22:31: runtime error: signed integer overflow: 1 + 1 cannot be represented
+    #0 0x55 in bifa::sine(unsigned short) lib/cpg/sine.h:22
+"""
+
+
+def test_what_a_sanitizer_found_is_named_with_its_place():
+    assert finding(ADDRESS) == (
+        "AddressSanitizer: global-buffer-overflow in bifa::flash_byte(void const*) lib/flash/flash.h:30"
+    )
+    assert finding(UNDEFINED).startswith("signed integer overflow: 1 + 1 cannot be represented in")
+    assert "lib/cpg/sine.h:22" in finding(UNDEFINED)
+
+
+def test_a_report_without_a_place_is_still_told():
+    assert finding("garbage") == "a sanitizer stopped a suite in an unknown place"

@@ -1,0 +1,24 @@
+"""TOML from strangers: tomllib, kept from what would cost it gigabytes or the interpreter's stack."""
+
+import re
+import tomllib
+from typing import Any
+
+MOST_PARTS = 100  # of a dotted key; tomllib's time and memory grow with their square
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w\\-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_PARTS},}}+", re.ASCII)
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """The document in `text`. Raises tomllib.TOMLDecodeError, whatever is wrong with it."""
+    if long := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long.start()) + 1
+        raise tomllib.TOMLDecodeError(f"A key of over {MOST_PARTS} parts (at line {line})")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("Nested too deep") from None
+    except ValueError as error:  # an integer of over 4300 digits
+        raise tomllib.TOMLDecodeError(str(error)) from None

@@ -1,0 +1,67 @@
+"""What a diagnosis could not tell apart is measured and diagnosed again, on the real firmware."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from bifa.campaign.resolve import ROUNDS, joined, planned, resolve
+from bifa.data import Dataset
+from bifa.measure.plan import PlannedTrial
+from bifa.rig import open_rig
+from bifa.robot.gait import BASELINE
+from lacuna.diagnosis.next_experiment import NextExperiment
+
+SEPARATING = NextExperiment(
+    ("hysteresis", "viscoelasticity"),
+    "static_loading",
+    {"actuator": "small", "pressure_psi": 0.0, "rate_mm_s": 30.0},
+    gain=12.0,
+)
+
+
+def test_settings_become_trials_with_their_repeats():
+    trials = planned(SEPARATING)
+    assert [t.repeat for t in trials] == [1, 2, 3]
+    assert {(t.experiment, t.actuator, t.rate_mm_s) for t in trials} == {("static_loading", "small", 30.0)}
+    uphill = planned(NextExperiment(("a", "b"), "locomotion", {"gait": BASELINE.as_dict(), "inclination_deg": 10.0}))
+    assert uphill[0].gait == BASELINE
+    assert uphill[0].settings == {"inclination_deg": 10.0}
+    assert uphill[0].cycles > 0
+
+
+def test_trials_measured_later_are_further_repeats_under_names_of_their_own():
+    def day(*repeats):
+        planned = [PlannedTrial("static_loading", "small", 0.0, 30.0, repeat=r) for r in repeats]
+        return Dataset(None, "day", {}, tuple(p.as_trial(session_order=k + 1) for k, p in enumerate(planned)))
+
+    both = joined(day(1, 2), day(1, 2, 3), "later_")
+    assert [t.repeat for t in both.trials] == [1, 2, 3, 4, 5]
+    assert [t.session_order for t in both.trials] == [1, 2, 3, 4, 5]
+    assert len({t.file for t in both.trials}) == 5
+
+
+@pytest.mark.uno
+def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
+    seen = []
+
+    def diagnose(dataset):
+        seen.append(dataset)
+        return SimpleNamespace(next=NextExperiment())
+
+    day = Dataset(None, "day", {}, (), {})
+    found = SimpleNamespace(next=SEPARATING)
+    dataset, found, ran = resolve(day, found, diagnose, lambda n: open_rig("virtual", seed=n), tmp_path)
+    assert ran == (SEPARATING,)
+    assert found.next.experiment is None
+    assert seen == [dataset]
+    assert [t.actuator for t in dataset.trials] == ["small"] * 3
+    assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
+
+
+@pytest.mark.uno
+def test_it_gives_up_where_experiments_do_not_help(tmp_path):
+    day = Dataset(None, "day", {}, (), {})
+    confused = SimpleNamespace(next=SEPARATING)
+    _, found, ran = resolve(day, confused, lambda _: confused, lambda n: open_rig("virtual", seed=n), tmp_path)
+    assert found is confused
+    assert len(ran) == ROUNDS
