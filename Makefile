@@ -15,22 +15,24 @@ ARGS ?=
 .PHONY: help
 help:
 	@echo "make demo     the whole story on a virtual robot with an undeclared effect, and its report"
-	echo "make test     every test: native, in the simulated ATmega328P, Python"
+	echo "make test     every test: native, sanitized, in the simulated ATmega328P, Python"
 	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
 	echo "make soak     the long proofs and fuzzers"
+	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS=--help)"
 	echo "make blind    diagnosis of sealed data sets: confusion matrix against baselines (ARGS='--help')"
 	echo "make lint     formatters and static checks; make format applies the formatters"
 	echo "make setup    only install what is needed: Debian packages, .venv, PlatformIO's packages"
 	echo "make lock     resolve host/requirements.in anew"
 	echo "make clean    remove what was built; make distclean removes .venv and .platformio as well"
 
-.PHONY: demo test bench soak blind
+.PHONY: demo test bench soak portability blind
 demo: setup
 	@$(bin)/bifa demo $(ARGS)
 
 test: setup
 	@failed=
 	$(bin)/python tools/unity_suites.py native || failed="$$failed native"
+	$(bin)/python tools/unity_suites.py sanitized || failed="$$failed sanitized"
 	$(bin)/python tools/unity_suites.py simavr || failed="$$failed simavr"
 	(cd host && ../$(bin)/pytest -n 2 $(ARGS)) || failed="$$failed pytest"
 	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
@@ -40,9 +42,12 @@ bench: setup
 
 soak: setup $(stamps)/fuzz
 	@failed=
-	$(bin)/python tools/unity_suites.py sanitized || failed="$$failed sanitized"
 	(cd host && ../$(bin)/pytest -n 2 -m soak $(ARGS)) || failed="$$failed pytest"
+	$(bin)/python tools/portability.py || failed="$$failed portability"
 	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
+
+portability: setup
+	@$(bin)/python tools/portability.py $(ARGS)
 
 blind: setup
 	@cd host && ../$(bin)/python -m bench.blind $(ARGS)
@@ -78,7 +83,7 @@ format: $(python) $(stamps)/lint
 # --- Set-up: each step leaves a stamp, so that a second run is instant ---
 
 .PHONY: setup
-setup: virtual_robot $(stamps)/firmware
+setup: virtual_robot $(stamps)/lanes $(stamps)/firmware
 
 $(stamps)/system: tools/system-packages.sh
 	@mkdir -p $(@D)
@@ -90,13 +95,17 @@ $(stamps)/lint $(stamps)/fuzz: tools/system-packages.sh
 	tools/system-packages.sh $(@F)
 	touch $@
 
-$(python): tools/python-environment.sh host/requirements.lock host/pyproject.toml host/virtual_robot/pyproject.toml | $(stamps)/system
+$(python): tools/python-environment.sh host/requirements.lock host/pyproject.toml host/lacuna/pyproject.toml host/virtual_robot/pyproject.toml | $(stamps)/system
 	@tools/python-environment.sh
 	touch $@
 
 .PHONY: virtual_robot
 virtual_robot: $(python)
 	@cd host && ../$(bin)/python -m virtual_robot.build  # knows itself what is up to date
+
+$(stamps)/lanes: $(python) $(wildcard host/bifa/simulate/*.py host/bifa/simulate/lanes/* host/bifa/effects/*.py)
+	@cd host && ../$(bin)/python -m bifa.simulate.lanes
+	touch ../$@
 
 $(stamps)/platformio: $(python) platformio.ini tools/system-packages.sh $(wildcard tools/provision/*.py tools/stand_ins/* tools/stand_ins/*/* tools/stand_ins/*/*/*)
 	@PYTHONPATH=tools $(bin)/python -m provision
@@ -118,7 +127,7 @@ lock: $(python)
 	@$(bin)/python tools/lock.py
 
 clean:
-	@rm -rf .pio build out bench.json host/build host/*.egg-info host/virtual_robot/*.egg-info compile_commands.json
+	@rm -rf .pio build out bench.json host/build host/*.egg-info host/lacuna/*.egg-info host/virtual_robot/*.egg-info compile_commands.json
 	find host tools schema -name __pycache__ -prune -exec rm -rf {} +
 	find host/virtual_robot -name '*.so' -delete
 	rm -rf .ruff_cache host/.pytest_cache host/.ruff_cache host/.hypothesis host/.import_linter_cache

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Creates .venv with the locked, hashed packages and this project's own two, editable.
+# Creates .venv with the locked, hashed packages and this project's own three, editable.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -28,4 +28,4 @@ pip() {
 }
 echo "Installing Python packages from host/requirements.lock"
 pip --require-hashes --no-deps --requirement host/requirements.lock
-pip --no-deps --no-build-isolation --editable host --editable host/virtual_robot
+pip --no-deps --no-build-isolation --editable host/lacuna --editable host --editable host/virtual_robot

@@ -1,12 +1,14 @@
 """Run the Unity suites of one PlatformIO environment, and fail where PlatformIO would not notice.
 
 PlatformIO calls a suite that printed no result "skipped" and is content; here each suite must pass at least one
-test. It waits for ever for a chip that hangs or restarts again and again; here there is a limit.
+test. It waits for ever for a chip that hangs or restarts again and again; here there is a limit. What a sanitizer finds
+it reports as a signal that never was; here its report is kept and its first lines are shown.
 """
 
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +17,8 @@ from pathlib import Path
 PROJECT = Path(__file__).resolve().parent.parent
 PIO = Path(sys.executable).with_name("pio")
 LIMIT_S = 1200
+SANITIZER_REPORTS = PROJECT / "build" / "sanitizer"
+NO_SIGNAL = 99  # PlatformIO takes a status of 1 for SIGHUP
 
 
 def main(environment: str) -> int:
@@ -22,21 +26,39 @@ def main(environment: str) -> int:
     report = PROJECT / "build" / f"unity-{environment}.json"
     report.parent.mkdir(exist_ok=True)
     report.unlink(missing_ok=True)
+    for old in sanitizer_reports():
+        old.unlink()
     try:
-        if run_limited([PIO, "test", "-e", environment, "--json-output-path", report], LIMIT_S):
-            return 1
+        failed = run_limited([PIO, "test", "-e", environment, "--json-output-path", report], LIMIT_S)
     except subprocess.TimeoutExpired:
         print(f"error: the suites in {environment} did not end within {LIMIT_S} s; the last one hangs", file=sys.stderr)
         return 1
-    complaints = unproven(json.loads(report.read_text()), environment)
+    complaints = [f"{finding(path.read_text())}; whole report in {path}" for path in sanitizer_reports()]
+    if not failed:
+        complaints += unproven(json.loads(report.read_text()), environment)
     for complaint in complaints:
         print(f"error: {complaint}", file=sys.stderr)
-    return 1 if complaints else 0
+    return 1 if failed or complaints else 0
+
+
+def sanitizer_reports() -> list[Path]:
+    """What the sanitizers wrote; they append the number of the process to the name."""
+    return sorted(SANITIZER_REPORTS.parent.glob(f"{SANITIZER_REPORTS.name}.*"))
+
+
+def finding(report: str) -> str:
+    """What a sanitizer's report says: what happened, and where in the project (the first place there)."""
+    what = re.search(r"(?:ERROR: |runtime error: )(.+?)(?: on address.*)?$", report, re.MULTILINE)
+    where = re.search(r"in (\S.*? (?:lib|test)/\S+)|^((?:lib|test)/[^:]+:\d+)", report, re.MULTILINE)
+    place = next((group for group in where.groups() if group), "?") if where else "an unknown place"
+    return f"{what[1] if what else 'a sanitizer stopped a suite'} in {place}"
 
 
 def run_limited(command: list, limit_s: float) -> int:
     """Run `command`; return its status. On TimeoutExpired or an interrupt no process of it is left behind."""
-    with subprocess.Popen(command, cwd=PROJECT, start_new_session=True) as process:
+    options = f"log_path={SANITIZER_REPORTS}:exitcode={NO_SIGNAL}:print_stacktrace=1"
+    environment = os.environ | {"ASAN_OPTIONS": options, "UBSAN_OPTIONS": options}
+    with subprocess.Popen(command, cwd=PROJECT, env=environment, start_new_session=True) as process:
         try:
             return process.wait(limit_s)
         except BaseException:
