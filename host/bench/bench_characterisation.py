@@ -4,8 +4,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from bifa.characterisation.identification import identify
 from bifa.data import read_dataset
+from bifa.identify.identification import identify
 from virtual_robot.sealed import generate
 
 SECONDS_ALLOWED = 60.0

@@ -13,9 +13,9 @@ LIMIT_S = 60.0
 
 def run() -> dict[str, float]:
     """Draw one sealed data set, diagnose it twice (the first compiles), and report the second."""
-    from bifa.characterisation.system import prepare
     from bifa.data import read_dataset
-    from bifa.discrepancy.diagnosis import diagnose
+    from bifa.identify.start import prepare
+    from lacuna.diagnosis.diagnose import diagnose
 
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "sealed"

@@ -1,14 +1,10 @@
 """The link of the real image in the simulated chip: uploads, saves, stops, and uploads over a faulty line."""
 
 import random
-import sys
-from pathlib import Path
 
 import bifa.link.session
 from bifa.link import Uno
 from bifa.link.frames import STOP_FRAME
-
-sys.path.append(str(Path(__file__).parents[1] / "tests/link"))  # the board, the chip and the faulty line of the tests
 
 BYTE_S = 10 / 250_000
 EEPROM_BYTE_S = 3.4e-3
@@ -17,7 +13,7 @@ STOP_ALLOWED_S = 100e-6
 
 def run() -> dict[str, float]:
     """Print each figure beside its peer or limit; return them flat."""
-    from chip import Chip
+    from harness.chip import Chip
 
     upload_s, sent = _upload(Chip)
     window = bifa.link.session.WINDOW
@@ -82,8 +78,8 @@ def _stop(make, stop: bytes) -> float:
 
 
 def _faulty() -> dict[str, float]:
-    from board import Board
-    from faulty_line import FaultyLine
+    from harness.board import Board
+    from harness.faulty_line import FaultyLine
 
     results = {}
     for rate in (0.0, 1e-3, 1e-2):
