@@ -11,8 +11,8 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.signal import savgol_filter
 
-from bifa.discrepancy.diagnosis import diagnose
-from bifa.identify.system import Effect, Parameter, System, Trial
+from lacuna.diagnosis.diagnose import diagnose
+from lacuna.system import Effect, Parameter, System, Trial
 
 STEP_S, CYCLE_S, WINDOWS, CYCLES = 1e-3, 6.249, 6, 4  # the reference repeats every 6.249 s: windows of it are repeats
 ORDER = [
