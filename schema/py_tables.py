@@ -21,7 +21,7 @@ def _plural(name: str) -> str:
 def module(parameters: ParameterTable, commands: CommandTable, table_hash: int) -> str:
     set_size = sum(WIRE_BYTES[p.wire] for p in parameters.parameters)
     rows = "\n".join(
-        f"    Parameter({p.name!r}, {p.unit!r}, {p.decimals}, {p.minimum}, {p.maximum}, {p.default},\n"
+        f"    UnoParameter({p.name!r}, {p.unit!r}, {p.decimals}, {p.minimum}, {p.maximum}, {p.default},\n"
         f"              {p.help!r}),"
         for p in parameters.parameters
     )
@@ -37,7 +37,7 @@ def module(parameters: ParameterTable, commands: CommandTable, table_hash: int) 
 from typing import NamedTuple
 
 
-class Parameter(NamedTuple):
+class UnoParameter(NamedTuple):
     """One parameter; the bounds and the default are integers in wire units: the value times 10^decimals."""
 
     name: str

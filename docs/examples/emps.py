@@ -12,7 +12,7 @@ from scipy.io import loadmat
 from scipy.signal import savgol_filter
 
 from lacuna.diagnosis.diagnose import diagnose
-from lacuna.system import Effect, Parameter, System, Trial
+from lacuna.system import Effect, Parameter, Record, System
 
 STEP_S, CYCLE_S, WINDOWS, CYCLES = 1e-3, 6.249, 6, 4  # the reference repeats every 6.249 s: windows of it are repeats
 ORDER = [
@@ -88,7 +88,7 @@ class Emps(System):
             time_s = STEP_S * np.arange(len(q[at]))
             given = (q[first], v[first], motor_N[at], pulses_N[at])
             measured = {"position_mm": 1e3 * q[at]}
-            trials.append(Trial(f"window {k}", "free run", k % WINDOWS, time_s, measured, k, given))
+            trials.append(Record(f"window {k}", "free run", k % WINDOWS, time_s, measured, k, given))
         self.trials = tuple(trials)
 
     def predict(self, theta, effects, trial, *, coarse=False, corrections=()):

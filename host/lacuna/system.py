@@ -97,7 +97,7 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Trial:
+class Record:
     """One measured record.
 
     `channels` maps a channel's name to its samples, shape (n,), unit in the name; NaN where a sample is
@@ -156,7 +156,7 @@ class CandidateExperiment:
 
     experiment: str
     settings: Mapping[str, Any]
-    trial: Trial
+    trial: Record
 
 
 class System(Protocol):
@@ -169,13 +169,13 @@ class System(Protocol):
     name: str
     parameters: tuple[Parameter, ...]  # of the base model, those that are to be fitted
     effects: Mapping[str, Effect]
-    trials: tuple[Trial, ...]
+    trials: tuple[Record, ...]
 
     def predict(
         self,
         theta: Theta,
         effects: tuple[str, ...],
-        trial: Trial,
+        trial: Record,
         *,
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
@@ -193,7 +193,7 @@ class System(Protocol):
         self,
         thetas: Sequence[Theta],
         effects: tuple[str, ...],
-        trial: Trial,
+        trial: Record,
         *,
         coarse: bool = False,
         corrections: Sequence[Sequence[Correction]] = (),
@@ -208,21 +208,21 @@ class System(Protocol):
             for theta, learnt in zip(thetas, corrections, strict=True)
         ]
 
-    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+    def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         """Named quantities, shape (n,) each, on which a residual may depend: "displacement", "direction of
         motion", "velocity", "command", "time since the last switch", "position in the pipe" ..."""
         return {}
 
-    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+    def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         """What varies from run to run in this trial: fitted for each trial, with a Gaussian prior of mean
         `value` and standard deviation `scale`."""
         return ()
 
-    def matters(self, parameter: str, trial: Trial) -> bool:
+    def matters(self, parameter: str, trial: Record) -> bool:
         """False if this base parameter cannot change this trial: saves a simulation per derivative."""
         return True
 
-    def isolates(self, trial: Trial) -> bool:
+    def isolates(self, trial: Record) -> bool:
         """Whether a trial shows a few parameters by themselves. Fits from afar begin with such trials: in one where
         everything acts together, and small errors add up, they would lose their way."""
         return True

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from virtual_robot.plant.parameters import ParameterError
+from virtual_robot.plant.parameters import PlantParameterError
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,11 @@ def plant_parameters(effects: Mapping[str, Mapping[str, float]]) -> dict[str, fl
     numbers: dict[str, float] = {}
     for name, given in effects.items():
         if name not in EFFECTS:
-            raise ParameterError(f"no effect {name!r}; there are {', '.join(EFFECTS)}")
+            raise PlantParameterError(f"no effect {name!r}; there are {', '.join(EFFECTS)}")
         effect = EFFECTS[name]
         unknown = set(given) - set(effect.sizes) - set(effect.drawn)
         if unknown:
             allowed = ", ".join([*effect.sizes, *effect.drawn])
-            raise ParameterError(f"{name} has no parameter {', '.join(sorted(unknown))}; it has {allowed}")
+            raise PlantParameterError(f"{name} has no parameter {', '.join(sorted(unknown))}; it has {allowed}")
         numbers |= {f"{name}_{key}": float(value) for key, value in (effect.defaults() | dict(given)).items()}
     return numbers

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
 
-from bifa.effects.effect import Effect, EffectError, EffectParameter
+from bifa.effects.effect import EffectError, EffectParameter, PhysicalEffect
 
-__all__ = ["Effect", "EffectError", "EffectParameter", "complete", "library", "modules"]
+__all__ = ["EffectError", "EffectParameter", "PhysicalEffect", "complete", "library", "modules"]
 
 _NOT_AN_EFFECT = "effect"
 
@@ -24,7 +24,7 @@ def modules() -> Mapping[str, object]:
 
 
 @cache
-def library() -> Mapping[str, Effect]:
+def library() -> Mapping[str, PhysicalEffect]:
     """Every effect by name."""
     return MappingProxyType({name: module.EFFECT for name, module in modules().items()})
 

@@ -1,8 +1,8 @@
 """The cross-section area changes along the stroke, as the pouch folds and bulges."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="area_variation",
     summary="the area on which the pressure acts grows or shrinks along the stroke",
     equation="F = a (1 + slope (x - x_contracted) / stroke) p",

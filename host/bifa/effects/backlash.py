@@ -1,8 +1,8 @@
 """Backlash: play between the bistable mechanism and the end that moves."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="backlash",
     summary="the spring follows the moving end only after a play is taken up, and so does a pull at the head",
     equation="K(y), y follows x as a play of width gap_m; anchor pull: the load train is slack over gap_m",

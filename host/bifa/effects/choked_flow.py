@@ -1,8 +1,8 @@
 """Choked flow: the chamber cannot fill or empty faster than the valve's throat lets through."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="choked_flow",
     summary="the filling rate saturates at a large pressure difference",
     equation="dp/dt = r / (1 + (saturation_s_per_psi |r|)^n)^(1/n),  r = alpha (p_d - p),  n = sharpness",

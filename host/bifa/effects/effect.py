@@ -34,7 +34,7 @@ class EffectParameter:
 
 
 @dataclass(frozen=True)
-class Effect:
+class PhysicalEffect:
     """A physical cause that the paper's model lacks.
 
     `enters`: the equation and the place in it; `experiments`: where it can be seen at all;

@@ -1,8 +1,8 @@
 """Friction that differs forward and backward, as tape, bristles or a curved support make it."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="friction_direction",
     summary="sliding forward meets another friction than sliding backward",
     equation="mu_forward = mu (1 + asymmetry),  mu_backward = mu (1 - asymmetry)",

@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="hysteresis",
     summary="the spring's force depends on the direction in which it was last moved, not on how fast",
     equation="K(x) + force_N z,  dz/dx = (1 - z sign(dx)) / displacement_m,  |z| <= 1",

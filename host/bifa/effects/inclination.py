@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="inclination",
     summary="part of the weight acts along the pipe of the walks, uphill positive",
     equation="- m g sin(angle) on each half; m g cos(angle) in the normal force (7)",

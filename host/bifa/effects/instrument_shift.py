@@ -1,8 +1,8 @@
 """Instrument shift: the camera's record is late or early against the Uno's."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="instrument_shift",
     summary="displacements are recorded late (negative: early) against the pressures; the motion is as the model says",
     equation="x_recorded(t) = x(t - share late_s)",

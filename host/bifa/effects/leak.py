@@ -1,8 +1,8 @@
 """Leak: air escapes from each chamber to the surroundings."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="leak",
     summary="a chamber loses pressure towards that of the surroundings, so it never quite reaches the supply's",
     equation="dp/dt = alpha (p_d - p) - rate_per_s p",

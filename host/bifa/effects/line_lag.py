@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="line_lag",
     summary="the pressure at the chamber's inlet follows the valve's with a lag of first order",
     equation="time_s dp_in/dt = p_d - p_in;  eq. (2) and (3) with p_in for p_d",

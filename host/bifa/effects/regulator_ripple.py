@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="regulator_ripple",
     summary="the positive supply oscillates around its set-point",
     equation="p_supply = p_0 + amplitude_psi sin(2 pi frequency_Hz t + phase_rad)",

@@ -1,8 +1,8 @@
 """Sensor calibration: a wrong gain and offset of the pressure reading."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="sensor_calibration",
     summary="the pressure reading is off by a gain and an offset; the motion itself is as the model says",
     equation="reading = (1 + gain) p + offset_psi",

@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="sensor_lag",
     summary="the pressure reading follows late; the motion itself is as the model says",
     equation="time_s ds/dt = p - s, s is read",

@@ -1,8 +1,8 @@
 """Sensor position: near the valve the sensor sees part of the drop in the line, not the chamber."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="sensor_position",
     summary="while air flows, the sensor reads between the chamber's pressure and the valve's",
     equation="reading = p + share (p_d - p)",

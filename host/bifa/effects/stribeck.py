@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="stribeck",
     summary="friction falls smoothly with sliding speed",
     equation="mu(v) = mu_k + (mu_s - mu_k) exp(-(v / speed_m_s)^2)",

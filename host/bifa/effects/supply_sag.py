@@ -1,8 +1,8 @@
 """Supply sag: the supplies give way while chambers are filling."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="supply_sag",
     summary="a supply's pressure falls with the flow drawn from it, so chambers that fill together slow each other",
     equation="p_supply = p_0 - resistance_s sum_i w_i alpha_i (p_supply - p_i), over the chambers on that supply, "

@@ -1,8 +1,8 @@
 """Tether drag: the tubes behind the robot drag more, the further it goes."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="tether_drag",
     summary="a resistance at the tail that grows with the distance travelled",
     equation="friction of the tail + drag_N_m max(x_t - x_t(0), 0)",

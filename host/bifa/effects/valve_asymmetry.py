@@ -1,8 +1,8 @@
 """Valve asymmetry: opening to positive pressure and going back to vacuum take different times."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="valve_asymmetry",
     summary="one edge of the valves is later than the other",
     equation="delay of the edge to positive pressure - delay of the edge to vacuum = difference_s; the earlier is 0",

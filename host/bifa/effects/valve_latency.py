@@ -1,8 +1,8 @@
 """Valve latency: the same delay between command and valve on both edges."""
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="valve_latency",
     summary="every valve acts a fixed time after its command, opening and closing alike",
     equation="p_d(t) = p_command(t - delay_s)",

@@ -2,9 +2,9 @@
 
 import math
 
-from bifa.effects.effect import Effect, EffectParameter
+from bifa.effects.effect import EffectParameter, PhysicalEffect
 
-EFFECT = Effect(
+EFFECT = PhysicalEffect(
     name="viscoelasticity",
     summary="part of the spring's force relaxes while it is held, so fast motion meets a stiffer spring",
     equation="K(x) + q,  dq/dt = stiffness_N_m dx/dt - q / time_s  (a Maxwell branch)",

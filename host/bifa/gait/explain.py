@@ -6,7 +6,7 @@ import numpy as np
 
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
-from bifa.simulate import Record, walk
+from bifa.simulate import SimulatedTrial, walk
 
 CYCLES = 8
 _RATE_HZ = 1000.0
@@ -22,7 +22,7 @@ class Anatomy:
     """
 
     gait: Gait
-    record: Record
+    record: SimulatedTrial
     advance_mm: float
     speed_mm_s: float
     extension_s: float

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 
 @dataclass(frozen=True)
-class Estimate:
+class IntervalEstimate:
     """`value` with the interval `lower` to `upper` of the given `confidence`; `sd` is its standard deviation."""
 
     value: float
@@ -22,7 +22,9 @@ class Estimate:
         return self.lower <= truth <= self.upper
 
 
-def weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float = 0.0, confidence: float = 0.9) -> Estimate:
+def weighted_mean(
+    values: np.ndarray, weights: np.ndarray, common_sd: float = 0.0, confidence: float = 0.9
+) -> IntervalEstimate:
     """The mean of repeated measurements whose variances go as 1/weights, with an interval from their scatter.
 
     `common_sd`: what shifts all of them alike and therefore does not show in the scatter. The degrees of freedom are
@@ -32,9 +34,9 @@ def weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float = 0.
     mean = float(np.average(values, weights=weights))
     n = len(values)
     if n < 2:
-        return Estimate(mean, np.inf, -np.inf, np.inf, confidence)
+        return IntervalEstimate(mean, np.inf, -np.inf, np.inf, confidence)
     scatter = float(np.sqrt(np.sum(weights * (values - mean) ** 2) / (n - 1) / weights.sum()))
     sd = float(np.hypot(scatter, common_sd))
     freedom = (n - 1) * (sd / scatter) ** 4 if scatter > 0 else np.inf
     half = float(student.ppf(0.5 + confidence / 2, freedom)) * sd
-    return Estimate(mean, sd, mean - half, mean + half, confidence)
+    return IntervalEstimate(mean, sd, mean - half, mean + half, confidence)

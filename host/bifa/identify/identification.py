@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bifa.data import Dataset
-from bifa.identify.estimate import Estimate
+from bifa.identify.estimate import IntervalEstimate
 from bifa.identify.robust import with_uncertainty
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import StaticFit
@@ -74,7 +74,7 @@ class Identification:
     model: Model
     fit: Fit
     uncertainty: Uncertainty
-    intervals: Mapping[str, Estimate]
+    intervals: Mapping[str, IntervalEstimate]
     statics: Mapping[str, StaticFit]
     open: tuple[Open, ...]
     error: Mapping[tuple[str, str], float]
@@ -88,7 +88,7 @@ def identify(
 ) -> Identification:
     """Identify the robot of `dataset` from `model` (the nominal one) on: the paper's stages, then all together.
 
-    Raises TooLittleDataError where nothing at all can be fitted. Deterministic.
+    Raises UndeterminedError where nothing at all can be fitted. Deterministic.
     """
     system = prepare(dataset, model, progress)
     progress("all experiments together, pressures included")
@@ -110,7 +110,7 @@ def identify(
     )
 
 
-def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, Estimate]:
+def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, IntervalEstimate]:
     """Quadratic intervals, wider where the experiments contradict one another by more than their noise."""
     spread = np.sqrt(np.diag(clustered_covariance(fit)))
     found = {}
@@ -120,11 +120,11 @@ def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, E
             low, high = estimate.value - _NORMAL_HALF * sd, estimate.value + _NORMAL_HALF * sd
             parameter = system.model.parameters[estimate.name]
             low, high = max(low, parameter.lower), min(high, parameter.upper)
-            found[estimate.name] = Estimate(estimate.value, sd, low, high, CONFIDENCE)
+            found[estimate.name] = IntervalEstimate(estimate.value, sd, low, high, CONFIDENCE)
     return found
 
 
-def _profiles(fit: Fit, intervals: Mapping[str, Estimate]) -> dict[str, Estimate]:
+def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, IntervalEstimate]:
     """Profile-likelihood intervals from the pulls alone, the rest of the robot where the joint fit has it; never
     narrower than the quadratic ones."""
     pulls = [trial for trial in fit.problem.trials if trial.experiment == ANCHOR]
@@ -138,12 +138,12 @@ def _profiles(fit: Fit, intervals: Mapping[str, Estimate]) -> dict[str, Estimate
         old = intervals[name]
         low, high = profile_interval(local, name, confidence=CONFIDENCE)
         low, high = min(low, old.lower), max(high, old.upper)
-        found[name] = Estimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high, CONFIDENCE)
+        found[name] = IntervalEstimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high, CONFIDENCE)
     return found
 
 
 def _model(
-    system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, Estimate], dataset: Dataset
+    system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, IntervalEstimate], dataset: Dataset
 ) -> Model:
     """The identified model: fitted values with their sd, and the covariance of those that are determined."""
     sd = {name: interval.sd for name, interval in intervals.items()}

@@ -16,9 +16,9 @@ from bifa.data import Dataset
 from bifa.identify.equilibria import pressure_sd_psi, reach_m, rests
 from bifa.identify.static import StaticFit, fit_static
 from bifa.pipe_robot.curves import FittedCurve
-from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.system import RobotSystem, fittable
-from bifa.robot import Model, ParameterError
+from bifa.robot import Model, ModelParameterError
 
 _ACTUATORS = {"large": "body", "small": "small"}
 _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supply
@@ -30,10 +30,10 @@ def prepare(dataset: Dataset, model: Model | None = None, progress: Progress = l
     """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
     stand where the static stage leaves them, and the rest is as in `model` (default: nominal).
 
-    `progress` is told the stage's name. Raises TooLittleDataError where the data set holds nothing that can be fitted.
+    `progress` is told the stage's name. Raises UndeterminedError where the data set holds nothing that can be fitted.
     """
     if not dataset.trials:
-        raise TooLittleDataError("the data set holds no trials: nothing can be fitted")
+        raise UndeterminedError("the data set holds no trials: nothing can be fitted")
     model = model or robot.nominal()
     progress("static loading: stiffness and area")
     statics = fit_statics(dataset)
@@ -42,7 +42,7 @@ def prepare(dataset: Dataset, model: Model | None = None, progress: Progress = l
     curves = {_ACTUATORS[a]: _curve(dataset, fit, values, model) for a, fit in statics.items()}
     system = RobotSystem(dataset, model.with_values(values), curves, fittable(dataset, curves))
     if not system.parameters:
-        raise TooLittleDataError("these trials constrain no unknown parameter of the model")
+        raise UndeterminedError("these trials constrain no unknown parameter of the model")
     return system
 
 
@@ -52,7 +52,7 @@ def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
     for actuator in _ACTUATORS:
         try:
             found[actuator] = fit_static(dataset, actuator, reach_m(dataset, actuator))
-        except TooLittleDataError:
+        except UndeterminedError:
             continue  # the model's own curve stands in; the report says so
     return found
 
@@ -76,7 +76,7 @@ def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model:
 def _known(dataset: Dataset, model: Model) -> dict[str, float]:
     unknown = [name for name in dataset.known if name not in model.parameters]
     if unknown:
-        raise ParameterError(
+        raise ModelParameterError(
             f"[known] in dataset.toml names {', '.join(unknown)}, which is not a parameter of the model; "
             f"there are {', '.join(model.parameters)}"
         )

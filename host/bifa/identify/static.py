@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.data import Dataset, Trial
-from bifa.identify.estimate import Estimate, weighted_mean
-from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.identify.estimate import IntervalEstimate, weighted_mean
+from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.motion import imposed_motion
 from bifa.pipe_robot.stiffness import StiffnessFit, fit_stiffness
 
@@ -26,7 +26,7 @@ class StaticFit:
 
     actuator: str
     stiffness: StiffnessFit
-    area_N_psi: Estimate | None
+    area_N_psi: IntervalEstimate | None
     hysteresis_N: float
     residual_N: dict[str, float]
 
@@ -36,12 +36,12 @@ def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | N
 
     reach_m: the least and greatest displacement that other experiments reach.
 
-    Raises TooLittleDataError without a trial at 0 psi.
+    Raises UndeterminedError without a trial at 0 psi.
     """
     trials = dataset.of("static_loading", actuator)
     unloaded = [trial for trial in trials if abs(trial.pressure_psi) < UNPRESSURISED_PSI]
     if not unloaded:
-        raise TooLittleDataError(
+        raise UndeterminedError(
             f"the stiffness curve of the {actuator} actuator cannot be determined: there is no static_loading of it at "
             f"0 psi; run `bifa experiment static_loading --actuator {actuator}`"
         )
@@ -60,7 +60,7 @@ def _branches(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return x[moving], trial.columns["force_N"][moving], direction[moving] > 0
 
 
-def _area(stiffness: StiffnessFit, trials: list[Trial]) -> Estimate:
+def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
     """Each trial gives one area, the mean of (K(x) - F) / p; higher pressures measure it better."""
     areas, weights = [], []
     for trial in trials:

@@ -12,7 +12,7 @@ from bifa.link.errors import (
 )
 from bifa.link.session import Counters, Hello
 from bifa.link.transport import PortGoneError, Transport
-from bifa.link.units import ParameterError
+from bifa.link.units import UnoParameterError
 from bifa.link.uno import Sample, Status, Uno
 
 __all__ = [
@@ -24,7 +24,6 @@ __all__ = [
     "LinkError",
     "MismatchError",
     "NoAnswerError",
-    "ParameterError",
     "PortGoneError",
     "RefusedError",
     "RestartedError",
@@ -33,5 +32,6 @@ __all__ = [
     "StillMovingError",
     "Transport",
     "Uno",
+    "UnoParameterError",
     "WallClock",
 ]

@@ -4,7 +4,7 @@
 from typing import NamedTuple
 
 
-class Parameter(NamedTuple):
+class UnoParameter(NamedTuple):
     """One parameter; the bounds and the default are integers in wire units: the value times 10^decimals."""
 
     name: str
@@ -31,23 +31,23 @@ TABLE_HASH = 0x6908B694
 NAME_BYTES = 12
 
 PARAMETERS = (
-    Parameter('period_s', 's', 6, 500000, 60000000, 5700000,
+    UnoParameter('period_s', 's', 6, 500000, 60000000, 5700000,
               'time of one cycle (1/f)'),
-    Parameter('psi12_deg', 'deg', 3, 0, 360000, 270000,
+    UnoParameter('psi12_deg', 'deg', 3, 0, 360000, 270000,
               'phase of the head ahead of the body (psi_12)'),
-    Parameter('psi13_deg', 'deg', 3, 0, 360000, 90000,
+    UnoParameter('psi13_deg', 'deg', 3, 0, 360000, 90000,
               'phase of the tail ahead of the body (psi_13)'),
-    Parameter('duty_body', '', 4, 0, 10000, 5000,
+    UnoParameter('duty_body', '', 4, 0, 10000, 5000,
               'vacuum part of the cycle: contracts (d_1)'),
-    Parameter('duty_head', '', 4, 0, 10000, 5000,
+    UnoParameter('duty_head', '', 4, 0, 10000, 5000,
               'vacuum part of the cycle: lets go (d_2)'),
-    Parameter('duty_tail', '', 4, 0, 10000, 5000,
+    UnoParameter('duty_tail', '', 4, 0, 10000, 5000,
               'vacuum part of the cycle: lets go (d_3)'),
-    Parameter('coupling_per_s', '1/s', 3, 0, 20000, 10000,
+    UnoParameter('coupling_per_s', '1/s', 3, 0, 20000, 10000,
               "oscillators' pull into phase (alpha_phi)"),
-    Parameter('pressure_psi', 'psi', 3, 0, 14000, 8500,
+    UnoParameter('pressure_psi', 'psi', 3, 0, 14000, 8500,
               'set-point of the positive supply'),
-    Parameter('host_timeout_s', 's', 3, 0, 60000, 0,
+    UnoParameter('host_timeout_s', 's', 3, 0, 60000, 0,
               'vent after such silence of the host; 0 = never'),
 )
 

@@ -6,25 +6,25 @@ from collections.abc import Mapping
 from decimal import ROUND_HALF_UP, Decimal
 
 from bifa.errors import BifaError
-from bifa.link.table import PARAMETERS, SET_FORMAT, Parameter
+from bifa.link.table import PARAMETERS, SET_FORMAT, UnoParameter
 
 _CONVERTER_COUNTS = 4096  # MCP4725
 _REGULATOR_SPAN_MPSI = 130_000  # ITV1050: 0 to 5 V
 BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
 
 
-class ParameterError(BifaError):
+class UnoParameterError(BifaError):
     """A parameter that does not exist or whose value lies out of its range."""
 
 
-def _parameter(name: str) -> Parameter:
+def _parameter(name: str) -> UnoParameter:
     try:
         return BY_NAME[name]
     except KeyError:
-        raise ParameterError(f"there is no parameter {name!r}; there are {', '.join(BY_NAME)}") from None
+        raise UnoParameterError(f"there is no parameter {name!r}; there are {', '.join(BY_NAME)}") from None
 
 
-def range_text(parameter: Parameter) -> str:
+def range_text(parameter: UnoParameter) -> str:
     """ "0.5 to 60 s" """
     low, high = (from_wire(parameter.name, bound) for bound in (parameter.minimum, parameter.maximum))
     return f"{low:g} to {high:g} {parameter.unit}".rstrip()
@@ -33,14 +33,14 @@ def range_text(parameter: Parameter) -> str:
 def to_wire(name: str, value: float) -> int:
     """The integer that stands for `value` (in the unit of the name), rounded half up as the Uno rounds.
 
-    Raises ParameterError, which names the range, for an unknown name, NaN, infinity and values out of range.
+    Raises UnoParameterError, which names the range, for an unknown name, NaN, infinity and values out of range.
     """
     parameter = _parameter(name)
     if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        raise ParameterError(f"{name} must be a number, {range_text(parameter)}, not {value!r}")
+        raise UnoParameterError(f"{name} must be a number, {range_text(parameter)}, not {value!r}")
     scaled = Decimal(str(value)).scaleb(parameter.decimals)
     if not parameter.minimum <= scaled <= parameter.maximum:
-        raise ParameterError(f"{name} = {value:g} is out of range: {range_text(parameter)}")
+        raise UnoParameterError(f"{name} = {value:g} is out of range: {range_text(parameter)}")
     return int(scaled.to_integral_value(ROUND_HALF_UP))
 
 

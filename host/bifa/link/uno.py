@@ -14,7 +14,7 @@ from bifa.link.leaving import CONFIRMED_WITHIN_S
 from bifa.link.session import Counters, Hello, Session
 from bifa.link.table import CHAMBER_STATES, CHAMBERS, FAULTS, STATES
 from bifa.link.transport import Transport
-from bifa.link.units import ParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
+from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
 from bifa.link.words import word
 
 EEPROM_TIMEOUT_S = 10.0
@@ -170,8 +170,8 @@ class Uno:
         """Replace the parameter set as a whole and read it back; parameters not named stay as they are.
 
         A walking robot takes the new set at the next cycle boundary: `wait` returns only then. `save` keeps it as a
-        preset as well. Raises ParameterError before anything is sent if a value is out of range, and LinkError if the
-        Uno ends up with anything but what was meant.
+        preset as well. Raises UnoParameterError before anything is sent if a value is out of range, and LinkError if
+        the Uno ends up with anything but what was meant.
         """
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
         wanted = {**self._read_set()[0], **wanted}
@@ -275,12 +275,12 @@ class Uno:
     def schedule(self, holds: Iterable[tuple[float, str, str]]) -> None:
         """Start timed holds (time_s, chamber, state), in order of time, executed by the Uno on its own ticks (1 ms).
 
-        Time 0 is the start, which is sent only when the Uno has every entry. Raises ParameterError, before anything is
-        sent, for more than SCHEDULE_ENTRIES, RefusedError for times that go backwards.
+        Time 0 is the start, which is sent only when the Uno has every entry. Raises UnoParameterError, before anything
+        is sent, for more than SCHEDULE_ENTRIES, RefusedError for times that go backwards.
         """
         additions = [("schedule_add", (_milliseconds(time_s), *_hold_fields(c, s))) for time_s, c, s in holds]
         if len(additions) > SCHEDULE_ENTRIES:
-            raise ParameterError(f"{len(additions)} timed holds; the Uno has room for {SCHEDULE_ENTRIES}")
+            raise UnoParameterError(f"{len(additions)} timed holds; the Uno has room for {SCHEDULE_ENTRIES}")
         self.session.call_all([("schedule_clear", ()), *additions])
         self.may_move = True
         self.session.call("schedule_start")
@@ -395,17 +395,17 @@ def _psi(milli: tuple[int, int, int]) -> tuple[float, float, float]:
 
 def _name_field(preset: str) -> bytes:
     if not preset or len(preset) > 12 or not all(c in "abcdefghijklmnopqrstuvwxyz0123456789_-" for c in preset):
-        raise ParameterError(f"a preset's name is 1 to 12 of a-z, 0-9, _ and -, not {preset!r}")
+        raise UnoParameterError(f"a preset's name is 1 to 12 of a-z, 0-9, _ and -, not {preset!r}")
     return frames.encode_name(preset)
 
 
 def _milliseconds(time_s: float) -> int:
     if not 0 <= time_s <= LATEST_HOLD_S:
-        raise ParameterError(f"the time of a hold is 0 to {LATEST_HOLD_S:.3f} s, not {time_s!r}")
+        raise UnoParameterError(f"the time of a hold is 0 to {LATEST_HOLD_S:.3f} s, not {time_s!r}")
     return round(time_s * 1000)
 
 
 def _hold_fields(chamber: str, state: str) -> tuple[int, int]:
     if chamber not in CHAMBERS or state not in CHAMBER_STATES:
-        raise ParameterError(f"hold {'|'.join(CHAMBERS)} {'|'.join(CHAMBER_STATES)}, not {chamber!r} {state!r}")
+        raise UnoParameterError(f"hold {'|'.join(CHAMBERS)} {'|'.join(CHAMBER_STATES)}, not {chamber!r} {state!r}")
     return CHAMBERS.index(chamber), CHAMBER_STATES.index(state)

@@ -3,5 +3,5 @@
 from bifa.errors import BifaError
 
 
-class TooLittleDataError(BifaError):
+class UndeterminedError(BifaError):
     """A parameter cannot be determined from this data set; the text says which, and which experiment would do it."""

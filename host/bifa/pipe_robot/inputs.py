@@ -131,7 +131,7 @@ class PullInputs:
             for record, case in zip(records, cases, strict=True)
         ]
 
-    def _force(self, record: simulate.Record, nuisances: Theta) -> np.ndarray:
+    def _force(self, record: simulate.SimulatedTrial, nuisances: Theta) -> np.ndarray:
         """The resistance, passing from the wound-up load cell to sliding over one sample instead of at once.
 
         A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change

@@ -11,7 +11,7 @@ def engine_effects() -> dict[str, Effect]:
     return {name: _engine_effect(effect) for name, effect in effects.library().items()}
 
 
-def _engine_effect(effect: effects.Effect) -> Effect:
+def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
     ordered = sorted((p for p in effect.parameters if not p.own), key=lambda p: not p.size)
     return Effect(
         name=effect.name,

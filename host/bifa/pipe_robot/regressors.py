@@ -7,12 +7,12 @@ import numpy as np
 from bifa.pipe_robot.inputs import PullInputs, StaticInputs, StepInputs, WalkInputs
 from bifa.robot.cpg import CHAMBERS
 from bifa.simulate import Timeline
-from lacuna.system import Channels, Trial
+from lacuna.system import Channels, Record
 
 _RESTING_MM_S = 0.2
 
 
-def of(trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+def of(trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
     """Regressors of a trial, each of shape (n,)."""
     named = {"time": trial.time_s - trial.time_s[0]}
     if trial.session_order is not None:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import LinearConstraint, minimize
 
-from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.errors import UndeterminedError
 from lacuna.estimation.autocorrelation import correlation_samples
 
 DEGREE = 15
@@ -83,7 +83,7 @@ class StiffnessFit:
         force = self.force(x)
         falling = np.flatnonzero((force[:-1] > 0) & (force[1:] <= 0))
         if not len(falling):
-            raise TooLittleDataError("the curve does not fall through 0 between its ends: the actuator is not bistable")
+            raise UndeterminedError("the curve does not fall through 0 between its ends: the actuator is not bistable")
         i = falling[0]
         return float(x[i] + (x[i + 1] - x[i]) * force[i] / (force[i] - force[i + 1]))
 
@@ -135,15 +135,15 @@ def fit_stiffness(
     displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
     reach_m: the least and greatest displacement that the curve will be asked for, if known.
 
-    Raises TooLittleDataError if there are too few points or they cover next to nothing.
+    Raises UndeterminedError if there are too few points or they cover next to nothing.
     """
     x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
     if len(x) < _MIN_POINTS:
-        raise TooLittleDataError(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
+        raise UndeterminedError(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
     covered = (float(x.min()), float(x.max()))
     width = covered[1] - covered[0]
     if width < 1e-3:
-        raise TooLittleDataError(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be fitted to it")
+        raise UndeterminedError(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be fitted to it")
     lower, upper = covered[0] - CONTINUATION * width, covered[1] + CONTINUATION * width
     if reach_m is not None:
         lower = max(lower, min(reach_m[0], covered[0]) - 0.01 * width)

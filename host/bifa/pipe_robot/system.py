@@ -12,8 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from bifa import robot
-from bifa.data import Dataset
-from bifa.data import Trial as Recorded
+from bifa.data import Dataset, Trial
 from bifa.errors import BifaError
 from bifa.pipe_robot import candidates, learnt_terms, regressors, sites
 from bifa.pipe_robot.accuracy import accuracy_of
@@ -34,9 +33,9 @@ from lacuna.system import (
     CorrectionSite,
     Effect,
     Parameter,
+    Record,
     System,
     Theta,
-    Trial,
 )
 
 FRICTION_WOBBLE = 0.01  # from run to run, relative
@@ -113,7 +112,7 @@ class RobotSystem(System):
         self,
         theta: Theta,
         effects: tuple[str, ...],
-        trial: Trial,
+        trial: Record,
         *,
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
@@ -124,7 +123,7 @@ class RobotSystem(System):
         self,
         thetas: Sequence[Theta],
         effects: tuple[str, ...],
-        trial: Trial,
+        trial: Record,
         *,
         coarse: bool = False,
         corrections: Sequence[Sequence[Correction]] = (),
@@ -146,7 +145,7 @@ class RobotSystem(System):
             for case, learnt in zip(cases, corrections, strict=True)
         ]
 
-    def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Trial) -> Case | None:
+    def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record) -> Case | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
         place = self._place_in_session(trial)
         inputs: Inputs = learnt_terms.corrected_inputs(trial.payload, learnt, place)
@@ -157,14 +156,14 @@ class RobotSystem(System):
             return None
         return Case(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
 
-    def _place_in_session(self, trial: Trial) -> float:
+    def _place_in_session(self, trial: Record) -> float:
         """0 for the day's first trial, 1 for its last; 0 where the order was not noted."""
         return (trial.session_order or 0) / max(self._last_in_session, 1)
 
-    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+    def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         return regressors.of(trial, prediction)
 
-    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+    def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         found = []
         if trial.experiment in (ANCHOR, WALK):
             source = "friction differs from run to run"
@@ -176,7 +175,7 @@ class RobotSystem(System):
             found.append(self._slip_late(trial))
         return tuple(found)
 
-    def _slip_late(self, trial: Trial) -> Parameter:
+    def _slip_late(self, trial: Record) -> Parameter:
         # Repeats are sampled alike, so that the same half sample may be missed in all of them.
         half_s = 0.5 * trial.payload.sample_s
         alike = sum(other.condition == trial.condition for other in self.trials)
@@ -193,7 +192,7 @@ class RobotSystem(System):
     def spare(self) -> tuple[tuple[str, Hashable], ...]:
         return spare(self.dataset)
 
-    def matters(self, parameter: str, trial: Trial) -> bool:
+    def matters(self, parameter: str, trial: Record) -> bool:
         actuator = trial.payload.actuator
         if parameter in BENCH:
             return (trial.experiment, actuator) == _FELT[parameter]
@@ -206,7 +205,7 @@ class RobotSystem(System):
             return False
         return trial.experiment in (STATIC, STEP) or parameter in self.curves[prefix].felt
 
-    def isolates(self, trial: Trial) -> bool:
+    def isolates(self, trial: Record) -> bool:
         return trial.experiment != WALK
 
     def accuracy(self, experiment: str, channel: str) -> float:
@@ -308,11 +307,11 @@ def _bench_unknowns(dataset: Dataset) -> list[str]:
     return [name for name, where in _FELT.items() if where in experiments]
 
 
-def _nothing(trial: Trial) -> Channels:
+def _nothing(trial: Record) -> Channels:
     return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
 
 
-def _seen(channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case, trial: Trial) -> Channels:
+def _seen(channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case, trial: Record) -> Channels:
     """What the instruments show of a simulation."""
     channels = learnt_terms.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
     return {name: channels[name] for name in trial.channels}
@@ -322,12 +321,12 @@ def _all_of(effect: Effect) -> tuple[Parameter, ...]:
     return effect.parameters + effect.own
 
 
-def _engine_trial(recorded: Recorded, inputs: Inputs, measured: bool = True) -> Trial:
+def _engine_trial(recorded: Trial, inputs: Inputs, measured: bool = True) -> Record:
     channels = {
         name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
         for name in inputs.channels
     }
-    return Trial(
+    return Record(
         name=recorded.file,
         experiment=recorded.experiment,
         condition=recorded.condition,
@@ -338,7 +337,7 @@ def _engine_trial(recorded: Recorded, inputs: Inputs, measured: bool = True) -> 
     )
 
 
-def _altered(plant: Plant, trial: Trial, theta: Theta, positive_psi: float | None) -> Plant:
+def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:
     """`plant` as it is in one trial: its friction, its supply, and what moves on the stand."""
     friction = theta.get("friction_scale", 1.0)
     q = plant.q.copy()

@@ -11,7 +11,7 @@ import numpy as np
 from bifa.identify.identification import Identification
 from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.style import CHAMBER_COLOURS, Palette, figure_style
-from lacuna.system import Channels, Trial
+from lacuna.system import Channels, Record
 
 
 def draw(found: Identification, folder: Path) -> list[Path]:
@@ -80,8 +80,8 @@ def _save(figure, path: Path) -> None:
     plt.close(figure)
 
 
-def _by_actuator(pairs) -> dict[str, list[tuple[Trial, Channels]]]:
-    groups: dict[str, list[tuple[Trial, Channels]]] = {}
+def _by_actuator(pairs) -> dict[str, list[tuple[Record, Channels]]]:
+    groups: dict[str, list[tuple[Record, Channels]]] = {}
     for trial, prediction in pairs:
         groups.setdefault(trial.payload.actuator, []).append((trial, prediction))
     return dict(sorted(groups.items()))
@@ -145,7 +145,7 @@ def _anchor(pairs, palette: Palette, path: Path) -> None:
 
 def _walks(pairs, palette: Palette, path: Path) -> None:
     """The first repeat of each gait: those that follow would lie on it."""
-    first: dict[object, tuple[Trial, Channels]] = {}
+    first: dict[object, tuple[Record, Channels]] = {}
     for trial, prediction in pairs:
         first.setdefault(trial.condition, (trial, prediction))
     figure, axes = _axes((3.0, 1.3), len(first))

@@ -11,7 +11,7 @@ import tomli_w
 
 from bifa.errors import BifaError
 from bifa.ranges import RANGES
-from bifa.robot.parameters import ParameterError, check_bounds
+from bifa.robot.parameters import ModelParameterError, check_bounds
 from bifa.toml import parse_toml
 
 FORMAT = 1
@@ -24,7 +24,7 @@ class GaitError(BifaError):
 def _checked(name: str, value: float) -> float:
     try:
         check_bounds(name, value, *RANGES[name])
-    except ParameterError as error:
+    except ModelParameterError as error:
         raise GaitError(f"gait: {error}") from None
     return float(value)
 

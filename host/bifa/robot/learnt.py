@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.robot.parameters import ParameterError
+from bifa.robot.parameters import ModelParameterError
 
 # The terms that may have one, and by how many rows: two where it differs by direction (docs/diagnosis.md).
 ROWS = {
@@ -37,15 +37,15 @@ class LearntCurve:
             values = np.array(self.values, dtype=float)
             inside = float(self.lower) < float(self.upper)
         except (TypeError, ValueError):
-            raise ParameterError("a learnt curve has lower, upper and rows of as many values each") from None
+            raise ModelParameterError("a learnt curve has lower, upper and rows of as many values each") from None
         if not inside or values.ndim != 2 or values.shape[1] < 2 or not np.all(np.isfinite(values)):
-            raise ParameterError("a learnt curve needs lower below upper, and rows of two finite values or more")
+            raise ModelParameterError("a learnt curve needs lower below upper, and rows of two finite values or more")
         object.__setattr__(self, "values", values)
 
 
 def check(name: str, curve: LearntCurve) -> None:
-    """Raise ParameterError where there is no such term or the curve is not of its shape."""
+    """Raise ModelParameterError where there is no such term or the curve is not of its shape."""
     if name not in ROWS:
-        raise ParameterError(f"no curve can be learnt at {name!r}; known are {', '.join(ROWS)}")
+        raise ModelParameterError(f"no curve can be learnt at {name!r}; known are {', '.join(ROWS)}")
     if len(curve.values) != ROWS[name]:
-        raise ParameterError(f"the learnt curve {name} has {len(curve.values)} rows instead of {ROWS[name]}")
+        raise ModelParameterError(f"the learnt curve {name} has {len(curve.values)} rows instead of {ROWS[name]}")

@@ -10,7 +10,7 @@ import numpy as np
 from bifa import effects as library
 from bifa.robot.learnt import LearntCurve
 from bifa.robot.learnt import check as check_learnt
-from bifa.robot.parameters import BASE_PARAMETERS, Parameter, ParameterError, check_bounds
+from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParameterError, check_bounds
 from bifa.robot.stiffness import StiffnessCurve
 
 GRAVITY_M_S2 = 9.80665
@@ -27,7 +27,9 @@ class Covariance:
         matrix = np.asarray(self.matrix, dtype=float)
         n = len(self.names)
         if matrix.shape != (n, n) or not np.all(np.isfinite(matrix)) or not np.allclose(matrix, matrix.T):
-            raise ParameterError(f"the covariance of {n} parameters must be a symmetric {n} x {n} matrix of numbers")
+            raise ModelParameterError(
+                f"the covariance of {n} parameters must be a symmetric {n} x {n} matrix of numbers"
+            )
         object.__setattr__(self, "matrix", matrix)
 
 
@@ -40,7 +42,7 @@ class Model:
     """
 
     name: str
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, ModelParameter]
     body_stiffness: StiffnessCurve
     small_stiffness: StiffnessCurve
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -53,7 +55,7 @@ class Model:
         unknown = [name for name in self.parameters if name not in BASE_PARAMETERS]
         if missing or unknown:
             what = f"lacks {', '.join(missing)}" if missing else f"has unknown parameters {', '.join(unknown)}"
-            raise ParameterError(f"model {self.name!r} {what}; known are {', '.join(BASE_PARAMETERS)}")
+            raise ModelParameterError(f"model {self.name!r} {what}; known are {', '.join(BASE_PARAMETERS)}")
         for parameter in self.parameters.values():
             check_bounds(parameter.name, parameter.value, parameter.lower, parameter.upper, parameter.unit)
         object.__setattr__(self, "effects", {name: library.complete(name, v) for name, v in self.effects.items()})
@@ -71,7 +73,7 @@ class Model:
         try:
             return self.effects[effect][parameter]
         except KeyError:
-            raise ParameterError(f"model {self.name!r} has no parameter {name!r}") from None
+            raise ModelParameterError(f"model {self.name!r} has no parameter {name!r}") from None
 
     @property
     def values(self) -> dict[str, float]:
@@ -90,7 +92,7 @@ class Model:
                 effect, _, parameter = name.partition(".")
                 effects.setdefault(effect, {})[parameter] = value
             else:
-                raise ParameterError(f"{name!r} is no parameter; known are {', '.join(BASE_PARAMETERS)}")
+                raise ModelParameterError(f"{name!r} is no parameter; known are {', '.join(BASE_PARAMETERS)}")
         return replace(self, parameters=parameters, effects=effects, covariance=covariance or self.covariance)
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Model:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from bifa.errors import BifaError
 
 
-class ParameterError(BifaError):
+class ModelParameterError(BifaError):
     """A parameter's name, bounds or value is wrong; the text gives the name and the range."""
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ModelParameter:
     """One value of the model in SI units (pressures in psi, as everywhere in the paper).
 
     `lower` and `upper` bound what can be computed and fitted, `plausible` what a sane robot would show,
@@ -33,27 +33,27 @@ class Parameter:
     source: str
     sd: float | None = None
 
-    def with_value(self, value: float, sd: float | None = None, source: str | None = None) -> Parameter:
-        """The same parameter with another value; ParameterError when it is outside the bounds."""
+    def with_value(self, value: float, sd: float | None = None, source: str | None = None) -> ModelParameter:
+        """The same parameter with another value; ModelParameterError when it is outside the bounds."""
         check_bounds(self.name, value, self.lower, self.upper, self.unit)
         return replace(self, value=float(value), sd=sd, source=self.source if source is None else source)
 
 
 def check_bounds(name: str, value: float, lower: float, upper: float, unit: str = "") -> None:
-    """Raise ParameterError naming the range unless `value` is a finite number within it."""
+    """Raise ModelParameterError naming the range unless `value` is a finite number within it."""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not number or not lower <= value <= upper:  # NaN is not; and an integer may be too long for a float
-        raise ParameterError(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
+        raise ModelParameterError(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
 
 
 _SEARCHED = "found to reproduce the paper's reported speeds and forces"
 
 
 def _row(name, value, unit, lower, upper, plausible, meaning, source):
-    return name, Parameter(name, value, unit, lower, upper, plausible, meaning, source)
+    return name, ModelParameter(name, value, unit, lower, upper, plausible, meaning, source)
 
 
-BASE_PARAMETERS: dict[str, Parameter] = dict(
+BASE_PARAMETERS: dict[str, ModelParameter] = dict(
     [
         _row("head_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_h (4)", "paper: 350 g, a half each"),
         _row("tail_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_t (4)", "paper: 350 g, a half each"),

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bifa.robot.parameters import ParameterError
+from bifa.robot.parameters import ModelParameterError
 
 DEGREE = 15
 NOT_BISTABLE = "the stiffness curve is not bistable: it needs a stable, an unstable and a stable point"
@@ -33,9 +33,9 @@ class StiffnessCurve:
     def __post_init__(self):
         numbers = [*self.coefficients, self.lower_m, self.upper_m]
         if not 2 <= len(self.coefficients) <= DEGREE + 1 or not np.all(np.isfinite(numbers)):
-            raise ParameterError(f"a stiffness curve has 2 to {DEGREE + 1} finite coefficients")
+            raise ModelParameterError(f"a stiffness curve has 2 to {DEGREE + 1} finite coefficients")
         if not self.lower_m < self.upper_m:
-            raise ParameterError(
+            raise ModelParameterError(
                 f"a stiffness curve needs lower_m < upper_m, not {self.lower_m:g} and {self.upper_m:g}"
             )
 
@@ -54,7 +54,7 @@ class StiffnessCurve:
     def equilibria_m(self) -> tuple[float, float, float]:
         """Contracted stable, unstable (x_th of eq. (3)) and extended stable point.
 
-        The outer zeros of K that rise, and the falling one between them. ParameterError if K is not bistable.
+        The outer zeros of K that rise, and the falling one between them. ModelParameterError if K is not bistable.
         """
         x = np.linspace(self.lower_m, self.upper_m, _SCAN_POINTS)
         force = self.force(x)
@@ -68,7 +68,7 @@ class StiffnessCurve:
         falling = roots[force[crossings] >= 0].tolist()
         between = [root for root in falling if rising and rising[0] < root < rising[-1]]
         if len(rising) < 2 or not between:
-            raise ParameterError(NOT_BISTABLE)
+            raise ModelParameterError(NOT_BISTABLE)
         return rising[0], between[len(between) // 2], rising[-1]
 
     @property

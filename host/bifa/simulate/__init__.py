@@ -8,7 +8,7 @@
 from bifa.simulate.gaits import Progress, cores, full_lanes, gait_rows, speed, speeds
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.records import (
-    Record,
+    SimulatedTrial,
     anchor_pull,
     anchor_pulls,
     static_loading,
@@ -35,7 +35,7 @@ __all__ = [
     "Obstacle",
     "Plant",
     "Progress",
-    "Record",
+    "SimulatedTrial",
     "SimulationError",
     "Supports",
     "Timeline",

@@ -35,7 +35,7 @@ _WALK_HZ, _STEP_HZ = 100.0, 100.0
 
 
 @dataclass(frozen=True)
-class Record:
+class SimulatedTrial:
     """`columns` as in a data set's CSV (contracted = 0, mm, N, psi), `states` what no instrument sees (SI, psi)."""
 
     experiment: str
@@ -56,7 +56,7 @@ def walk(
     inclination_deg: float = 0.0,
     terrain: np.ndarray = rigs.CLEAR,
     tolerance_m: float = TOLERANCE_M,
-) -> Record:
+) -> SimulatedTrial:
     """A walk from rest (vented, contracted) at time 0, by a settled gait or by given commands.
 
     `time_s`: (n,) rising sample times from 0 on; left out, 100 Hz for `cycles` periods. `tolerance_m` bounds the
@@ -85,7 +85,7 @@ def walks(
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
     states: bool = True,
-) -> list[Record]:
+) -> list[SimulatedTrial]:
     """`walk` for each robot and its commands. `together`: they differ little and are to be compared with the first
     (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
     time_s = _times(time_s)
@@ -94,7 +94,7 @@ def walks(
     kind = lanes.WALK if states else lanes.SEEN
     rows = _marched(kind, flats, mounted, commands, time_s, tolerance_m, together)
     walked = _walked if states else _seen
-    return [Record("locomotion", *walked(*one, time_s)) for one in zip(flats, commands, rows, strict=True)]
+    return [SimulatedTrial("locomotion", *walked(*one, time_s)) for one in zip(flats, commands, rows, strict=True)]
 
 
 def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
@@ -136,7 +136,7 @@ def step_response(
     command: np.ndarray | Timeline | None = None,
     pressure_psi: float | None = None,
     tolerance_m: float = TOLERANCE_M,
-) -> Record:
+) -> SimulatedTrial:
     """One actuator ("large" or "small") on its stand, at rest under vacuum at time 0.
 
     `command`: (n,) at `time_s`, 1 positive, 0 vacuum, NaN off, a switch where the new one is first seen; or a
@@ -163,7 +163,7 @@ def step_responses(
     pressure_psi: float | None = None,
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
-) -> list[Record]:
+) -> list[SimulatedTrial]:
     """`step_response` for each robot and its commands, which are not among the columns; `together` as in `walks`."""
     time_s = _times(time_s)
     flats = [plant(model) for model in models]
@@ -173,10 +173,10 @@ def step_responses(
     return [_stepped(flat, rows, time_s) for flat, rows in zip(flats, found, strict=True)]
 
 
-def _stepped(flat: Plant, rows: np.ndarray, time_s: np.ndarray) -> Record:
+def _stepped(flat: Plant, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
     displacement_m = _as_stamped(flat, time_s, rows[0], rows[1])
     columns = {"time_s": time_s, "displacement_mm": displacement_m * _MM, "pressure_psi": rows[2]}
-    return Record("step_response", columns, {"velocity_m_s": rows[1]})
+    return SimulatedTrial("step_response", columns, {"velocity_m_s": rows[1]})
 
 
 def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
@@ -189,7 +189,7 @@ def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
 
 def static_loading(
     model: Model | Plant, actuator: str, time_s: np.ndarray, displacement_mm: np.ndarray, pressure_psi: float
-) -> Record:
+) -> SimulatedTrial:
     """The force that moves one actuator's end along `displacement_mm` (n,), its pressure held at `pressure_psi`.
 
     Quasi-static: K(x) - a p. Give the cross-head's path, not its noisy reading, or hysteresis sees the noise.
@@ -203,7 +203,7 @@ def static_loadings(
     time_s: np.ndarray,
     displacements_mm: Sequence[np.ndarray],
     pressure_psi: float,
-) -> list[Record]:
+) -> list[SimulatedTrial]:
     """`static_loading` for each robot and its path."""
     time_s = _times(time_s)
     paths = [np.ascontiguousarray(path, dtype=float) / _MM for path in displacements_mm]
@@ -214,14 +214,14 @@ def static_loadings(
     return [_loaded(path, rows, time_s) for path, rows in zip(paths, found, strict=True)]
 
 
-def _loaded(path: np.ndarray, rows: np.ndarray, time_s: np.ndarray) -> Record:
+def _loaded(path: np.ndarray, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
     columns = {
         "time_s": time_s,
         "displacement_mm": path * _MM,
         "force_N": rows[0],
         "pressure_psi": rows[1],
     }
-    return Record("static_loading", columns)
+    return SimulatedTrial("static_loading", columns)
 
 
 def anchor_pull(
@@ -231,7 +231,7 @@ def anchor_pull(
     pressure_psi: float,
     load_cell_N_m: float = LOAD_CELL_N_M,
     tolerance_m: float = TOLERANCE_M,
-) -> Record:
+) -> SimulatedTrial:
     """A pressurised head pulled through the pipe (negative rate: backward) through a load cell's spring.
 
     Quasi-static. The head was extended first; `displacement_mm` is that of the pulling end.
@@ -247,7 +247,7 @@ def anchor_pulls(
     load_cell_N_m: float = LOAD_CELL_N_M,
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
-) -> list[Record]:
+) -> list[SimulatedTrial]:
     """`anchor_pull` for each robot; `together` as in `walks`."""
     time_s = _times(time_s)
     if not np.isfinite(rate_mm_s) or rate_mm_s == 0.0 or not load_cell_N_m > 0.0:
@@ -260,14 +260,14 @@ def anchor_pulls(
     return [_pulled(rate_mm_s, rows, time_s) for rows in found]
 
 
-def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> Record:
+def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
     columns = {
         "time_s": time_s,
         "displacement_mm": abs(rate_mm_s) * time_s,
         "force_N": rows[0],
         "pressure_psi": rows[1],
     }
-    return Record("anchor_pull", columns, {"wound_N": rows[2], "holding_N": rows[3], "kinetic_N": rows[4]})
+    return SimulatedTrial("anchor_pull", columns, {"wound_N": rows[2], "holding_N": rows[3], "kinetic_N": rows[4]})
 
 
 def _marched(kind, flats, mounted, commands, time_s, tolerance_m, together, **pull) -> list[np.ndarray]:

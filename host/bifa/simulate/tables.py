@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bifa.robot.parameters import ParameterError
+from bifa.robot.parameters import ModelParameterError
 from bifa.robot.stiffness import NOT_BISTABLE, StiffnessCurve
 
 _INTERVALS = 256
@@ -62,7 +62,7 @@ class Tabulated:
 
 
 def tabulated(curve: StiffnessCurve) -> Tabulated:
-    """A curve's table with the curve's own equilibria; ParameterError if it is not bistable."""
+    """A curve's table with the curve's own equilibria; ModelParameterError if it is not bistable."""
     return Tabulated(table(curve), *curve.equilibria_m)
 
 
@@ -74,7 +74,7 @@ class Family:
         self._ways = np.array([table(way)[1:].ravel() for way in ways]).reshape(len(ways), 4 * _INTERVALS)
 
     def at(self, weights: Sequence[float]) -> Tabulated:
-        """The member with so much of each way; ParameterError if it is not bistable."""
+        """The member with so much of each way; ModelParameterError if it is not bistable."""
         rows = self._first.copy()
         rows[1:] += (np.asarray(weights) @ self._ways).reshape(_INTERVALS, 4)
         return Tabulated(sealed(rows), *_equilibria(rows))
@@ -87,7 +87,7 @@ def _equilibria(rows: np.ndarray) -> tuple[float, float, float]:
     rising = [i for i in crossings if below[i]]
     between = [i for i in crossings if not below[i] and rising and rising[0] < i < rising[-1]]
     if len(rising) < 2 or not between:
-        raise ParameterError(NOT_BISTABLE)
+        raise ModelParameterError(NOT_BISTABLE)
     lower, _, per_width, _ = rows[0]
     chosen = (rising[0], between[len(between) // 2], rising[-1])
     return tuple(float(lower + (i + _zero(rows[i + 1].tolist())) / per_width) for i in chosen)

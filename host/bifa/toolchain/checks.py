@@ -21,7 +21,7 @@ OK, MISSING, OPTIONAL = "ok", "missing", "optional"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Check:
     """state: "ok", "missing" (something will not work) or "optional" (something that not everybody needs)."""
 
     what: str
@@ -30,9 +30,9 @@ class Finding:
     remedy: str = ""
 
 
-def run_checks(port: str | None) -> Iterator[Finding]:
+def run_checks(port: str | None) -> Iterator[Check]:
     """Make every check; the board's last, because opening its port resets it."""
-    yield Finding("bifa", OK, f"bifa {__version__}, Python {sys.version.split()[0]}")
+    yield Check("bifa", OK, f"bifa {__version__}, Python {sys.version.split()[0]}")
     yield _guarded("PlatformIO", _platformio)
     yield _guarded("PlatformIO's packages", _packages)
     yield _guarded("firmware image", _image)
@@ -43,62 +43,62 @@ def run_checks(port: str | None) -> Iterator[Finding]:
     yield _guarded("firmware on the board", lambda what: _board(what, port))
 
 
-def _guarded(what: str, check: Callable[[str], Finding]) -> Finding:
+def _guarded(what: str, check: Callable[[str], Check]) -> Check:
     """An expected error is a finding as well: its text says what to do."""
     try:
         return check(what)
     except BifaError as error:
-        return Finding(what, MISSING, "not in order", str(error))
+        return Check(what, MISSING, "not in order", str(error))
 
 
-def _platformio(what: str) -> Finding:
+def _platformio(what: str) -> Check:
     program = platformio_program()
     done = subprocess.run([program, "--version"], capture_output=True, text=True, check=False)
     if done.returncode:
-        return Finding(what, MISSING, f"{program} does not run", "run `make setup`")
-    return Finding(what, OK, done.stdout.strip())
+        return Check(what, MISSING, f"{program} does not run", "run `make setup`")
+    return Check(what, OK, done.stdout.strip())
 
 
-def _packages(what: str) -> Finding:
+def _packages(what: str) -> Check:
     try:
         source = json.loads((project_folder() / ".platformio" / "provisioned.json").read_text())["source"]
     except (OSError, ValueError, KeyError):
-        return Finding(what, OPTIONAL, "not provisioned", "run `make setup`, or let PlatformIO download them")
+        return Check(what, OPTIONAL, "not provisioned", "run `make setup`, or let PlatformIO download them")
     if source == "stand-ins" and not shutil.which("avr-gcc"):
-        return Finding(what, MISSING, "avr-gcc is gone", "sudo apt-get install gcc-avr avr-libc binutils-avr")
-    return Finding(what, OK, {"registry": "from its registry"}.get(source, "stand-ins from PyPI and Debian"))
+        return Check(what, MISSING, "avr-gcc is gone", "sudo apt-get install gcc-avr avr-libc binutils-avr")
+    return Check(what, OK, {"registry": "from its registry"}.get(source, "stand-ins from PyPI and Debian"))
 
 
-def _image(what: str) -> Finding:
+def _image(what: str) -> Check:
     project = project_folder()
     image = image_path(project)
     if not image.is_file():
-        return Finding(what, MISSING, "not built", "run `pio run -e uno` or `make setup`")
+        return Check(what, MISSING, "not built", "run `pio run -e uno` or `make setup`")
     if _newest(project / "firmware", project / "lib") > image.stat().st_mtime:
-        return Finding(what, OPTIONAL, "older than its sources", "run `pio run -e uno`")
-    return Finding(what, OK, str(image.relative_to(project)))
+        return Check(what, OPTIONAL, "older than its sources", "run `pio run -e uno`")
+    return Check(what, OK, str(image.relative_to(project)))
 
 
 def _newest(*folders: Path) -> float:
     return max((path.stat().st_mtime for folder in folders for path in folder.rglob("*.[ch]*")), default=0.0)
 
 
-def _virtual_rig(what: str) -> Finding:
+def _virtual_rig(what: str) -> Check:
     if not importlib.metadata.entry_points(group="bifa.rigs", name="virtual"):
-        return Finding(what, OPTIONAL, "not installed", "run `make setup`, or pip install -e host/virtual_robot")
+        return Check(what, OPTIONAL, "not installed", "run `make setup`, or pip install -e host/virtual_robot")
     try:
         open_rig("virtual").close()
     except Exception as error:  # a rig of another package: whatever it raises is the finding
-        return Finding(what, MISSING, "does not start", str(error))
-    return Finding(what, OK, "starts, and the image runs in it")
+        return Check(what, MISSING, "does not start", str(error))
+    return Check(what, OK, "starts, and the image runs in it")
 
 
-def _ports(what: str) -> Finding:
+def _ports(what: str) -> Check:
     ports = serial_ports()
     if not ports:
-        return Finding(what, OPTIONAL, "none", "plug the Uno in; without one, use `--port virtual`")
+        return Check(what, OPTIONAL, "none", "plug the Uno in; without one, use `--port virtual`")
     listed = ", ".join(f"{port.device} ({port.board or port.description})" for port in ports)
-    return Finding(what, OK, listed)
+    return Check(what, OK, listed)
 
 
 OPTIONAL_TOOLS = (
@@ -108,18 +108,18 @@ OPTIONAL_TOOLS = (
 )
 
 
-def _optional_tool(program: str, purpose: str) -> Finding:
+def _optional_tool(program: str, purpose: str) -> Check:
     found = shutil.which(program)
     if found:
-        return Finding(program, OK, found)
-    return Finding(program, OPTIONAL, "not installed", f"needed by {purpose}, which installs it")
+        return Check(program, OK, found)
+    return Check(program, OPTIONAL, "not installed", f"needed by {purpose}, which installs it")
 
 
-def _board(what: str, port: str | None) -> Finding:
+def _board(what: str, port: str | None) -> Check:
     """Ask the board who it is; only where a port is named or an Uno is plugged in."""
     if port is None and not any(candidate.board for candidate in serial_ports()):
-        return Finding(what, OPTIONAL, "no board to ask", "plug the Uno in, or name its port: --port")
+        return Check(what, OPTIONAL, "no board to ask", "plug the Uno in, or name its port: --port")
     with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
     ours = f"protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}"
-    return Finding(what, OK, f"firmware {hello.firmware}, {ours}, last restart: {hello.start_cause}")
+    return Check(what, OK, f"firmware {hello.firmware}, {ours}, last restart: {hello.start_cause}")

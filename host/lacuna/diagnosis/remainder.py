@@ -18,7 +18,7 @@ from scipy.stats import norm
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import SOFT_LIMIT
-from lacuna.system import Channels, System, Trial
+from lacuna.system import Channels, Record, System
 
 _DRAWS = 200
 _TAIL = 0.1
@@ -73,7 +73,7 @@ class Remainder:
 
 def find_remainder(
     system: System,
-    trials: Sequence[Trial],
+    trials: Sequence[Record],
     scaled: Sequence[Channels],
     floor: NoiseFloor,
     *,
@@ -102,7 +102,7 @@ def find_remainder(
 
 def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
     """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base."""
-    groups: dict[object, list[tuple[Trial, Channels]]] = defaultdict(list)
+    groups: dict[object, list[tuple[Record, Channels]]] = defaultdict(list)
     for trial, channels in zip(trials, scaled, strict=True):
         groups[trial.experiment, trial.condition].append((trial, channels))
     found: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)

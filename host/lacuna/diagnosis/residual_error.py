@@ -11,7 +11,7 @@ import numpy as np
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.noise import repeat_pairs
-from lacuna.system import Channels, Trial
+from lacuna.system import Channels, Record
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def share_of_gap(before: float, after: float, floor: float) -> float:
 
 
 def repeat_differences(
-    known: Sequence[Trial], held_out: Sequence[Trial], residuals: Mapping[str, Channels]
+    known: Sequence[Record], held_out: Sequence[Record], residuals: Mapping[str, Channels]
 ) -> tuple[list[Channels], list[Channels]]:
     """What repeats differ by, over the root of 2 (as large as the noise of one of them): of the pairs among the known
     trials, and of those with a held-out one. `residuals` by trial."""
@@ -86,13 +86,13 @@ def rms(members) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
-def _on(fitted: Fit, trials: Sequence[Trial]) -> dict[str, Channels]:
+def _on(fitted: Fit, trials: Sequence[Record]) -> dict[str, Channels]:
     if not trials:
         return {}
     return dict(zip((t.name for t in trials), evaluate_on(fitted, trials).scaled_residuals(), strict=True))
 
 
-def _difference(first: Trial, second: Trial, residuals: Mapping[str, Channels]) -> Channels:
+def _difference(first: Record, second: Record, residuals: Mapping[str, Channels]) -> Channels:
     return {
         c: (r - np.interp(first.time_s, second.time_s, residuals[second.name][c])) / np.sqrt(2)
         for c, r in residuals[first.name].items()

@@ -10,7 +10,7 @@ import numpy as np
 
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.estimation.fit import Fit
-from lacuna.system import Trial
+from lacuna.system import Record
 
 _BINS = 15
 _WORTH_NAMING = 0.08  # share of a residual's square that a dependence must predict in other runs
@@ -74,7 +74,7 @@ def _gather(fitted: Fit) -> dict[tuple[str, str], _Rows]:
     return rows
 
 
-def _finite(quantities: Mapping[str, np.ndarray], trial: Trial) -> dict[str, np.ndarray]:
+def _finite(quantities: Mapping[str, np.ndarray], trial: Record) -> dict[str, np.ndarray]:
     return {n: np.nan_to_num(q) for n, q in quantities.items() if q.shape == trial.time_s.shape}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
-from lacuna.system import Channels, Trial
+from lacuna.system import Channels, Record
 
 _RESOLUTION_HZ = 0.005
 _LOCAL_HZ = 0.5  # the background that a peak must stand out from is taken over this width
@@ -16,7 +16,7 @@ _LONGEST = 20.0  # a trial's power at a frequency counts at most so many times i
 
 
 def peaks(
-    trials: Sequence[Trial], scaled: Sequence[Channels], lower_hz: float, upper_hz: float, count: int
+    trials: Sequence[Record], scaled: Sequence[Channels], lower_hz: float, upper_hz: float, count: int
 ) -> list[float]:
     """The `count` most prominent frequencies [Hz] of the residuals `scaled`, pooled over trials and channels, each
     weighed by its own background."""

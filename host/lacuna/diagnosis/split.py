@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 
-from lacuna.system import Trial
+from lacuna.system import Record
 
 
 @dataclass(frozen=True)
@@ -14,40 +14,40 @@ class Split:
     """`fit`: fitted. `select`: further repeats of the same conditions, and `unseen`: whole conditions that are never
     fitted; both choose between explanations. `final`: repeats (without repeats: trials) that inform nothing."""
 
-    fit: tuple[Trial, ...]
-    select: tuple[Trial, ...]
-    unseen: tuple[Trial, ...]
-    final: tuple[Trial, ...]
+    fit: tuple[Record, ...]
+    select: tuple[Record, ...]
+    unseen: tuple[Record, ...]
+    final: tuple[Record, ...]
 
     @property
-    def known(self) -> tuple[Trial, ...]:
+    def known(self) -> tuple[Record, ...]:
         """What the final explanation is fitted to."""
         return self.fit + self.select
 
     @property
-    def judging(self) -> tuple[Trial, ...]:
+    def judging(self) -> tuple[Record, ...]:
         """What explanations are compared on besides the trials that they are fitted to."""
         return self.select + self.unseen
 
     @property
-    def held_out(self) -> tuple[Trial, ...]:
+    def held_out(self) -> tuple[Record, ...]:
         """Everything that the final explanation is not fitted to."""
         return self.unseen + self.final
 
     @property
-    def conditions(self) -> tuple[Trial, ...]:
+    def conditions(self) -> tuple[Record, ...]:
         """The held-out trials of conditions that were never fitted."""
         fitted = {(t.experiment, t.condition) for t in self.known}
         return tuple(t for t in self.held_out if (t.experiment, t.condition) not in fitted)
 
     @property
-    def repeats(self) -> tuple[Trial, ...]:
+    def repeats(self) -> tuple[Record, ...]:
         """The held-out trials of conditions of which other repeats were fitted."""
         names = {t.name for t in self.conditions}
         return tuple(t for t in self.held_out if t.name not in names)
 
 
-def split_trials(trials: Sequence[Trial], spare: Collection[tuple[str, Hashable]] = ()) -> Split:
+def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = ()) -> Split:
     """Split by whole trials; deterministic.
 
     `spare`: (experiment, condition) of those that are never fitted. Of three or more repeats of any other condition
@@ -55,11 +55,11 @@ def split_trials(trials: Sequence[Trial], spare: Collection[tuple[str, Hashable]
     early or all the late runs of a session; of two, every other condition gives one away; where there are no repeats,
     every fifth trial is held out and every fourth selects.
     """
-    groups: dict[tuple[str, Hashable], list[Trial]] = defaultdict(list)
+    groups: dict[tuple[str, Hashable], list[Record]] = defaultdict(list)
     for trial in trials:
         groups[trial.experiment, trial.condition].append(trial)
     left_out = set(spare)
-    parts: dict[str, list[Trial]] = {"fit": [], "select": [], "unseen": [], "final": []}
+    parts: dict[str, list[Record]] = {"fit": [], "select": [], "unseen": [], "final": []}
     pairs = 0
     singles = [members[0] for members in groups.values() if len(members) == 1]
     for turn, (key, members) in enumerate(groups.items()):

@@ -12,7 +12,7 @@ from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.problem import PLAIN, Point, Problem
 from lacuna.estimation.solve import ENOUGH, RELATIVE, Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
-from lacuna.system import Channels, System, Trial
+from lacuna.system import Channels, Record, System
 
 _SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
 _OPEN = 0.1  # scales
@@ -78,7 +78,7 @@ class Fit:
 
 def fit(
     structure: Structure,
-    trials: Sequence[Trial],
+    trials: Sequence[Record],
     floor: NoiseFloor,
     *,
     starts: Sequence[np.ndarray] = (),
@@ -107,7 +107,7 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
 
 def refit_on(
     fitted: Fit,
-    trials: Sequence[Trial],
+    trials: Sequence[Record],
     *,
     near: Sequence[Fit] = (),
     max_iterations: int = 20,
@@ -150,7 +150,7 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
-def evaluate_on(fitted: Fit, trials: Sequence[Trial]) -> Fit:
+def evaluate_on(fitted: Fit, trials: Sequence[Record]) -> Fit:
     """The fitted parameters on other trials: only the trials' own nuisances are estimated."""
     problem = fitted.problem.over(trials)
     start = problem.start(fitted.solution.point.values)
@@ -190,7 +190,7 @@ def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) 
 
 
 def fit_base(
-    system: System, trials: Sequence[Trial], *, starts: int = 1, seed: int = 0, max_iterations: int = 30
+    system: System, trials: Sequence[Record], *, starts: int = 1, seed: int = 0, max_iterations: int = 30
 ) -> Fit:
     """Fit the base model, then take the noise floor again from what repeats differ by in the residual, and refit."""
     floor = estimate_noise(system, trials)

@@ -20,7 +20,7 @@ from scipy.ndimage import median_filter
 from scipy.optimize import brentq
 
 from lacuna.estimation.autocorrelation import correlation_samples
-from lacuna.system import Channels, System, Trial
+from lacuna.system import Channels, Record, System
 
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
@@ -56,7 +56,7 @@ class NoiseFloor:
 
     channels: Mapping[tuple[str, str], ChannelNoise]
 
-    def sd(self, trial: Trial, channel: str) -> np.ndarray:
+    def sd(self, trial: Record, channel: str) -> np.ndarray:
         """Standard deviation of each sample of a trial, shape (n,): grows where the record moves fast."""
         noise = self.channels[trial.experiment, channel]
         if noise.jitter_s == 0:
@@ -72,12 +72,12 @@ class NoiseFloor:
         """The smallest ratio of this floor to `other` among the channels."""
         return min(n.per_piece / other.channels[k].per_piece for k, n in self.channels.items())
 
-    def samples_per_piece(self, trial: Trial, channel: str) -> float:
+    def samples_per_piece(self, trial: Record, channel: str) -> float:
         return self.channels[trial.experiment, channel].samples_per_piece
 
 
 def estimate_noise(
-    system: System, trials: Sequence[Trial], residuals: Mapping[str, Channels] | None = None
+    system: System, trials: Sequence[Record], residuals: Mapping[str, Channels] | None = None
 ) -> NoiseFloor:
     """Noise floor of `trials` from the differences between repeats.
 
@@ -85,8 +85,8 @@ def estimate_noise(
     nuisances leaves is a sharper basis than the measurements themselves, and what the model gets wrong
     alike in all repeats cancels.
     """
-    by_key: dict[tuple[str, str], list[tuple[Trial, Trial]]] = defaultdict(list)
-    solo: dict[tuple[str, str], list[Trial]] = defaultdict(list)
+    by_key: dict[tuple[str, str], list[tuple[Record, Record]]] = defaultdict(list)
+    solo: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for trial in trials:
         for channel in trial.channels:
             solo[trial.experiment, channel].append(trial)
@@ -104,9 +104,9 @@ def estimate_noise(
     return NoiseFloor(channels)
 
 
-def repeat_pairs(trials: Sequence[Trial]) -> Iterator[tuple[Trial, Trial]]:
+def repeat_pairs(trials: Sequence[Record]) -> Iterator[tuple[Record, Record]]:
     """All pairs of trials with the same experiment and condition."""
-    groups: dict[object, list[Trial]] = defaultdict(list)
+    groups: dict[object, list[Record]] = defaultdict(list)
     for trial in trials:
         groups[trial.experiment, trial.condition].append(trial)
     for members in groups.values():
@@ -114,7 +114,7 @@ def repeat_pairs(trials: Sequence[Trial]) -> Iterator[tuple[Trial, Trial]]:
 
 
 def _from_pairs(
-    pairs: Sequence[tuple[Trial, Trial]],
+    pairs: Sequence[tuple[Record, Record]],
     channel: str,
     sensor: float,
     residuals: Mapping[str, Channels] | None,
@@ -138,7 +138,7 @@ def _from_pairs(
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
 
 
-def _difference(first: Trial, second: Trial, channel: str, residuals: Mapping[str, Channels] | None) -> np.ndarray:
+def _difference(first: Record, second: Record, channel: str, residuals: Mapping[str, Channels] | None) -> np.ndarray:
     """(first - second) / sqrt(2) on the first's time base: of the same variance as the noise of either."""
     a, b = first.channels[channel], second.channels[channel]
     if residuals is not None:
@@ -150,7 +150,7 @@ def _difference(first: Trial, second: Trial, channel: str, residuals: Mapping[st
     return (a - common) / np.sqrt(2)
 
 
-def _moves(trial: Trial, channel: str) -> np.ndarray:
+def _moves(trial: Record, channel: str) -> np.ndarray:
     """Where a record changes within the window by much more than its fast noise."""
     samples = trial.channels[channel]
     window = max(1, round(_WINDOW_S / _sample_period(trial)))
@@ -177,7 +177,7 @@ def _jitter(pairs, channel, differences, moving, sd) -> float:
     return float(brentq(lacking, 0.0, _LONGEST_JITTER_S, xtol=1e-9))
 
 
-def _shift_variance(trial: Trial, channel: str, jitter_s: float, sd: float) -> np.ndarray:
+def _shift_variance(trial: Record, channel: str, jitter_s: float, sd: float) -> np.ndarray:
     """Mean square change of a record under a random shift in time, less what its own noise adds."""
     samples = _smooth(trial.channels[channel])
     known = np.isfinite(samples)
@@ -200,13 +200,13 @@ def _fast_noise(samples: np.ndarray) -> float:
     return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6)) if len(bends) else 0.0
 
 
-def _smallest(trials: Sequence[Trial], channel: str) -> float:
+def _smallest(trials: Sequence[Record], channel: str) -> float:
     """A floor that keeps noise-free records from infinite weights: 1e-4 of the channel's spread."""
     spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
     return 1e-4 * spread or 1e-12
 
 
-def _sample_period(trial: Trial) -> float:
+def _sample_period(trial: Record) -> float:
     return float(np.median(np.diff(trial.time_s)))
 
 

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.structure import Structure
-from lacuna.system import Channels, Parameter, Trial
+from lacuna.system import Channels, Parameter, Record
 
 LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivatives
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
@@ -75,7 +75,7 @@ class Problem:
     everything else.
     """
 
-    def __init__(self, structure: Structure, trials: Sequence[Trial], floor: NoiseFloor, view: View = SHARP):
+    def __init__(self, structure: Structure, trials: Sequence[Record], floor: NoiseFloor, view: View = SHARP):
         self.structure, self.view = structure, view
         self.trials = tuple(trials)
         self.floor = floor
@@ -110,7 +110,7 @@ class Problem:
         other.view = view
         return other
 
-    def over(self, trials: Sequence[Trial]) -> Problem:
+    def over(self, trials: Sequence[Record]) -> Problem:
         """The same problem with other trials."""
         return Problem(self.structure, trials, self.floor, self.view)
 
@@ -251,7 +251,7 @@ class Problem:
         return np.where(np.isfinite(z), z, _FAILED)
 
 
-def _weighing(trial: Trial, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
+def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
     measured = np.concatenate([trial.channels[c] for c in trial.channels])
     weight = np.concatenate([1.0 / floor.sd(trial, c) for c in trial.channels])
     thinning = np.concatenate(

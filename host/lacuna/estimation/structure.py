@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from lacuna.system import Correction, CorrectionSite, Parameter, System, Theta, Trial
+from lacuna.system import Correction, CorrectionSite, Parameter, Record, System, Theta
 
 _TABLE_INTERVALS = 64  # at least
 
@@ -37,11 +37,11 @@ class Structure:
     def names(self) -> tuple[str, ...]:
         return tuple(p.name for p in self.parameters)
 
-    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+    def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         """What varies from run to run, with the effects' own parameters of this trial last."""
         return (*self.system.nuisances(trial), *self.own(trial))
 
-    def own(self, trial: Trial) -> tuple[Parameter, ...]:
+    def own(self, trial: Record) -> tuple[Parameter, ...]:
         """The effects' parameters of which this trial has its own value."""
         return tuple(
             replace(p, name=effect.full_name(p))

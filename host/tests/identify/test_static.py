@@ -10,7 +10,7 @@ from independent_lab import Lab
 
 from bifa.data import Dataset
 from bifa.identify.static import fit_static
-from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.motion import imposed_motion
 from bifa.pipe_robot.stiffness import fit_stiffness
 from bifa.robot import nominal
@@ -94,12 +94,12 @@ def test_a_single_pressure_leaves_the_area_open():
 
 @pytest.mark.parametrize(("pressures", "names"), [((4.0,), "stiffness curve of the large"), ((), "0 psi")])
 def test_too_little_data_says_which_parameter_cannot_be_had(pressures, names):
-    with pytest.raises(TooLittleDataError, match=names):
+    with pytest.raises(UndeterminedError, match=names):
         fit_static(bench(Lab().with_seed(1), "large", pressures), "large")
 
 
 def test_a_static_test_that_did_not_move_is_refused():
-    with pytest.raises(TooLittleDataError, match="moved by"):
+    with pytest.raises(UndeterminedError, match="moved by"):
         fit_stiffness(np.full(500, 1e-3), np.zeros(500), np.ones(500, bool))
 
 

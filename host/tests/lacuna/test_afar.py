@@ -11,7 +11,7 @@ from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.problem import PLAIN, Problem, View
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
-from lacuna.system import Parameter, System, Trial
+from lacuna.system import Parameter, Record, System
 
 SD = 0.02
 T = np.linspace(0.0, 10.0, 1001)
@@ -36,10 +36,10 @@ class Jumping(System):
         )
         self.trials = ()
         for name in ("jump", "both"):
-            trial = Trial(name, name, name, T, {})
+            trial = Record(name, name, name, T, {})
             clean = self.predict(TRUTH, (), trial)["y_m"] + bump * np.sin(3.0 * T)
             measured = {"y_m": clean + SD * draw.standard_normal(T.shape)}
-            self.trials += (Trial(name, name, name, T, measured),)
+            self.trials += (Record(name, name, name, T, measured),)
 
     def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
         if abs(theta["shape"]) > 3.0:

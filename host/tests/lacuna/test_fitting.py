@@ -14,7 +14,7 @@ from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import profile_interval, uncertainty
-from lacuna.system import Parameter, System, Trial
+from lacuna.system import Parameter, Record, System
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +82,10 @@ class Block(System):
     def __init__(self, holding_N, sliding_N):
         draw, self.trials = np.random.default_rng(4), ()
         for repeat in range(2):
-            trial = Trial(f"pull {repeat}", "pull", "pull", np.linspace(0.0, 1.0, 101), {})
+            trial = Record(f"pull {repeat}", "pull", "pull", np.linspace(0.0, 1.0, 101), {})
             force = self.predict({"holding_N": holding_N, "sliding_N": sliding_N}, (), trial)["force_N"]
             measured = {"force_N": force + 0.05 * draw.standard_normal(101)}
-            self.trials += (Trial(trial.name, "pull", "pull", trial.time_s, measured),)
+            self.trials += (Record(trial.name, "pull", "pull", trial.time_s, measured),)
 
     def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
         static = max(theta["holding_N"], theta["sliding_N"])
@@ -124,7 +124,7 @@ def test_the_jitter_of_events_is_the_standard_deviation_of_their_times():
     time_s = np.linspace(0.0, 4.0, 401)
     draw = np.random.default_rng(7)
     trials = [
-        Trial(f"rise {k}", "rise", "rise", time_s, {"position_mm": 100 * np.clip(time_s - 1.5 - late, 0, 1)})
+        Record(f"rise {k}", "rise", "rise", time_s, {"position_mm": 100 * np.clip(time_s - 1.5 - late, 0, 1)})
         for k, late in enumerate(late_s)
     ]
     for trial in trials:

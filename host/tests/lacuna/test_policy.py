@@ -17,7 +17,7 @@ from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.search import Search
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
-from lacuna.system import System, Trial
+from lacuna.system import Record, System
 
 KEY = ("steps", "position_mm")
 
@@ -47,7 +47,7 @@ def remainder(shared_rms, *, good_enough=0.0, policy=POLICY, repeats=4, seed=0):
     draw = np.random.default_rng(seed)
     time_s = np.arange(4000) * 0.01
     shared = shared_rms * np.sqrt(2.0) * np.sin(2 * np.pi * time_s)
-    trials = [Trial(f"{k}", "steps", 1.0, time_s, {"position_mm": time_s}) for k in range(repeats)]
+    trials = [Record(f"{k}", "steps", 1.0, time_s, {"position_mm": time_s}) for k in range(repeats)]
     scaled = [{"position_mm": shared + draw.standard_normal(len(time_s))} for _ in trials]
     floor = NoiseFloor({KEY: ChannelNoise(0.2, 0.0, 1.0, 6)})
     system = OneChannel()
@@ -105,7 +105,7 @@ class Tried:
     @cached_property
     def trials(self):
         count = len(self.fitted_costs) + len(self.checked_costs)
-        return [Trial(f"t{k}", "steps", k, np.zeros(1), {}) for k in range(count)]
+        return [Record(f"t{k}", "steps", k, np.zeros(1), {}) for k in range(count)]
 
     @property
     def fitted(self):
@@ -228,7 +228,7 @@ def test_implausible_costs_as_stated_half_a_range_outside():
 
 
 def test_a_spared_condition_is_never_fitted():
-    trials = [Trial(f"{c}_{r}", "steps", c, np.zeros(3), {}) for c in range(5) for r in range(3)]
+    trials = [Record(f"{c}_{r}", "steps", c, np.zeros(3), {}) for c in range(5) for r in range(3)]
     split = split_trials(trials, spare=[("steps", 3)])
     assert {t.condition for t in split.unseen} == {3}
     assert not {t.condition for t in split.known} & {3}

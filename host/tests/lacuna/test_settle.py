@@ -11,7 +11,7 @@ from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
 from lacuna.estimation.structure import Structure
-from lacuna.system import Parameter, System, Trial
+from lacuna.system import Parameter, Record, System
 
 SD = 0.1
 TRUTH = {"slope": 1.0, "bent": 2.0}
@@ -41,7 +41,7 @@ class Lines(System):
         random = np.random.default_rng(seed)
         self.parameters = tuple(Parameter(name, "m", 1.4, -10.0, upper, scale=1.0) for name in TRUTH)
         self.trials = tuple(
-            Trial(
+            Record(
                 f"{run}",
                 "line",
                 "all alike",

@@ -22,9 +22,9 @@ from lacuna.system import (
     CorrectionSite,
     Effect,
     Parameter,
+    Record,
     System,
     Theta,
-    Trial,
 )
 
 SAMPLE_S = 0.01
@@ -110,7 +110,7 @@ def _simulate(force, p, table, lower, upper):
 class ToySystem(System):
     """`trials` as measured; `effects` the library on offer."""
 
-    trials: tuple[Trial, ...]
+    trials: tuple[Record, ...]
     effects: Mapping[str, Effect]
     name: str = "mass on a spring"
     parameters: tuple[Parameter, ...] = _BASE
@@ -119,14 +119,14 @@ class ToySystem(System):
         self,
         theta: Theta,
         effects: tuple[str, ...],
-        trial: Trial,
+        trial: Record,
         *,
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
     ) -> Channels:
         return {"position_mm": _position_mm(theta, trial.payload, corrections)}
 
-    def regressors(self, trial: Trial, prediction: Channels) -> dict[str, np.ndarray]:
+    def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         position = prediction["position_mm"]
         velocity = np.gradient(position, trial.time_s)
         return {
@@ -136,7 +136,7 @@ class ToySystem(System):
             "force": trial.payload,
         }
 
-    def nuisances(self, trial: Trial) -> tuple[Parameter, ...]:
+    def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         return (Parameter("wobble", "1", 0.0, -0.5, 0.5, scale=WOBBLE_SD),)
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
@@ -184,9 +184,9 @@ def _force(experiment: str, size: float) -> np.ndarray:
     return size * np.sin(2 * np.pi * (0.2 + 0.2 * time) * time) * (time > 0.2)
 
 
-def _trial(experiment, size, repeat, order, position_mm) -> Trial:
+def _trial(experiment, size, repeat, order, position_mm) -> Record:
     force = _force(experiment, size)
-    return Trial(
+    return Record(
         f"{experiment}_{size:g}N_{repeat}",
         experiment,
         size,

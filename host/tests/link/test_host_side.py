@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from bifa.cli import app
-from bifa.link import MismatchError, NoAnswerError, ParameterError, PortGoneError, Uno
+from bifa.link import MismatchError, NoAnswerError, PortGoneError, Uno, UnoParameterError
 from bifa.link.clock_relation import ClockRelation
 from bifa.link.frames import Report
 from bifa.link.table import PARAMETERS, TABLE_HASH
@@ -37,7 +37,7 @@ def test_values_out_of_range_are_refused(parameter, value):
     if inside:
         assert abs(from_wire(parameter.name, to_wire(parameter.name, value)) - value) <= 0.5 * 10**-parameter.decimals
     else:
-        with pytest.raises(ParameterError, match=parameter.name):
+        with pytest.raises(UnoParameterError, match=parameter.name):
             to_wire(parameter.name, value)
 
 

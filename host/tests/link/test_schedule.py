@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from bifa.link import ParameterError, RefusedError, Uno
+from bifa.link import RefusedError, Uno, UnoParameterError
 from bifa.link.uno import LATEST_HOLD_S, SCHEDULE_ENTRIES
 from harness.board import Board
 from harness.native import ROOT
@@ -47,10 +47,10 @@ def test_a_refused_schedule_does_not_start(board, uno):
 def test_a_schedule_that_does_not_fit_is_refused_before_anything_is_sent(board, uno):
     before = board.written
     holds = [(i / 10, "body", "positive" if i % 2 == 0 else "off") for i in range(SCHEDULE_ENTRIES + 1)]
-    with pytest.raises(ParameterError, match="17 timed holds; the Uno has room for 16"):
+    with pytest.raises(UnoParameterError, match="17 timed holds; the Uno has room for 16"):
         uno.schedule(holds)
     for time_s in (-0.001, math.nan, math.inf, LATEST_HOLD_S + 0.001):
-        with pytest.raises(ParameterError, match="time of a hold"):
+        with pytest.raises(UnoParameterError, match="time of a hold"):
             uno.schedule([(time_s, "body", "off")])
     assert board.written == before
 

@@ -7,7 +7,7 @@ import pytest
 from bifa.link.units import set_point_psi
 from bifa.measure.known import known_of, parse_known
 from bifa.rig import SerialRig, open_rig
-from bifa.robot.parameters import ParameterError
+from bifa.robot.parameters import ModelParameterError
 
 
 def test_a_serial_port_declares_nothing():
@@ -30,7 +30,7 @@ def test_what_the_person_measured_comes_before_what_the_rig_declares():
     ],
 )
 def test_what_cannot_be_known_is_refused(text, told):
-    with pytest.raises(ParameterError, match=told):
+    with pytest.raises(ModelParameterError, match=told):
         parse_known([text])
 
 

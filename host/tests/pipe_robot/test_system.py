@@ -9,9 +9,9 @@ from independent_lab import BASELINE, Lab
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
-from bifa.pipe_robot.errors import TooLittleDataError
+from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.library import engine_effects
-from bifa.robot import ParameterError
+from bifa.robot import ModelParameterError
 from lacuna.estimation.afar import solve_from_afar
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.noise import estimate_noise
@@ -198,10 +198,10 @@ def test_the_identified_model_predicts_what_the_system_does(system, theta):
 
 
 def test_an_empty_data_set_is_refused():
-    with pytest.raises(TooLittleDataError, match="no trials"):
+    with pytest.raises(UndeterminedError, match="no trials"):
         prepare(Dataset(path=None, name="empty", known={}, trials=()))
 
 
 def test_knowledge_of_what_the_model_does_not_have_is_refused(dataset):
-    with pytest.raises(ParameterError, match="colour"):
+    with pytest.raises(ModelParameterError, match="colour"):
         prepare(replace(dataset, known=dataset.known | {"colour": 3.0}))

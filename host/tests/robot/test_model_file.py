@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.robot import BASELINE, Covariance, ModelFileError, ParameterError, load_model, nominal, save_model
+from bifa.robot import BASELINE, Covariance, ModelFileError, ModelParameterError, load_model, nominal, save_model
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import walk
 
@@ -72,7 +72,7 @@ def test_a_missing_file_is_told(tmp_path):
 
 
 def test_values_out_of_bounds_are_refused_with_the_range():
-    with pytest.raises(ParameterError, match=r"mu_s = 5.0 is outside its range 0.02 to 2"):
+    with pytest.raises(ModelParameterError, match=r"mu_s = 5.0 is outside its range 0.02 to 2"):
         nominal().with_values({"mu_s": 5.0})
-    with pytest.raises(ParameterError, match="no parameter"):
+    with pytest.raises(ModelParameterError, match="no parameter"):
         nominal().with_values({"mass": 5.0})

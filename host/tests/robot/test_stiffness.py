@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bifa.robot import ParameterError, StiffnessCurve, nominal
+from bifa.robot import ModelParameterError, StiffnessCurve, nominal
 
 
 def test_nominal_curves_have_the_papers_shape():
@@ -30,5 +30,5 @@ def test_continuation_is_straight():
 
 def test_a_curve_that_is_not_bistable_says_so():
     spring = StiffnessCurve((0.0, 10.0), -0.01, 0.01)
-    with pytest.raises(ParameterError, match="not bistable"):
+    with pytest.raises(ModelParameterError, match="not bistable"):
         spring.equilibria_m  # noqa: B018

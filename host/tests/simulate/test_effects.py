@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bifa import effects, robot, simulate
-from bifa.effects import Effect, EffectError, EffectParameter
+from bifa.effects import EffectError, EffectParameter, PhysicalEffect
 from bifa.simulate import hooks, layout
 from bifa.simulate.paper import FAST
 from bifa.simulate.plant import plant as flat
@@ -131,7 +131,7 @@ def test_a_wrong_effect_is_refused_by_name_and_range(chosen, told):
 def _new_effect(**functions):
     module = types.ModuleType("bifa.effects.swelling")
     parameter = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
-    module.EFFECT = Effect("swelling", "", "F (1 + share)", "a test", "eq. (2)", (), (), (parameter,))
+    module.EFFECT = PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", (), (), (parameter,))
     module.__dict__.update(functions)
     return module
 

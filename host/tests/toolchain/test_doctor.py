@@ -10,7 +10,7 @@ from bifa.cli import app
 from bifa.errors import BifaError
 from bifa.rig.ports import SerialPort
 from bifa.toolchain import checks
-from bifa.toolchain.checks import MISSING, OK, OPTIONAL, Finding
+from bifa.toolchain.checks import MISSING, OK, OPTIONAL, Check
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def clone(tmp_path, monkeypatch):
 
 
 def test_an_image_that_was_never_built(clone):
-    assert checks._image("image") == Finding("image", MISSING, "not built", "run `pio run -e uno` or `make setup`")
+    assert checks._image("image") == Check("image", MISSING, "not built", "run `pio run -e uno` or `make setup`")
 
 
 def test_an_image_older_than_its_sources(clone):
@@ -55,7 +55,7 @@ def test_an_expected_error_becomes_a_finding_with_its_remedy():
     def fail(what):
         raise BifaError("plug it in")
 
-    assert checks._guarded("board", fail) == Finding("board", MISSING, "not in order", "plug it in")
+    assert checks._guarded("board", fail) == Check("board", MISSING, "not in order", "plug it in")
 
 
 def test_no_board_is_no_fault(monkeypatch):
@@ -65,7 +65,7 @@ def test_no_board_is_no_fault(monkeypatch):
 
 @pytest.mark.parametrize(("state", "status"), [(OK, 0), (OPTIONAL, 0), (MISSING, 1)])
 def test_the_exit_status_says_whether_something_necessary_is_missing(monkeypatch, state, status):
-    monkeypatch.setattr(checks, "run_checks", lambda port: [Finding("a tool", state, "somewhere", "get it")])
+    monkeypatch.setattr(checks, "run_checks", lambda port: [Check("a tool", state, "somewhere", "get it")])
     done = CliRunner().invoke(app, ["doctor"])
     assert done.exit_code == status
     assert "a tool" in done.output

@@ -5,7 +5,7 @@ import pytest
 
 from virtual_robot.effects import EFFECTS, plant_parameters
 from virtual_robot.gait import BASELINE, ROBUST, Gait
-from virtual_robot.plant import NOMINAL, ParameterError, Plant, nominal_curves, profile
+from virtual_robot.plant import NOMINAL, Plant, PlantParameterError, nominal_curves, profile
 
 
 def walk(gait: Gait, cycles: int, parameters=NOMINAL, step_s: float | None = None) -> np.ndarray:
@@ -139,11 +139,11 @@ def test_a_worn_robot_walks_too_and_its_air_is_compressible():
 
 
 def test_unknown_names_are_refused():
-    with pytest.raises(ParameterError, match="no parameter 'mass'"):
+    with pytest.raises(PlantParameterError, match="no parameter 'mass'"):
         Plant({"mass": 1.0})
-    with pytest.raises(ParameterError, match="no effect 'magic'"):
+    with pytest.raises(PlantParameterError, match="no effect 'magic'"):
         plant_parameters({"magic": {}})
-    with pytest.raises(ParameterError, match="hysteresis has no parameter size"):
+    with pytest.raises(PlantParameterError, match="hysteresis has no parameter size"):
         plant_parameters({"hysteresis": {"size": 1.0}})
-    with pytest.raises(ParameterError, match="no profile"):
+    with pytest.raises(PlantParameterError, match="no profile"):
         profile("perfect")

@@ -53,7 +53,7 @@ def model():
     return nominal.with_values({name: value for name, value in NOMINAL.items() if name in nominal.parameters})
 
 
-def predicted(model, plan: Plan, seen: dict) -> simulate.Record:
+def predicted(model, plan: Plan, seen: dict) -> simulate.SimulatedTrial:
     time_s = seen["time_s"]
     match plan.experiment:
         case "static_loading":

@@ -2,7 +2,7 @@
 """The robot in its pipe, its air and its test stands, in C; its own equations, shared with nothing."""
 
 from virtual_robot.plant.curves import Curve, nominal_curves
-from virtual_robot.plant.parameters import NOMINAL, ParameterError, profile
+from virtual_robot.plant.parameters import NOMINAL, PlantParameterError, profile
 from virtual_robot.plant.plant import Plant
 
-__all__ = ["NOMINAL", "Curve", "ParameterError", "Plant", "nominal_curves", "profile"]
+__all__ = ["NOMINAL", "Curve", "Plant", "PlantParameterError", "nominal_curves", "profile"]

@@ -6,7 +6,7 @@ from __future__ import annotations
 from virtual_robot.errors import VirtualRobotError
 
 
-class ParameterError(VirtualRobotError, ValueError):
+class PlantParameterError(VirtualRobotError, ValueError):
     """A parameter or effect that the plant does not have."""
 
 
@@ -61,5 +61,5 @@ _PROFILES = {"ideal": {}, "realistic": {}, "worn": _WORN}
 def profile(name: str) -> dict[str, float]:
     """Parameters of the plant in a profile, "ideal", "realistic" or "worn"; what is absent is 0."""
     if name not in _PROFILES:
-        raise ParameterError(f"no profile {name!r}; there are {', '.join(_PROFILES)}")
+        raise PlantParameterError(f"no profile {name!r}; there are {', '.join(_PROFILES)}")
     return NOMINAL | _PROFILES[name]

@@ -10,7 +10,7 @@ import numpy as np
 
 from virtual_robot.errors import NotBuiltError
 from virtual_robot.plant.curves import Curve, nominal_curves
-from virtual_robot.plant.parameters import NOMINAL, ParameterError
+from virtual_robot.plant.parameters import NOMINAL, PlantParameterError
 
 try:
     from virtual_robot.plant._plant import ffi, lib
@@ -49,7 +49,7 @@ class Plant:
         numbers = ffi.new("PlantParameters *")
         for name, value in parameters.items():
             if not hasattr(numbers, name):
-                raise ParameterError(f"the plant has no parameter {name!r}")
+                raise PlantParameterError(f"the plant has no parameter {name!r}")
             setattr(numbers, name, value)
         body, small = curves or nominal_curves()
         self._plant = lib.plant_new(numbers, *_table(body), *_table(small))
