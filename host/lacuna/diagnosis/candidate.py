@@ -149,17 +149,20 @@ def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -
     return found[0].cost, tuple(s.point for s in found)
 
 
-def sketches(profiled: Sequence[Profile], twice: int, crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Release everything for as long as it pays quickly, from the best point of each profile; the best few, `twice`,
-    from afar as well. The best first."""
+def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Release everything for as long as it pays quickly, from the best point of each profile. The best first."""
     names = [p.problem.structure.effects for p in profiled]
     near = crew.map("refitting", names, _sketched, [(p.problem, p.points[0]) for p in profiled])
-    pairs = sorted(zip(near, profiled, strict=True), key=lambda pair: pair[0].cost)
-    again = [p for _, p in pairs[:twice]]
-    names = [p.problem.structure.effects for p in again]
-    afar = crew.map("refitting from afar", names, _sketched_from_afar, [(p.problem, p.from_afar()) for p in again])
-    fits = [(best_of(p.problem, [solution, *afar[place : place + 1]]), p) for place, (solution, p) in enumerate(pairs)]
+    fits = [(best_of(p.problem, [solution]), p) for solution, p in zip(near, profiled, strict=True)]
     return sorted(fits, key=lambda pair: pair[0].cost)
+
+
+def from_afar(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Each sketch, or what comes of beginning afar with its effect, whichever is better."""
+    profiled = [p for _, p in sketched]
+    names = [p.problem.structure.effects for p in profiled]
+    afar = crew.map("refitting from afar", names, _sketched_from_afar, [(p.problem, p.from_afar()) for p in profiled])
+    return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, afar, strict=True)]
 
 
 def _sketched(problem: Problem, start: Point) -> Solution:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
-from lacuna.diagnosis.drift import find_drift
+from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.learn import holds, learn_correction
 from lacuna.diagnosis.named import Named, Rival, describe_effects, drop_absent, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
@@ -72,7 +72,7 @@ class Diagnosis:
     search: Search
     choice: Choice
     split: Split
-    drifts: tuple[str, ...]
+    drifts: tuple[Drift, ...]
     seconds: float
 
 
@@ -145,9 +145,9 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> Search:
     return search(base, case.split, base.problem.floor, enough=case.suffices, policy=case.policy, crew=crew)
 
 
-def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, drifts: tuple[str, ...]) -> str:
+def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, drifts: tuple[Drift, ...]) -> str:
     if not remainder.matters:
-        return "unexplained" if drifts else "none"
+        return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
     if not choice.probability or min(choice.probability.values()) < case.policy.supported:
         return "unexplained"
     return "identified" if case.closed(choice.candidate, found.base) >= case.policy.half else "unexplained"

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from typing import NamedTuple
+
 import numpy as np
 
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.fit import Fit
+from lacuna.estimation.uncertainty import pieces_of
 
 _SHUFFLES = 2000
 _FEWEST = 6  # trials, and as many that tell about a parameter
 
 
-def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[str, ...]:
-    """Names of base parameters whose value, as each single trial would have it, moves with `session_order`.
+class Drift(NamedTuple):
+    """A base parameter that moves with the order of the session. `share`: what that adds to the residual's mean square,
+    in units of the floor's variance, in the experiment where it adds most."""
+
+    parameter: str
+    share: float
+
+    def matters(self, policy: Policy) -> bool:
+        return self.share > policy.relevance
+
+
+def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[Drift, ...]:
+    """Base parameters whose value, as each single trial would have it, moves with `session_order`.
 
     Each trial's residual is projected on the derivative by each parameter: the shift that this trial alone asks for,
     weighed by how well it knows and by how much the trials differ anyway (DerSimonian and Laird 1986). The correlation
@@ -23,21 +38,42 @@ def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[
     if len(ordered) < _FEWEST or not fitted.solution.sensitivities:
         return ()
     order = np.array([float(trials[k].session_order) for k in ordered])
-    names, asked, weights = _asked(fitted, ordered)
-    if not names:
+    columns, asked, weights = _asked(fitted, ordered)
+    if not columns:
         return ()
     observed = _trend(asked, weights, order)
     draw = np.random.default_rng(seed)
     largest = [_trend(asked, weights, draw.permutation(order)).max() for _ in range(_SHUFFLES)]
     limit = np.quantile(largest, 1 - policy.drift_chance)
-    return tuple(name for name, trend in zip(names, observed, strict=True) if trend > limit)
+    return tuple(
+        Drift(fitted.structure.names[fitted.solution.free[columns[k]]], _added(fitted, ordered, columns[k], moved))
+        for k, moved in enumerate(_moved(asked, weights, order))
+        if observed[k] > limit
+    )
 
 
-def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Names of the parameters that enough trials tell about, and by trial the shifts asked for and their weights,
+def _moved(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """By parameter its shift in each trial, as a weighted line through what the trials ask for has it, shape (P, n)."""
+    place = order - (weights @ order / weights.sum(axis=1))[:, None]
+    slope = (weights * asked * place).sum(axis=1) / np.maximum((weights * place**2).sum(axis=1), 1e-300)
+    return slope[:, None] * place
+
+
+def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> float:
+    """What such shifts add to the mean square of the residual in the experiment where they add most."""
+    squares, pieces = defaultdict(float), defaultdict(float)
+    for k, shift in zip(ordered, moved, strict=True):
+        trial, derivative = fitted.problem.trials[k], fitted.solution.jacobians[k][0][:, column]
+        squares[trial.experiment] += float(derivative @ derivative) * shift**2
+        pieces[trial.experiment] += pieces_of(trial, fitted.problem.floor)
+    return max(squares[e] / pieces[e] for e in squares)
+
+
+def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """Columns of the parameters that enough trials tell about, and by trial the shifts asked for and their weights,
     shapes (P, n)."""
     residuals, jacobians = fitted.problem.residuals(fitted.solution.point), fitted.solution.jacobians
-    names, asked, weights = [], [], []
+    columns, asked, weights = [], [], []
     for column, index in enumerate(fitted.solution.free):
         if index >= fitted.structure.base_size:
             continue
@@ -47,10 +83,10 @@ def _asked(fitted: Fit, ordered: list[int]) -> tuple[list[str], np.ndarray, np.n
         shifts = np.divide(pulls, known, out=np.zeros_like(pulls), where=known > 0)
         weight = _weights(shifts, known)
         if _effective(weight) >= _FEWEST:
-            names.append(fitted.structure.names[index])
+            columns.append(column)
             asked.append(shifts)
             weights.append(weight)
-    return names, np.array(asked), np.array(weights)
+    return columns, np.array(asked), np.array(weights)
 
 
 def _weights(shifts: np.ndarray, known: np.ndarray) -> np.ndarray:

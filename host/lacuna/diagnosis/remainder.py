@@ -137,11 +137,7 @@ def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> n
     noise = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
     found = np.empty(_DRAWS)
     for k in range(_DRAWS):
-        drawn = [
-            np.array([_stretch(noise[draw.integers(len(noise))], rows.shape[1], draw) for _ in rows])
-            for rows in conditions
-        ]
-        found[k] = _shared(drawn)
+        found[k] = _shared([_stretches(noise, rows.shape, draw) for rows in conditions])
     return found
 
 
@@ -155,7 +151,10 @@ def _exceeded(draws: np.ndarray, value: float) -> float:
     return _TAIL * float(np.exp(-(value - threshold) / max(float(excess.mean()), 1e-12)))
 
 
-def _stretch(trace: np.ndarray, length: int, draw: np.random.Generator) -> np.ndarray:
-    start = draw.integers(len(trace))
-    doubled = np.resize(np.concatenate([trace[start:], trace[:start]]), length)
-    return doubled * draw.choice((-1.0, 1.0))
+def _stretches(noise: Sequence[np.ndarray], shape: tuple[int, int], draw: np.random.Generator) -> np.ndarray:
+    """Rows of noise, each a trace drawn at random, begun anywhere in it and gone round, in either sign."""
+    rows = np.empty(shape)
+    for row in rows:
+        trace = noise[draw.integers(len(noise))]
+        row[:] = np.take(trace, np.arange(shape[1]) + draw.integers(len(trace)), mode="wrap")
+    return rows * draw.choice((-1.0, 1.0), (shape[0], 1))

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lacuna.diagnosis.candidate import Candidate, Profile, finish, finish_elsewhere, judge, profiles, sketches
+from lacuna.diagnosis.candidate import (
+    Candidate,
+    Profile,
+    finish,
+    finish_elsewhere,
+    from_afar,
+    judge,
+    profiles,
+    sketches,
+)
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import Policy
@@ -154,8 +163,19 @@ def _grow(
             if same not in profiled or found.cost < profiled[same].cost:
                 profiled[same] = found
     promising = sorted(profiled.values(), key=lambda p: p.cost)[: _SKETCHED[size]]
-    sketched = sketches(promising, _SKETCHED_TWICE[size], crew)
+    sketched = _sketched(promising, _SKETCHED_TWICE[size], split, enough, policy, crew)
     return _finish(min(beam, key=lambda c: c.cost), sketched, _FINISHED[size], split, tried, enough, policy, crew)
+
+
+def _sketched(promising: Sequence[Profile], twice: int, split, enough, policy: Policy, crew: Crew):
+    """A quick refit of each, the best first; the best few, `twice`, from afar as well. Where one explains enough as it
+    is (it begins afar again when it is finished), only those are begun anew that could reach it."""
+    found = sketches(promising, crew)
+    again = found[:twice]
+    if again and enough(judge(again[0][0], split)):
+        again = [pair for pair in again[1:] if pair[0].cost < policy.reach * again[0][0].cost]
+    rest = [pair for pair in found if not any(pair is other for other in again)]
+    return sorted([*rest, *from_afar(again, crew)], key=lambda pair: pair[0].cost)
 
 
 def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:

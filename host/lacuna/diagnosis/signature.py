@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lacuna.diagnosis.drift import Drift
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.estimation.fit import Fit
 from lacuna.system import Record
@@ -39,7 +40,7 @@ class Signature:
     text: str
 
 
-def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[str] = ()) -> Signature:
+def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = ()) -> Signature:
     """The signature of what `fitted` leaves, given the test of it and what drifts over the session."""
     top = remainder.largest
     places = sorted(
@@ -146,5 +147,7 @@ def _sentence(places, remainder: Remainder, dependences, drifts) -> str:
     if places and not dependences:
         parts.append("No single quantity of the model explains it.")
     if drifts:
-        parts.append(f"{', '.join(drifts)} drift{'s' if len(drifts) == 1 else ''} over the session.")
+        parts.append(
+            f"{', '.join(d.parameter for d in drifts)} drift{'s' if len(drifts) == 1 else ''} over the session."
+        )
     return " ".join(parts)

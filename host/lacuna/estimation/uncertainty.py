@@ -9,8 +9,10 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from lacuna.estimation.fit import Fit
+from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point
 from lacuna.estimation.solve import solve
+from lacuna.system import Record
 
 _UNDETERMINED = 3.0  # a direction whose standard deviation exceeds this many scales is not determined
 
@@ -140,12 +142,12 @@ def _walk_out(fitted, index, others, stride, bound, limit, max_iterations) -> fl
 
 def effective_samples(fitted: Fit) -> float:
     """Independent pieces of information in the fitted trials."""
-    floor = fitted.problem.floor
-    return sum(
-        np.isfinite(v).sum() / floor.samples_per_piece(t, c)
-        for t in fitted.problem.trials
-        for c, v in t.channels.items()
-    )
+    return sum(pieces_of(trial, fitted.problem.floor) for trial in fitted.problem.trials)
+
+
+def pieces_of(trial: Record, floor: NoiseFloor) -> float:
+    """Independent pieces of information in one trial."""
+    return sum(np.isfinite(v).sum() / floor.samples_per_piece(trial, c) for c, v in trial.channels.items())
 
 
 def _dispersion(fitted: Fit) -> float:

@@ -11,6 +11,7 @@ from toy import hide
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import choose, worth_adding
+from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.drift import find_drift
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
@@ -88,6 +89,16 @@ def test_drift_chance_a_trend_is_a_drift_where_shuffled_orders_seldom_show_it():
         assert find_drift(fitted, policy=replace(POLICY, drift_chance=1.0)), (
             "any trend is one where chance does not count"
         )
+
+
+def test_a_drift_below_relevance_is_told_and_the_verdict_is_none():
+    found = diagnose(hide({}, seed=16, repeats=6, drift=0.02))
+    largest = max(drift.share for drift in found.drifts)
+    assert (found.verdict, largest > POLICY.relevance) == ("unexplained", True)
+    lenient = replace(POLICY, relevance=1.1 * largest)
+    again = diagnose(hide({}, seed=16, repeats=6, drift=0.02), policy=lenient)
+    assert (again.verdict, bool(again.drifts)) == ("none", True)
+    assert "over the session" in again.signature.text
 
 
 # --- Which mechanisms are supported? ---
