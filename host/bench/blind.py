@@ -1,10 +1,10 @@
 """Blind trial of the diagnosis: sealed data sets, verdicts first, labels opened afterwards.
 
-    python -m bench.blind --truth own|foreign --singles 60 --none 20 --outside 20 --pairs 20 [--jobs 2] [--out FOLDER]
+    python -m bench.blind --truth own|realistic|foreign --singles 60 --none 20 [--jobs 2] [--out FOLDER]
 
-Each data set is drawn by `python -m virtual_robot.sealed` from its seed: single effects in turn, sizes and pairs at
-random, outside the library those that were never in it and, of the own truth, each library effect in turn, withheld
-from the diagnosis.
+Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or measured through the real firmware by
+`python -m bench.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the library
+those that were never in it and, but for the foreign truth, each library effect in turn, withheld from the diagnosis.
 Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues. Prints the
 figures with 95 % Wilson intervals beside four baselines that see the same fits: the best single refit by error, BIC,
 greedy forward selection, and sparse regression on the base model's residual.
@@ -30,7 +30,12 @@ from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
 _STRIDE = 7  # through the effects: coprime to their numbers, so that relatives in the list are far apart
-_CLOSE = {"own": 1.2, "foreign": 1.3}  # floors that the error after may be
+_CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # floors that the error after may be
+_DRAWN_BY = {
+    "own": ["-m", "virtual_robot.sealed"],
+    "realistic": ["-m", "bench.sealed_campaign"],
+    "foreign": ["-m", "virtual_robot.sealed", "--truth", "foreign"],
+}
 BASELINES = ("best single", "BIC", "greedy", "sparse regression")
 
 
@@ -48,8 +53,8 @@ class Job:
 
 def jobs(truth: str, counts: dict[str, int], first_seed: int) -> list[Job]:
     """Kinds mixed in proportion, so that a trial that was interrupted has some of each."""
-    effects = {"own": own, "foreign": foreign}[truth]
-    withheld = own.LIBRARY if truth == "own" else ()
+    effects = foreign if truth == "foreign" else own
+    withheld = () if truth == "foreign" else own.LIBRARY
     outside = [*((name, False) for name in effects.OUTSIDE), *((name, True) for name in withheld)]
     placed = []
     for place, (kind, count) in enumerate(counts.items()):
@@ -71,13 +76,13 @@ def diagnose_sealed(job: Job, out: Path) -> dict:
         return json.loads(kept.read_text())
     with tempfile.TemporaryDirectory() as scratch:
         folder, verdict = Path(scratch) / "sealed", Path(scratch) / "verdict.json"
-        options = ["--effect", job.effect] if job.effect else [] if job.kind == "single" else [f"--{job.kind}"]
-        options += ["--truth", job.truth]
+        kind = "one" if job.kind == "single" else job.kind
+        options = ["--effect", job.effect] if job.effect else ["--kind", kind]
         withheld = ["--without", job.effect] if job.withheld else []
         label = Path(scratch) / "label" / "sealed.toml"
         label.parent.mkdir()
-        sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(job.seed), "--out", str(folder), *options]
-        subprocess.run([*sealed, "--label", str(label)], check=True)
+        sealed = [*_DRAWN_BY[job.truth], "--seed", str(job.seed), "--out", str(folder), *options]
+        subprocess.run([sys.executable, *sealed, "--label", str(label)], check=True)
         one = [sys.executable, "-m", "bench.blind", "--one", str(folder), "--json", str(verdict), *withheld]
         out.mkdir(parents=True, exist_ok=True)
         with kept.with_suffix(".log").open("w") as log:
@@ -159,7 +164,7 @@ def report(records: list[dict], truth: str) -> None:
         f"identified: conditions not fitted within {close} floors",
         [_ratio(r, "held_out_conditions") <= close for r in of_conditions],
     )
-    if truth == "own":
+    if truth != "foreign":
         _share("90 % intervals of sizes hold the truth", [hit for r in named for hit in _covered(r)])
     closed = sorted(_closed(r) for r in named)
     if closed:

@@ -41,8 +41,8 @@ class _BenchProfile:
 
 
 # A ceramic resonator is good to 0.5 %; optiboot waits after an external reset; amplifiers and cameras filter, so their
-# noise is correlated (0.1 to 0.3 from one sample to the next).
-_REAL = _BenchProfile(2.3e-3, 1.0, 0.01, Noise(memory_s=0.008))
+# noise is correlated (0.1 to 0.3 from one sample to the next); their clocks count tenths of a millisecond.
+_REAL = _BenchProfile(2.3e-3, 1.0, 0.01, Noise(memory_s=0.008), 1e-4)
 _BENCHES = {"ideal": _BenchProfile(), "realistic": _REAL, "worn": _REAL}
 
 

@@ -10,6 +10,8 @@ EPILOG = """Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign
 bifa campaign --rerun diagnose   |
 bifa campaign --port /dev/ttyACM0 --known head_mass_kg=0.182 --known tail_mass_kg=0.171 --out out/monday"""
 
+PROFILE = typer.Option(help="Of a virtual robot: realistic, worn, or ideal (the paper's equations, white noise).")
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -22,6 +24,7 @@ def campaign(
     seed: Annotated[int, typer.Option(min=0, help="Of the virtual robot, its undisclosed effect, all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer conditions, each twice.")] = False,
     known: Annotated[list[str], typer.Option(help="What you measured: NAME=VALUE, as head_mass_kg=0.182.")] = [],  # noqa: B006
+    profile: Annotated[str, PROFILE] = "realistic",
     rerun: Annotated[list[str], typer.Option(help="Run this stage again even if it is up to date.")] = [],  # noqa: B006
 ) -> None:
     """Run the whole loop on a robot; a virtual one has an undisclosed effect.
@@ -32,11 +35,17 @@ def campaign(
     """
     from bifa.measure.known import parse_known
 
-    run_campaign(out, port, seed, quick, rerun, parse_known(known))
+    run_campaign(out, port, seed, quick, rerun, parse_known(known), profile)
 
 
 def run_campaign(
-    out: Path, port: str, seed: int, quick: bool, rerun: Sequence[str], known: Mapping[str, float] | None = None
+    out: Path,
+    port: str,
+    seed: int,
+    quick: bool,
+    rerun: Sequence[str],
+    known: Mapping[str, float] | None = None,
+    profile: str = "realistic",
 ) -> None:
     """Bring all stages up to date with progress on the terminal, then print what came of it."""
     import json
@@ -49,7 +58,7 @@ def run_campaign(
     from bifa.screen import Console
 
     console = Console()
-    bench = Bench(port, seed, {"sealed": seed} if port == "virtual" else {}, known or {})
+    bench = Bench(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
     with stage_progress(console) as progress:
         stages = campaign(bench, Effort(quick), progress.part)
         run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)

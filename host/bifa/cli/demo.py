@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli.campaign import PROFILE
+
 EPILOG = """Examples:  bifa demo   |   bifa demo --seed 3 --out out/three   |   bifa demo --quick   |
 bifa demo --rerun diagnose"""
 QUICK_CYCLES = 6
@@ -19,6 +21,7 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/demo"),
     seed: Annotated[int, typer.Option(min=0, help="Of the robot, its undisclosed effect and all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Only walk two gaits and compare their speeds.")] = False,
+    profile: Annotated[str, PROFILE] = "realistic",
     rerun: Annotated[list[str], typer.Option(help="Run this stage again even if it is up to date.")] = [],  # noqa: B006
 ) -> None:
     """Characterise a virtual robot with an undisclosed effect, find the effect, optimise the gait, walk, compare.
@@ -30,7 +33,7 @@ def demo(
     else:
         from bifa.cli.campaign import run_campaign
 
-        run_campaign(out, "virtual", seed, False, rerun)
+        run_campaign(out, "virtual", seed, False, rerun, profile=profile)
 
 
 def _walk_two_gaits(out: Path, seed: int, rerun: list[str]) -> None:
