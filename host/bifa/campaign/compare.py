@@ -8,10 +8,9 @@ import numpy as np
 
 from bifa.campaign.page import campaign_page
 from bifa.campaign.stages import Stage
-from bifa.campaign.walks import predict, speeds
+from bifa.campaign.walks import predict, predicted_speed, speeds
 from bifa.data import Trial, read_dataset
 from bifa.gait import simulations
-from bifa.gait.measured import measured_speed
 from bifa.gait.metric import Metric
 from bifa.gait.objectives import distribution
 from bifa.gait.uncertainty import SPREAD, spread_of
@@ -45,7 +44,7 @@ class GaitResult:
 
 def compare(sealed: bool) -> Stage:
     """The stage that makes `summary.json`, `report.html` and its two main figures."""
-    needs = ["model-base.toml", "model-completed.toml", "walks-base", "walks-completed"]
+    needs = ["model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "report.html")
     return Stage("compare", "compare and report", tuple(needs), makes, _run)
@@ -80,6 +79,7 @@ def _run(inputs: Path, outputs: Path) -> None:
         "remainder": diagnosis["remainder"],
         "error": diagnosis["error"],
         "prediction_error": json.loads((inputs / "errors.json").read_text()),
+        "rounds": json.loads((inputs / "rounds.json").read_text()),
         "robustness": _robustness(completed, trials),
         "truth": truth,
     }
@@ -101,9 +101,3 @@ def _robustness(model: Model, trials: list[Trial]) -> dict[str, list[float]]:
     with simulations() as runs:
         speeds = distribution(runs, robots, gait_rows(list(gaits.values())), Metric())
     return {name: [round(float(v), 2) for v in np.sort(row)] for name, row in zip(gaits, speeds, strict=True)}
-
-
-def predicted_speed(model: Model, trial: Trial) -> float:
-    """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
-    columns = predict(model, trial)
-    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.gait["period_s"]).mean_mm_s

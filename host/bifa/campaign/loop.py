@@ -5,15 +5,16 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from bifa.campaign.again import Trades, again
 from bifa.campaign.bench import Bench
 from bifa.campaign.compare import compare
 from bifa.campaign.prediction_error import prediction_errors
 from bifa.campaign.residuals import residuals
-from bifa.campaign.resolve import resolve
+from bifa.campaign.resolve import joined, resolve
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
 from bifa.data import Dataset, read_dataset, write_dataset
-from bifa.gait import Settings, optimise, simulations
+from bifa.gait import Optimum, Settings, optimise, simulations
 from bifa.gait.library import provenance
 from bifa.gait.uncertainty import SPREAD
 from bifa.identify.completed import completed_model
@@ -22,14 +23,15 @@ from bifa.identify.start import prepare
 from bifa.measure import plan
 from bifa.measure.known import known_of
 from bifa.measure.session import run_session
-from bifa.robot import load_model, save_model
-from bifa.robot.gait import BASELINE, load_gait, save_gait
+from bifa.robot import Model, load_model, save_model
+from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 from lacuna.diagnosis.record import as_record
 
 Part = Callable[[str, float], None]
 
-_SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects
+_SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
+_FURTHER = 20  # and for walks of further rounds
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
             part,
         ),
         _walk("walk-completed", {"completed": "gait-completed.toml"}, 2, bench, effort, part),
+        _again(bench, effort, part),
     ]
     if bench.is_virtual:
         stages.append(_unseal(bench))
@@ -95,13 +98,17 @@ def _fit(bench: Bench, part: Part) -> Stage:
 def _optimise(name: str, title: str, model: str, gait: str, bench: Bench, part: Part) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
         robot = load_model(inputs / model)
-        with simulations() as runs:
-            # not the fit's covariance, which is narrower than what a robot changes by from day to day
-            settings = Settings(seed=bench.seed, spread=SPREAD)
-            best = optimise(robot, runs, settings, lambda what, share, _: part(what, share))
+        best = _robust_gait(robot, bench, part)
         save_gait(outputs / gait, best.gait, provenance(best, robot.name, "bifa campaign"))
 
     return Stage(name, title, (model,), (gait,), run, {"seed": bench.seed, "spread": SPREAD})
+
+
+def _robust_gait(robot: Model, bench: Bench, part: Part) -> Optimum:
+    with simulations() as runs:
+        # not the fit's covariance, which is narrower than what a robot changes by from day to day
+        settings = Settings(seed=bench.seed, spread=SPREAD)
+        return optimise(robot, runs, settings, lambda what, share, _: part(what, share))
 
 
 def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, effort: Effort, part: Part) -> Stage:
@@ -138,6 +145,30 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
     settings = bench.settings(_SEPARATING)
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings)
+
+
+def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
+    def complete(dataset: Dataset) -> tuple[Model, tuple[str, ...]]:
+        found = diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
+        return completed_model(found.final), tuple(effect.name for effect in found.effects)
+
+    def walk(number: int, gait: Gait) -> Dataset:
+        with bench.open(_FURTHER + number) as rig:
+            return measure_walks(rig, {f"round-{number}": gait}, effort.cycles, effort.repeats, part)
+
+    def run(inputs: Path, outputs: Path) -> None:
+        dataset = read_dataset(inputs / "bench")
+        for folder in sorted((inputs / "separating").iterdir()):
+            dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
+        named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
+        trades = Trades(complete, lambda robot: _robust_gait(robot, bench, part).gait, walk)
+        again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
+
+    needs = ("bench", "separating", "walks-base", "walks-completed", "diagnosis.json")
+    needs += ("model-completed.toml", "gait-completed.toml")
+    makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
+    settings = bench.settings(_FURTHER) | {"effort": asdict(effort)}
+    return Stage("again", "feed the walks back", needs, makes, run, settings)
 
 
 def _unseal(bench: Bench) -> Stage:

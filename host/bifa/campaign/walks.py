@@ -61,6 +61,12 @@ def predict(model: Model, trial: Trial) -> dict:
     return walk(model, Gait(**trial.gait), time_s=trial.time_s).columns
 
 
+def predicted_speed(model: Model, trial: Trial) -> float:
+    """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
+    columns = predict(model, trial)
+    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.gait["period_s"]).mean_mm_s
+
+
 def walks_stage(
     open_rig: Callable[[], object],
     gaits: Mapping[str, tuple[str, Gait]],

@@ -72,6 +72,13 @@ def run_campaign(
     errors = prediction_table(summary["prediction_error"]), error_table(summary["error"])
     for table in (*errors, speed_table(summary["gaits"])):
         _print_table(console, table)
+    for number, one in enumerate(summary["rounds"], 1):
+        console.print(
+            f"round {number}, a gait that was not fitted: {one['predicted_mm_s']:.2f} mm/s predicted,"
+            f" {one['measured_mm_s']:.2f} measured; places wrong by {one['error_mm']:.3f} mm,"
+            f" repeats differ by {one['floor_mm']:.3f} mm",
+            highlight=False,
+        )
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
 
 

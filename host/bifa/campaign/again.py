@@ -1,0 +1,110 @@
+"""Walks are data too: feed them back, complete the model anew, and walk its gait, until a gait that was never fitted is
+predicted to within the floor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bifa.campaign.resolve import joined
+from bifa.campaign.walks import predict, predicted_speed, speeds
+from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.robot import Model, load_model, save_model
+from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
+
+ROUNDS = 3
+WITHIN = 1.1  # floors: as in the engine, an error within a tenth of the floor is as good as the data
+_UNCHANGED = 0.01  # of the measured speed
+_PLACES = ("displacement_head_mm", "displacement_tail_mm")
+
+
+@dataclass(frozen=True)
+class Round:
+    """One gait that was not fitted: `error_mm`, RMS of both ends' places against what `effects` and the model predict;
+    `floor_mm`, what its repeats differ by; speeds over settled cycles."""
+
+    effects: tuple[str, ...]
+    predicted_mm_s: float
+    measured_mm_s: float
+    error_mm: float
+    floor_mm: float
+
+    @property
+    def is_predicted(self) -> bool:
+        return self.error_mm <= WITHIN * self.floor_mm
+
+    def changes_nothing(self, before: Round) -> bool:
+        """Whether the model still names the same and its gait walks no faster or slower, nor is predicted better."""
+        as_fast = abs(self.measured_mm_s - before.measured_mm_s) < _UNCHANGED * before.measured_mm_s
+        return self.effects == before.effects and as_fast and self.error_mm > 0.9 * before.error_mm
+
+
+@dataclass(frozen=True)
+class Trades:
+    """What a round is made of: a diagnosis of all data gives the completed model and what it names, an optimiser its
+    gait, and the robot walks it; walk(number, gait) numbers the rounds from 2 on."""
+
+    complete: Callable[[Dataset], tuple[Model, tuple[str, ...]]]
+    optimise: Callable[[Model], Gait]
+    walk: Callable[[int, Gait], Dataset]
+
+
+def judged(model: Model, effects: tuple[str, ...], walks: Dataset) -> Round:
+    """How well `model` predicts the repeats of one gait. With a single repeat the floor is NaN and nothing is within
+    it."""
+    trials = walks.trials
+    residuals = _residuals(model, trials)
+    between = residuals - residuals.mean(axis=0)
+    floor = np.sqrt((between**2).sum(axis=0).mean() / (len(trials) - 1)) if len(trials) > 1 else np.nan
+    measured = [speed.mean_mm_s for repeats in speeds(walks).values() for speed in repeats]
+    return Round(
+        effects,
+        predicted_speed(model, trials[0]),
+        float(np.mean(measured)),
+        float(np.sqrt(np.mean(residuals**2))),
+        float(floor),
+    )
+
+
+def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
+    """Measured less predicted places of both ends in mm, shape (repeats, 2, samples), on the shortest's time base."""
+    shortest = min(repeats, key=lambda trial: trial.time_s[-1])
+    columns = predict(model, shortest)
+    predicted = np.array([columns[place] for place in _PLACES])
+    measured = [[np.interp(shortest.time_s, t.time_s, t.columns[place]) for place in _PLACES] for t in repeats]
+    return np.array(measured) - predicted
+
+
+def _without_baseline(walks: Dataset) -> Dataset:
+    """The optimised gait's walks: the bench has walked the baseline, for another length of time."""
+    return replace(walks, trials=tuple(t for t in walks.trials if Gait(**t.gait) != BASELINE))
+
+
+def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], trades: Trades) -> None:
+    """Go round until a gait that was never fitted is predicted, nothing changes any more, or after `ROUNDS` rounds.
+
+    `dataset`: all that informed model-completed.toml, less the walks in `inputs`, whose last gait is the first round's.
+    Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), and the last round's model and gait.
+    """
+    model, gait = load_model(inputs / "model-completed.toml"), load_gait(inputs / "gait-completed.toml")
+    walks = read_dataset(inputs / "walks-completed")
+    dataset = joined(dataset, _without_baseline(read_dataset(inputs / "walks-base")), "walks-1/")
+    (outputs / "rounds").mkdir()
+    rounds = [judged(model, effects, walks)]
+    while not rounds[-1].is_predicted and len(rounds) < ROUNDS:
+        number = len(rounds) + 1
+        dataset = joined(dataset, walks, f"walks-{number - 1}/")
+        model, effects = trades.complete(dataset)
+        gait = trades.optimise(model)
+        write_dataset(outputs / "rounds" / f"walks-{number}", trades.walk(number, gait))
+        walks = read_dataset(outputs / "rounds" / f"walks-{number}")
+        rounds.append(judged(model, effects, walks))
+        if rounds[-1].changes_nothing(rounds[-2]):
+            break
+    save_model(outputs / "model-last.toml", model)
+    save_gait(outputs / "gait-last.toml", gait, {"created_by": "bifa campaign"})
+    (outputs / "rounds.json").write_text(json.dumps([asdict(r) for r in rounds], indent=1) + "\n")

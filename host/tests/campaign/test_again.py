@@ -1,0 +1,99 @@
+"""Walks fed back until a gait that was never fitted is predicted; the robot here is a model with noise."""
+
+import json
+
+import numpy as np
+import pytest
+
+from bifa.campaign.again import ROUNDS, Trades, again, judged
+from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.robot import nominal, save_model
+from bifa.robot.gait import BASELINE, Gait, save_gait
+from bifa.simulate import walk
+
+ROBOT = nominal()
+SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * ROBOT.values["mu_s"]})
+FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
+FASTER = Gait(2.6, 204.5, 331.7, 0.6535, 0.439, 0.439)
+
+
+def walked(gaits: dict[str, Gait], seed: int = 0) -> Dataset:
+    draw = np.random.default_rng(seed)
+    trials = []
+    for name, gait in gaits.items():
+        clean = walk(ROBOT, gait, time_s=np.arange(0.0, 4 * gait.period_s, 0.01)).columns
+        for repeat in (1, 2, 3):
+            columns = {
+                key: values + (0.1 * draw.standard_normal(len(values)) if key.startswith("displacement") else 0.0)
+                for key, values in clean.items()
+            }
+            trials.append(
+                Trial(
+                    file=f"{name}_{repeat}.csv",
+                    experiment="locomotion",
+                    columns=columns,
+                    gait=gait.as_dict(),
+                    repeat=repeat,
+                    session_order=len(trials) + 1,
+                )
+            )
+    return Dataset(None, "walks", {}, tuple(trials), {})
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """Inputs with the walks of the baseline and of two gaits, and an empty folder of outputs."""
+    inputs, outputs = tmp_path / "in", tmp_path / "out"
+    outputs.mkdir()
+    write_dataset(inputs / "walks-base", walked({"baseline": BASELINE, "base": FASTER}))
+    write_dataset(inputs / "walks-completed", walked({"completed": FAST}, 1))
+    save_gait(inputs / "gait-completed.toml", FAST)
+    return inputs, outputs
+
+
+def go_round(folders, first, later, gaits=(FASTER, FASTER)):
+    """again() with a completed model `first` and diagnoses that answer `later` in turn; rounds and data they saw."""
+    inputs, outputs = folders
+    save_model(inputs / "model-completed.toml", first)
+    seen, answers, gaits = [], iter(later), iter(gaits)
+
+    def complete(dataset):
+        seen.append([trial.file for trial in dataset.trials])
+        return next(answers), ("hysteresis",)
+
+    trades = Trades(complete, lambda model: next(gaits), lambda number, gait: walked({f"round-{number}": gait}, number))
+    again(inputs, outputs, Dataset(None, "day", {}, ()), (), trades)
+    return json.loads((outputs / "rounds.json").read_text()), seen
+
+
+def test_a_gait_that_is_predicted_ends_it(folders):
+    rounds, seen = go_round(folders, ROBOT, [])
+    assert len(rounds) == 1
+    assert seen == []
+    assert rounds[0]["floor_mm"] == pytest.approx(0.1, rel=0.1)
+    assert rounds[0]["error_mm"] <= 1.1 * rounds[0]["floor_mm"]
+    assert rounds[0]["predicted_mm_s"] == pytest.approx(rounds[0]["measured_mm_s"], rel=0.01)
+
+
+def test_a_gait_that_is_not_is_fed_back_and_the_next_one_judged(folders):
+    rounds, seen = go_round(folders, SLIPPERY, [ROBOT])
+    assert [r["error_mm"] < 1.1 * r["floor_mm"] for r in rounds] == [False, True]
+    assert len(seen) == 1
+    assert {file.split("/")[0] for file in seen[0]} == {"walks-1"}
+    assert not any("baseline" in file for file in seen[0]), "the bench has walked it for another length of time"
+    assert len(seen[0]) == 6
+    walks = read_dataset(folders[1] / "rounds" / "walks-2")
+    assert {Gait(**trial.gait) for trial in walks.trials} == {FASTER}
+
+
+def test_it_ends_where_nothing_changes_any_more(folders):
+    rounds, _ = go_round(folders, SLIPPERY, [SLIPPERY, SLIPPERY])
+    assert len(rounds) == ROUNDS, "the second round names something else"
+    assert [tuple(r["effects"]) for r in rounds] == [(), ("hysteresis",), ("hysteresis",)]
+
+
+def test_one_repeat_has_no_floor_to_be_within():
+    walks = walked({"completed": FAST})
+    alone = Dataset(None, "walks", {}, walks.trials[:1], {})
+    assert not judged(ROBOT, (), alone).is_predicted
+    assert judged(ROBOT, (), walks).is_predicted
