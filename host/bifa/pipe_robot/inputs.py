@@ -18,7 +18,6 @@ from lacuna.system import Theta
 
 STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
 _MM = 1e3
-_STEADY_MM = 0.05  # a pull that departs from its straight line by less was driven at its rate
 
 
 @dataclass(frozen=True)
@@ -208,13 +207,8 @@ def _pull(trial: Trial) -> PullInputs:
 
 def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
     """For how long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
-    moving = (pulled_mm > 0.1 * pulled_mm.max()) & (pulled_mm < 0.95 * pulled_mm.max())
-    begin_s = float(np.median(time_s[moving] - pulled_mm[moving] / rate_mm_s)) if moving.any() else 0.0
-    straight_s = np.clip(time_s - begin_s, 0.0, None)
-    if np.sqrt(np.mean((rate_mm_s * straight_s - pulled_mm) ** 2)) < _STEADY_MM:
-        return straight_s
-    smooth_m, _ = imposed_motion(time_s, pulled_mm / _MM)
-    return np.maximum.accumulate(np.clip(smooth_m * _MM / rate_mm_s, 0.0, None))
+    path_m, _ = imposed_motion(time_s, pulled_mm / _MM)
+    return np.maximum.accumulate(np.clip(path_m * _MM / rate_mm_s, 0.0, None))
 
 
 def _walk(trial: Trial) -> WalkInputs:

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.signal import savgol_filter
 
 _DIRECTION_WINDOW = 25  # samples: half a second at 50 Hz
 _SMOOTHING_WINDOW = 11
+_MARGIN = _DIRECTION_WINDOW // 2 + 1  # samples at either end of a stretch that may belong to the next one
+_OFF = 5.0  # standard deviations from a line: not on it
+_STRAIGHT = 1.2  # times the noise that neighbouring samples show: what straight lines may leave
+
+_Line = tuple[float, float]  # level at time 0, slope
 
 
 def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The imposed displacement [m] and its direction (1, 0 at rest, -1), both shape (n,).
 
-    Each stretch in one direction is smoothed by itself, so the corners where the cross-head turns stay sharp, and
-    a noise-free ramp comes back unchanged.
+    A cross-head that is driven at constant rates goes by straight lines, which meet where it starts, turns and stops:
+    these say where it was more exactly than any smoothing. Where they do not fit, each stretch in one direction is
+    smoothed by itself. A noise-free ramp comes back unchanged.
     """
     displacement_m = np.asarray(displacement_m, float)
     n = len(displacement_m)
@@ -28,7 +36,52 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> tuple[np.n
     for start, stop in zip(np.r_[0, edges], np.r_[edges, n], strict=True):
         if stop - start >= _SMOOTHING_WINDOW:
             smooth[start:stop] = savgol_filter(displacement_m[start:stop], _SMOOTHING_WINDOW, 1)
-    return smooth, direction
+    return _straight(time_s, displacement_m, direction) or (smooth, direction)
+
+
+def _straight(
+    time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The motion as straight lines, and its direction; None where it was not one, as what they leave shows: it may not
+    exceed what neighbouring samples differ by."""
+    edges = np.flatnonzero(np.diff(direction)) + 1
+    stretches = list(zip(np.r_[0, edges], np.r_[edges, len(direction)], strict=True))
+    if any(stop - start < 2 * _MARGIN + 3 for start, stop in stretches if direction[start]):
+        return None
+    lines = [_line(time_s, displacement_m, start, stop, direction[start] != 0) for start, stop in stretches]
+    lines = [*_rest_before(time_s, displacement_m, lines[0]), *lines]
+    lines = [*lines, *_rest_before(time_s[::-1], displacement_m[::-1], lines[-1])]
+    corners = [(a0 - b0) / (b1 - a1) for (a0, a1), (b0, b1) in pairwise(lines)]
+    if any(late <= early for early, late in pairwise(corners)):
+        return None
+    place = np.searchsorted(corners, time_s)
+    level, slope = np.array(lines).T
+    path = level[place] + slope[place] * time_s
+    noise = np.sqrt(0.5 * np.mean(np.diff(displacement_m - path) ** 2))
+    if np.sqrt(np.mean((displacement_m - path) ** 2)) > _STRAIGHT * noise + 1e-9:
+        return None
+    return path, np.sign(slope).astype(int)[place]
+
+
+def _rest_before(
+    time_s: np.ndarray, displacement_m: np.ndarray, line: tuple[float, float]
+) -> list[tuple[float, float]]:
+    """The line of a rest too short to have been found, before a motion along `line`; none where there is none."""
+    level, slope = line
+    off = np.abs(displacement_m - level - slope * time_s)
+    inside = off[_MARGIN : 3 * _MARGIN]
+    on = off <= _OFF * 1.4826 * np.median(inside) + 1e-9
+    rest = int(np.argmax(on))
+    return [(float(np.median(displacement_m[:rest])), 0.0)] if slope and 0 < rest <= _MARGIN else []
+
+
+def _line(time_s: np.ndarray, displacement_m: np.ndarray, start: int, stop: int, moves: bool) -> _Line:
+    """Level at time 0 and slope of a stretch, away from its ends where it moves; slope 0 where it rests."""
+    if not moves:
+        return float(np.median(displacement_m[start:stop])), 0.0
+    inside = slice(start + _MARGIN, stop - _MARGIN)
+    slope, level = np.polyfit(time_s[inside], displacement_m[inside], 1)
+    return float(level), float(slope)
 
 
 def _sharpened(displacement_m: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, best_of, evaluate_on, solve_from_afar, starting_point
+from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, solve_from_afar, starting_point
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, solve
@@ -107,6 +107,11 @@ class Profile:
     cost: float
     points: tuple[Point, ...]
 
+    def at_typical_size(self) -> np.ndarray:
+        """The base model's own start, with the effect as large as it usually is."""
+        structure = self.problem.structure
+        return structure.values(structure.theta(structure.start()))
+
     def from_afar(self) -> np.ndarray:
         """The base model's own start, with the effect as it is at the best point: what has been fitted without the
         effect may have gone astray."""
@@ -160,9 +165,21 @@ def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile
 def from_afar(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple[Fit, Profile]]:
     """Each sketch, or what comes of beginning afar with its effect, whichever is better."""
     profiled = [p for _, p in sketched]
-    names = [p.problem.structure.effects for p in profiled]
-    afar = crew.map("refitting from afar", names, _sketched_from_afar, [(p.problem, p.from_afar()) for p in profiled])
+    afar = _begun_afar(profiled, [p.from_afar() for p in profiled], crew)
     return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, afar, strict=True)]
+
+
+def anew(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Sketches that owe nothing to the parent's fit: from afar, with the effect at its typical size. The best first."""
+    found = _begun_afar(profiled, [p.at_typical_size() for p in profiled], crew)
+    fits = [(best_of(p.problem, [solution]), p) for solution, p in zip(found, profiled, strict=True)]
+    return sorted(fits, key=lambda pair: pair[0].cost)
+
+
+def _begun_afar(profiled: Sequence[Profile], starts: Sequence[np.ndarray], crew: Crew) -> list[Solution]:
+    names = [p.problem.structure.effects for p in profiled]
+    jobs = [(p.problem, start) for p, start in zip(profiled, starts, strict=True)]
+    return crew.map("refitting from afar", names, _sketched_from_afar, jobs)
 
 
 def _sketched(problem: Problem, start: Point) -> Solution:
@@ -177,7 +194,8 @@ def finish(sketched: Fit) -> Fit:
     """Refit to the end: from afar once more, since with the effect at its size the trials that isolate parameters lead
     those back that went astray without it."""
     again = solve_from_afar(sketched.problem, sketched.solution.point.values, **_REFIT)
-    return best_of(sketched.problem, [sketched.solution, again])
+    best = min(sketched.solution, again, key=lambda s: s.cost)
+    return best_of(sketched.problem, [renewed(sketched.problem, best, **_REFIT)])
 
 
 def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:

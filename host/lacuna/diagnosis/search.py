@@ -10,6 +10,7 @@ import numpy as np
 from lacuna.diagnosis.candidate import (
     Candidate,
     Profile,
+    anew,
     finish,
     finish_elsewhere,
     from_afar,
@@ -162,9 +163,15 @@ def _grow(
             same = frozenset(found.problem.structure.effects)
             if same not in profiled or found.cost < profiled[same].cost:
                 profiled[same] = found
-    promising = sorted(profiled.values(), key=lambda p: p.cost)[: _SKETCHED[size]]
-    sketched = _sketched(promising, _SKETCHED_TWICE[size], split, enough, policy, crew)
-    return _finish(min(beam, key=lambda c: c.cost), sketched, _FINISHED[size], split, tried, enough, policy, crew)
+    ranked = sorted(profiled.values(), key=lambda p: p.cost)
+    sketched = _sketched(ranked[: _SKETCHED[size]], _SKETCHED_TWICE[size], split, enough, policy, crew)
+    before = min(beam, key=lambda c: c.cost)
+    grown = _finish(before, sketched, _FINISHED[size], split, tried, enough, policy, crew)
+    if size == 1 and not any(enough(c) for c in grown):
+        # a base model that lacks much may be fitted so wrongly that what it lacks does not help it
+        best = min([before, *grown], key=lambda c: c.cost)
+        grown += _finish(best, anew(ranked, crew), _FINISHED[size], split, tried, enough, policy, crew)
+    return grown
 
 
 def _sketched(promising: Sequence[Profile], twice: int, split, enough, policy: Policy, crew: Crew):
@@ -214,5 +221,7 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Po
         if suffices:
             explained = min(explained, candidate.cost)
         done.append(candidate)
-    tried.update((frozenset(candidate.effects), candidate) for candidate in [*done, *waiting])
+    for candidate in (*done, *waiting):
+        same = frozenset(candidate.effects)
+        tried[same] = min(tried.get(same, candidate), candidate, key=lambda c: c.cost)
     return [*done, *waiting]

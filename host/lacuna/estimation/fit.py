@@ -130,14 +130,24 @@ def refit_on(
 def converged(fitted: Fit) -> Fit:
     """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
-    problem, solution = fitted.problem.seen(PLAIN), fitted.solution
-    before = np.inf
-    for _ in range(_ROUNDS):
-        solution = solve(problem, solution.point, max_iterations=_CONVERGED_ITERATIONS, relative=0.1 * _CONVERGED)
-        if before - solution.cost < _CONVERGED * solution.cost:
-            break
-        before = solution.cost
+    problem = fitted.problem.seen(PLAIN)
+    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.1 * _CONVERGED}
+    solution = renewed(problem, solve(problem, fitted.solution.point, **options), **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def renewed(problem: Problem, solution: Solution, **options) -> Solution:
+    """Searches that follow `solution`, for as long as one gains `_CONVERGED` of the cost: with nuisances as they are,
+    and begun anew at their means. A nuisance and a parameter of like effect (a run's friction and the friction) hold
+    one another where the model predicts a jump a little early or late; a search has to let go of one of them."""
+    for _ in range(_ROUNDS):
+        starts = [solution.point, problem.start(solution.point.values)] if any(problem.nuisances) else [solution.point]
+        further = min((solve(problem, start, **options) for start in starts), key=lambda s: s.cost)
+        gained = solution.cost - further.cost
+        solution = min(solution, further, key=lambda s: s.cost)
+        if gained < _CONVERGED * solution.cost:
+            break
+    return solution
 
 
 def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:

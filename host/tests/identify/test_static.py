@@ -104,10 +104,16 @@ def test_a_static_test_that_did_not_move_is_refused():
 
 
 @settings(max_examples=30, deadline=None)
-@given(rate=st.floats(0.5, 20.0), noise=st.floats(0.0, 5e-6), dwell=st.integers(0, 100), seed=st.integers(0, 99))
-def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, seed):
+@given(
+    rate=st.floats(0.5, 20.0),
+    noise=st.floats(0.0, 5e-6),
+    dwell=st.integers(0, 100),
+    rest_s=st.floats(0.0, 0.2),
+    seed=st.integers(0, 99),
+)
+def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, rest_s, seed):
     half = 50.0 / rate
-    time = np.arange(0.0, 2 * half + dwell * 0.02, 0.02)
+    time = np.arange(-rest_s, 2 * half + dwell * 0.02 + rest_s, 0.02)
     true = 1e-3 * rate * np.clip(np.minimum(time, 2 * half - (time - dwell * 0.02)), 0, half)
     measured = true + noise * np.random.default_rng(seed).standard_normal(len(time))
     smooth, direction = imposed_motion(time, measured)
