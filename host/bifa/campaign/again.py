@@ -12,19 +12,18 @@ import numpy as np
 
 from bifa.campaign.resolve import joined
 from bifa.campaign.walks import predict, predicted_speed, speeds
-from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.data import Dataset, Trial, read_dataset
 from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 
 ROUNDS = 3
 WITHIN = 1.1  # floors: as in the engine, an error within a tenth of the floor is as good as the data
 _UNCHANGED = 0.01  # of the measured speed
-_PLACES = ("displacement_head_mm", "displacement_tail_mm")
 
 
 @dataclass(frozen=True)
 class Round:
-    """One gait that was not fitted: `error_mm`, RMS of both ends' places against what `effects` and the model predict;
+    """One gait that was not fitted: `error_mm`, RMS of the ends' places against what `effects` and the model predict;
     `floor_mm`, what its repeats differ by; speeds over settled cycles."""
 
     effects: tuple[str, ...]
@@ -46,11 +45,11 @@ class Round:
 @dataclass(frozen=True)
 class Trades:
     """What a round is made of: a diagnosis of all data gives the completed model and what it names, an optimiser its
-    gait, and the robot walks it; walk(number, gait) numbers the rounds from 2 on."""
+    gait, and the robot walks it into a data set; walk(number, gait, folder) numbers the rounds from 2 on."""
 
     complete: Callable[[Dataset], tuple[Model, tuple[str, ...]]]
     optimise: Callable[[Model], Gait]
-    walk: Callable[[int, Gait], Dataset]
+    walk: Callable[[int, Gait, Path], Dataset]
 
 
 def judged(model: Model, effects: tuple[str, ...], walks: Dataset) -> Round:
@@ -71,11 +70,13 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset) -> Round:
 
 
 def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
-    """Measured less predicted places of both ends in mm, shape (repeats, 2, samples), on the shortest's time base."""
+    """Measured less predicted places of the ends that were tracked in mm, shape (repeats, ends, samples), on the
+    shortest's time base."""
+    places = [name for name in repeats[0].columns if name.startswith("displacement")]
     shortest = min(repeats, key=lambda trial: trial.time_s[-1])
     columns = predict(model, shortest)
-    predicted = np.array([columns[place] for place in _PLACES])
-    measured = [[np.interp(shortest.time_s, t.time_s, t.columns[place]) for place in _PLACES] for t in repeats]
+    predicted = np.array([columns[place] for place in places])
+    measured = [[np.interp(shortest.time_s, t.time_s, t.columns[place]) for place in places] for t in repeats]
     return np.array(measured) - predicted
 
 
@@ -88,20 +89,21 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     """Go round until a gait that was never fitted is predicted, nothing changes any more, or after `ROUNDS` rounds.
 
     `dataset`: all that informed model-completed.toml, less the walks in `inputs`, whose last gait is the first round's.
-    Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), and the last round's model and gait.
+    Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), and the last round's model and gait. Rounds
+    that an interrupted run has walked there are not walked again.
     """
     model, gait = load_model(inputs / "model-completed.toml"), load_gait(inputs / "gait-completed.toml")
     walks = read_dataset(inputs / "walks-completed")
     dataset = joined(dataset, _without_baseline(read_dataset(inputs / "walks-base")), "walks-1/")
-    (outputs / "rounds").mkdir()
+    (outputs / "rounds").mkdir(exist_ok=True)
     rounds = [judged(model, effects, walks)]
     while not rounds[-1].is_predicted and len(rounds) < ROUNDS:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         model, effects = trades.complete(dataset)
         gait = trades.optimise(model)
-        write_dataset(outputs / "rounds" / f"walks-{number}", trades.walk(number, gait))
-        walks = read_dataset(outputs / "rounds" / f"walks-{number}")
+        folder = outputs / "rounds" / f"walks-{number}"
+        walks = read_dataset(folder) if folder.exists() else trades.walk(number, gait, folder)
         rounds.append(judged(model, effects, walks))
         if rounds[-1].changes_nothing(rounds[-2]):
             break

@@ -1,9 +1,10 @@
-"""Where a campaign is run: a rig that is opened anew for every stage."""
+"""Where a campaign is run: a rig that is opened anew for every stage that measures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from bifa.rig import open_rig
+from bifa.measure.by_hand import ByHand
+from bifa.rig import is_offered, open_rig
 
 
 @dataclass(frozen=True)
@@ -11,12 +12,19 @@ class Bench:
     """`port` as for `--port`; `options` go to a virtual rig. Every stage draws its own noise.
 
     `known`: what the person has measured directly, in place of what the rig declares (`bifa.measure.known`).
+    `hands`: on a serial port, whose rig has no instruments, the person who works the lab's own.
     """
 
     port: str | None = "virtual"
     seed: int = 0
     options: Mapping[str, object] = field(default_factory=dict)
     known: Mapping[str, float] = field(default_factory=dict)
+    hands: ByHand | None = None
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether a person works the instruments: the port is not that of a rig that brings its own."""
+        return not is_offered(self.port)
 
     @property
     def is_virtual(self) -> bool:
@@ -25,10 +33,15 @@ class Bench:
 
     def open(self, stage: int):
         """The rig for stage number `stage`."""
-        return open_rig(self.port, **self._options(stage))
+        rig = open_rig(self.port, **self._options(stage))
+        if rig.instruments is None and self.hands is not None:
+            self.hands.equip(rig)
+        return rig
 
     def settings(self, stage: int) -> dict[str, object]:
         """What decides the stage's data, for its provenance."""
+        if self.is_by_hand:  # the port's name changes from day to day
+            return {"port": "serial", "instruments": "by hand"}
         return {"port": self.port, **self._options(stage)}
 
     def _options(self, stage: int) -> dict[str, object]:

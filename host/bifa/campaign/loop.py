@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from bifa.campaign.again import Trades, again
@@ -36,7 +36,7 @@ _FURTHER = 20  # and for walks of further rounds
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured: `quick` takes one condition less of each experiment, twice instead of three times."""
+    """How much is measured: `quick` measures each condition twice instead of three times, and faster."""
 
     quick: bool = False
     cycles: int = 7
@@ -44,9 +44,13 @@ class Effort:
 
 
 def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
-    """The stages of a campaign on `bench`; `part(what, share)` is told how the running stage is getting on."""
+    """The stages of a campaign on `bench`; `part(what, share)` is told how the running stage is getting on.
+
+    By hand, only the stages that measure need the robot: a diagnosis there names the experiment that would separate
+    what it cannot tell apart, and the person decides.
+    """
     stages = [
-        _measure(bench, effort, part),
+        *([_measure_by_hand(bench, effort), _declare(bench)] if bench.is_by_hand else [_measure(bench, effort, part)]),
         _fit(bench, part),
         _optimise("optimise-base", "gait from the base model", "model-base.toml", "gait-base.toml", bench, part),
         _walk("walk-base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
@@ -87,6 +91,27 @@ def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
     return Stage("measure", "characterise the robot on its bench", (), ("bench",), run, settings, resumes=True)
 
 
+def _measure_by_hand(bench: Bench, effort: Effort) -> Stage:
+    """Without the known values: to correct one is no reason to measure again."""
+    trials = plan.session(quick=effort.quick)
+
+    def run(inputs: Path, outputs: Path) -> None:
+        with bench.open(0) as rig:
+            run_session(rig, outputs / "measured", trials, name="campaign", known={}, provenance=bench.settings(0))
+
+    title = f"characterise the robot: {len(trials)} trials"
+    settings = bench.settings(0) | {"effort": asdict(effort)}
+    return Stage("measure", title, (), ("measured",), run, settings, resumes=True, by_hand=True)
+
+
+def _declare(bench: Bench) -> Stage:
+    def run(inputs: Path, outputs: Path) -> None:
+        measured = read_dataset(inputs / "measured")
+        write_dataset(outputs / "bench", replace(measured, name="campaign: characterisation", known=dict(bench.known)))
+
+    return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(bench.known)})
+
+
 def _fit(bench: Bench, part: Part) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
         found = identify(read_dataset(inputs / "bench"), progress=lambda what: part(what, 0.0))
@@ -117,11 +142,12 @@ def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, ef
     def run(inputs: Path, outputs: Path) -> None:
         loaded = {key: load_gait(inputs / file) if file else BASELINE for key, file in gaits.items()}
         with bench.open(number) as rig:
-            write_dataset(outputs / walks, measure_walks(rig, loaded, effort.cycles, effort.repeats, part))
+            measure_walks(rig, outputs / walks, loaded, effort.cycles, effort.repeats, _told(bench, part))
 
     needs = tuple(file for file in gaits.values() if file)
     settings = bench.settings(number) | {"effort": asdict(effort)}
-    return Stage(name, f"walk: {' and '.join(gaits)}", needs, (walks,), run, settings)
+    title, hands = f"walk: {' and '.join(gaits)}", bench.is_by_hand
+    return Stage(name, title, needs, (walks,), run, settings, resumes=hands, by_hand=hands)
 
 
 def _diagnose(bench: Bench, part: Part) -> Stage:
@@ -132,9 +158,11 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
         dataset = read_dataset(inputs / "bench")
         found = diagnosed(dataset)
         (outputs / "separating").mkdir()
-        _, found, ran = resolve(
-            dataset, found, diagnosed, lambda n: bench.open(_SEPARATING + n), outputs / "separating", part
-        )
+        ran = ()
+        if not bench.is_by_hand:
+            _, found, ran = resolve(
+                dataset, found, diagnosed, lambda n: bench.open(_SEPARATING + n), outputs / "separating", part
+            )
         record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
@@ -152,9 +180,10 @@ def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
         found = diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
-    def walk(number: int, gait: Gait) -> Dataset:
+    def walk(number: int, gait: Gait, folder: Path) -> Dataset:
         with bench.open(_FURTHER + number) as rig:
-            return measure_walks(rig, {f"round-{number}": gait}, effort.cycles, effort.repeats, part)
+            told = _told(bench, part)
+            return measure_walks(rig, folder, {f"round-{number}": gait}, effort.cycles, effort.repeats, told)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -168,7 +197,13 @@ def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
     needs += ("model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
     settings = bench.settings(_FURTHER) | {"effort": asdict(effort)}
-    return Stage("again", "feed the walks back", needs, makes, run, settings)
+    hands = bench.is_by_hand
+    return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=hands, by_hand=hands)
+
+
+def _told(bench: Bench, part: Part) -> Part:
+    """Who hears how a walk is getting on: nobody where a person at the bench is asked things meanwhile."""
+    return (lambda what, share: None) if bench.is_by_hand else part
 
 
 def _unseal(bench: Bench) -> Stage:

@@ -4,39 +4,72 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Column
 
 from bifa.campaign.stages import Stage
 from bifa.screen import Console
 
+_TITLE = 35  # characters: the longest title of a stage
+
 
 class StageProgress:
-    """Hand `start` and `end` to `run_stages`, `part` to what happens inside a stage."""
+    """Hand `start` and `end` to `run_stages`, `part` to what happens inside a stage.
 
-    def __init__(self, bars: Progress) -> None:
-        self._bars = bars
+    While a person measures there is no bar, which would redraw itself over questions and answers: `close` it before.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._title = ""
+        self._bars: Progress | None = None
         self._task = None
 
     def start(self, stage: Stage) -> None:
         """A stage begins."""
-        self._task = self._bars.add_task(stage.title, total=None, what="")
+        self._title = stage.title
+        if stage.by_hand:
+            self._console.print(stage.title, highlight=False)
+        else:
+            self._begin()
+
+    def _begin(self) -> None:
+        self._bars = Progress(
+            TextColumn("{task.description}", table_column=Column(min_width=_TITLE)),
+            BarColumn(bar_width=20),
+            TextColumn("{task.fields[what]}"),
+            TimeElapsedColumn(),
+            console=self._console,
+        )
+        self._task = self._bars.add_task(self._title, total=None, what="")
+        self._bars.start()
 
     def part(self, what: str, share: float) -> None:
         """`what` inside the running stage is done to `share`, 0 to 1."""
+        if self._bars is None:
+            self._begin()
         self._bars.update(self._task, total=1.0, completed=min(share, 0.999), what=what)
 
     def end(self, stage: Stage, ran: bool) -> None:
         """A stage is done; ran: it was not up to date already."""
-        self._bars.update(self._task, total=1.0, completed=1.0, what="done" if ran else "up to date")
+        said = "done" if ran else "up to date"
+        if self._bars is None:
+            self._console.print(f"{stage.title}: {said}", highlight=False)
+            return
+        self._bars.update(self._task, total=1.0, completed=1.0, what=said)
+        self.close()
+
+    def close(self) -> None:
+        """Nothing is redrawn any more; what stands there stays."""
+        if self._bars is not None:
+            self._bars.stop()
+            self._bars = None
 
 
 @contextmanager
 def stage_progress(console: Console) -> Iterator[StageProgress]:
     """Bars that redraw themselves on a terminal and end as plain lines elsewhere."""
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=28),
-        TextColumn("{task.fields[what]}"),
-        TimeElapsedColumn(),
-        console=console,
-    ) as bars:
-        yield StageProgress(bars)
+    progress = StageProgress(console)
+    try:
+        yield progress
+    finally:
+        progress.close()

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import bifa
 from bifa.errors import BifaError
+from bifa.files import write_text
 
 PROVENANCE = "provenance.json"
 _SCRATCH = ".scratch"
@@ -33,6 +34,8 @@ class Stage:
     run(inputs, outputs): `inputs` is the campaign's folder, `outputs` the scratch folder to write `makes` into.
     settings: whatever else decides the result (seed, gait, port); plain JSON.
     resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept.
+    by_hand: somebody measured for hours to make it. It is not run again for another version of bifa, with other
+    settings only on request, and what it made before is kept beside the new.
     """
 
     name: str
@@ -42,6 +45,7 @@ class Stage:
     run: Callable[[Path, Path], None]
     settings: Mapping[str, object] = field(default_factory=dict)
     resumes: bool = False
+    by_hand: bool = False
 
 
 def digest(path: Path) -> str:
@@ -102,10 +106,23 @@ def _asked(folder: Path, stage: Stage) -> dict:
 
 
 def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool:
-    if record is None or any(record.get(key) != value for key, value in asked.items()):
+    if record is None:
         return False
     made = record.get("artefacts", {})
-    return all((folder / name).exists() and made.get(name) == digest(folder / name) for name in stage.makes)
+    intact = all((folder / name).exists() and made.get(name) == digest(folder / name) for name in stage.makes)
+    if stage.by_hand and intact and record.get("settings") != asked["settings"]:
+        raise StageError(
+            f"{', '.join(stage.makes)} in {folder} was measured with {_differing(record, asked)}: run with the same, "
+            f"name another folder, or measure again with --rerun {stage.name}"
+        )
+    counting = ("settings", "inputs") if stage.by_hand else tuple(asked)
+    return intact and all(record.get(key) == asked[key] for key in counting)
+
+
+def _differing(record: dict, asked: dict) -> str:
+    old, new = record.get("settings") or {}, asked["settings"]
+    names = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
+    return ", ".join(f"{name} = {old.get(name)}, not {new.get(name)}" for name in names)
 
 
 def _run(folder: Path, stage: Stage) -> None:
@@ -118,15 +135,18 @@ def _run(folder: Path, stage: Stage) -> None:
         if missing:
             raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
         for name in stage.makes:
-            _replace(scratch / name, folder / name)
+            _replace(scratch / name, folder / name, keep=stage.by_hand)
         done = True
     finally:
         if done or not stage.resumes:
             shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _replace(new: Path, target: Path) -> None:
+def _replace(new: Path, target: Path, keep: bool) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
+    if keep and target.exists():
+        earlier = len(list(target.parent.glob(f"{target.name}.earlier-*")))
+        os.replace(target, target.with_name(f"{target.name}.earlier-{earlier + 1}"))
     if target.is_dir():
         shutil.rmtree(target)
     os.replace(new, target)
@@ -142,6 +162,4 @@ def _read_records(folder: Path) -> dict:
 
 
 def _write_json(path: Path, content: dict) -> None:
-    scratch = path.with_suffix(".tmp")
-    scratch.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
-    os.replace(scratch, path)
+    write_text(path, json.dumps(content, indent=1, sort_keys=True) + "\n")

@@ -1,15 +1,17 @@
 """Walk gaits on a rig and compare what was measured with what the model predicts."""
 
+import itertools
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from bifa.campaign.stages import Stage
-from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.link import Uno
 from bifa.measure.locomotion import record_walk
+from bifa.measure.plan import PlannedTrial
 from bifa.report.walks import Walk, draw_walks
 from bifa.robot import Model
 from bifa.robot.gait import Gait
@@ -20,31 +22,41 @@ Progress = Callable[[str, float], None]
 
 def measure_walks(
     rig,
+    folder: Path,
     gaits: Mapping[str, Gait],
     cycles: int,
     repeats: int = 1,
     on_progress: Progress = lambda what, share: None,
 ) -> Dataset:
-    """Walk every gait `repeats` times on the rig; the trials of one data set, named after the gaits."""
-    trials = []
+    """Walk every gait `repeats` times on the rig, into the data set `folder` of trials named after the gaits; walks
+    that an interrupted run has left there are not walked again."""
+    record = getattr(rig, "recorder", None) or _walk
+    total = len(gaits) * repeats
     with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         hello = uno.connect()
         uno.clear()
-        for name, gait in gaits.items():
-            for repeat in range(1, repeats + 1):
-                recorded = record_walk(rig, uno, gait, cycles, lambda share, name=name: on_progress(name, share))
-                trials.append(
-                    Trial(
-                        file=f"{name}_{repeat}.csv",
-                        experiment="locomotion",
-                        columns=recorded.columns,
-                        gait=gait.as_dict(),
-                        repeat=repeat,
-                        session_order=len(trials) + 1,
-                        extra=recorded.extra,
-                    )
-                )
-    return Dataset(None, "walks", {}, tuple(trials), {"firmware": hello.firmware})
+        writer = DatasetWriter(folder, "walks", {}, {"firmware": hello.firmware}, resume=True)
+        for number, (name, repeat) in enumerate(itertools.product(gaits, range(1, repeats + 1)), start=1):
+            planned = PlannedTrial("locomotion", gait=gaits[name], cycles=cycles, repeat=repeat)
+            if writer.has(planned.as_trial()):
+                continue
+            trial = record(
+                rig,
+                uno,
+                planned,
+                lambda share, name=name: on_progress(name, share),
+                number=number,
+                total=total,
+                writer=writer,
+            )
+            writer.add(replace(trial, file=f"{name}_{repeat}.csv", session_order=number))
+    return writer.finish()
+
+
+def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress, **_) -> Trial:
+    """The `Recorder` of walks on a rig that needs nobody."""
+    walk = record_walk(rig, uno, planned.gait, planned.cycles, on_progress)
+    return planned.as_trial(walk.columns, extra=walk.extra)
 
 
 def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:
@@ -82,9 +94,8 @@ def walks_stage(
 
     def run(inputs: Path, outputs: Path) -> None:
         with open_rig() as rig:
-            dataset = measure_walks(rig, {name: gait for name, (_, gait) in gaits.items()}, cycles, 1, on_progress)
-        write_dataset(outputs / "walks", dataset)
-        dataset = read_dataset(outputs / "walks")
+            walked = {name: gait for name, (_, gait) in gaits.items()}
+            dataset = measure_walks(rig, outputs / "walks", walked, cycles, 1, on_progress)
         measured = {name: [asdict(speed) for speed in repeats] for name, repeats in speeds(dataset).items()}
         (outputs / "walks.json").write_text(json.dumps(measured, indent=1) + "\n")
         columns = [

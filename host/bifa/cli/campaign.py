@@ -8,7 +8,8 @@ import typer
 
 EPILOG = """Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
 bifa campaign --rerun diagnose   |
-bifa campaign --port /dev/ttyACM0 --known head_mass_kg=0.182 --known tail_mass_kg=0.171 --out out/monday"""
+bifa campaign --port /dev/ttyACM0 --watch records --out out/monday   |
+bifa campaign --port /dev/ttyACM0 --known head_mass_kg=0.182 --out out/monday"""
 
 PROFILE = typer.Option(help="Of a virtual robot: realistic, worn, or ideal (the paper's equations, white noise).")
 
@@ -20,22 +21,32 @@ def register(app: typer.Typer) -> None:
 
 def campaign(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/campaign"),
-    port: Annotated[str, typer.Option(help="`virtual`, or a serial port whose rig has instruments.")] = "virtual",
+    port: Annotated[str, typer.Option(help="`virtual`, a serial port, or a rig of your own by its name.")] = "virtual",
     seed: Annotated[int, typer.Option(min=0, help="Of the virtual robot, its undisclosed effect, all noise.")] = 0,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer conditions, each twice.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Each condition twice, not three times; faster.")] = False,
+    watch: Annotated[
+        Path | None, typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")
+    ] = None,
+    bench: Annotated[
+        Path, typer.Option(help="What is known of the bench, asked for once (serial port).", show_default=True)
+    ] = Path("bench.toml"),
     known: Annotated[list[str], typer.Option(help="What you measured: NAME=VALUE, as head_mass_kg=0.182.")] = [],  # noqa: B006
     profile: Annotated[str, PROFILE] = "realistic",
     rerun: Annotated[list[str], typer.Option(help="Run this stage again even if it is up to date.")] = [],  # noqa: B006
 ) -> None:
     """Run the whole loop on a robot; a virtual one has an undisclosed effect.
 
-    Every stage can be interrupted and resumed, and is run again only when something that it depends on has changed.
-    What you have weighed or gauged yourself goes into --known; everything else is fitted, or stands at the nominal
-    value where no experiment can tell it. A virtual robot comes with its masses and its supply pressure.
+    On a serial port your own camera and testing machine measure: the campaign says what to mount and to start, takes
+    the CSV that they save, lines it up with the Uno by the strobe, shows it, and repeats it if you like: docs/bench.md.
+
+    Every stage can be interrupted and resumed, days later as well, and is run again only when something that it
+    depends on has changed. Only the stages that measure need the robot. What you have weighed or gauged yourself is
+    declared in the bench's file or with --known; everything else is fitted, or stands at the nominal value where no
+    experiment can tell it. A virtual robot comes with its masses and its supply pressure.
     """
     from bifa.measure.known import parse_known
 
-    run_campaign(out, port, seed, quick, rerun, parse_known(known), profile)
+    run_campaign(out, port, seed, quick, rerun, parse_known(known), profile, watch, bench)
 
 
 def run_campaign(
@@ -46,6 +57,8 @@ def run_campaign(
     rerun: Sequence[str],
     known: Mapping[str, float] | None = None,
     profile: str = "realistic",
+    watch: Path | None = None,
+    bench_file: Path | None = None,
 ) -> None:
     """Bring all stages up to date with progress on the terminal, then print what came of it."""
     import json
@@ -55,13 +68,23 @@ def run_campaign(
     from bifa.campaign.page import error_table, prediction_table, speed_table
     from bifa.campaign.progress import stage_progress
     from bifa.campaign.stages import run_stages
+    from bifa.files import check_targets
     from bifa.screen import Console
 
+    check_targets(folders=(out,))
     console = Console()
     bench = Bench(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
-    with stage_progress(console) as progress:
-        stages = campaign(bench, Effort(quick), progress.part)
-        run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
+    try:
+        if bench.is_by_hand:
+            bench = _attended(console, bench, watch, bench_file)
+        with stage_progress(console) as progress:
+            if bench.hands is not None:
+                bench.hands.before = progress.close
+            stages = campaign(bench, Effort(quick), progress.part)
+            run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
+    except KeyboardInterrupt:
+        console.print(f"stopped; {_kept(out)}. The same command goes on there.", highlight=False, soft_wrap=True)
+        raise typer.Exit(130) from None
 
     summary = json.loads((out / "summary.json").read_text())
     effects = "; ".join(_sized(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
@@ -80,6 +103,47 @@ def run_campaign(
             highlight=False,
         )
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
+
+
+def _attended(console, bench, watch: Path | None, bench_file: Path | None):
+    """The bench with somebody at its desk, and what is known of it."""
+    from dataclasses import replace
+
+    from bifa.measure.bench_file import known_on
+
+    desk, hands = at_desk(console, watch)
+    known = {**(known_on(bench_file, desk) if bench_file else {}), **bench.known}
+    return replace(bench, known=known, hands=hands)
+
+
+def at_desk(console, watch: Path | None):
+    """The desk on this terminal, and who works the instruments there (`bifa.measure.by_hand`)."""
+    from bifa.errors import BifaError
+    from bifa.measure.by_hand import ByHand
+    from bifa.measure.desk import Desk
+
+    if watch is not None and not watch.is_dir():
+        raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
+    plain = not console.encoding.lower().startswith("utf")
+    desk = Desk(lambda text: console.print(text, markup=False, highlight=False), watch)
+    return desk, ByHand(desk, watch, plain)
+
+
+def _kept(out: Path) -> str:
+    """What an interrupted campaign has on disk, in words."""
+    import json
+
+    from bifa.campaign.stages import PROVENANCE
+    from bifa.data.write import PARTIAL_SUFFIX
+
+    try:
+        done = list(json.loads((out / PROVENANCE).read_text())["stages"])
+    except (OSError, ValueError, KeyError):
+        done = []
+    trials = sum(len(list(folder.glob("*.csv"))) for folder in out.glob(f".*-unfinished/*{PARTIAL_SUFFIX}"))
+    under_way = f"{trials} trial{'' if trials == 1 else 's'} of the stage under way" if trials else ""
+    kept = " and ".join(part for part in (f"the stages {', '.join(done)}" if done else "", under_way) if part)
+    return f"{out} keeps {kept}" if kept else "nothing has been finished yet"
 
 
 def _sized(name: str, values) -> str:

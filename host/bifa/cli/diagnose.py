@@ -33,6 +33,9 @@ def diagnose(
     port: Annotated[
         str | None, typer.Option(help="For --resolve: `virtual` (the robot that made the data), or a serial port.")
     ] = None,
+    watch: Annotated[
+        Path | None, typer.Option(help="For --resolve: folder in which your instruments' CSV files appear.")
+    ] = None,
     matters: Annotated[
         list[str] | None,
         typer.Option(
@@ -61,11 +64,11 @@ def diagnose(
     folder = dataset.with_name(dataset.name + "-resolved") if resolve else None
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
-    found = _found(console, measured, robot, good_enough, seed, folder, port, workers)
+    found = _found(console, measured, robot, good_enough, seed, folder, port, watch, workers)
     _report(console, measured.name, found, json, out, report)
 
 
-def _found(console, measured, robot, good_enough, seed: int, resolved: Path | None, port: str | None, workers):
+def _found(console, measured, robot, good_enough, seed: int, resolved: Path | None, port, watch, workers):
     """The diagnosis of a data set; `resolved`: with experiments that separate, recorded into this folder."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -87,7 +90,8 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
         with workers as (executor, _):
             found = diagnosed(measured)
             if resolved is not None:
-                _, found, _ = resolve(measured, found, diagnosed, _rig_of(measured, port), resolved, said)
+                rigs = _rigs(measured, port, console, watch, progress)
+                _, found, _ = resolve(measured, found, diagnosed, rigs, resolved, said)
     return found
 
 
@@ -113,14 +117,30 @@ def _report(console, name: str, found, json: Path | None, model: Path | None, pa
         console.print(f"report: {page}", highlight=False)
 
 
-def _rig_of(measured, port: str | None):
-    """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance."""
+def _rigs(measured, port: str | None, console, watch: Path | None, progress):
+    """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance; where a person
+    works the instruments, no bar redraws itself over the questions."""
+    from contextlib import contextmanager
+
     from bifa.campaign.resolve import SPECIMEN
+    from bifa.cli.campaign import at_desk
     from bifa.rig import open_rig
 
     made = {**measured.provenance, **measured.provenance.get("options", {})}
     options = {key: made[key] for key in SPECIMEN if key in made} if port == "virtual" else {}
-    return lambda number: open_rig(port, **options, **({"seed": 1000 + number} if port == "virtual" else {}))
+
+    @contextmanager
+    def opened(number: int):
+        with open_rig(port, **options, **({"seed": 1000 + number} if port == "virtual" else {})) as rig:
+            if rig.instruments is not None:
+                yield rig
+                return
+            at_desk(console, watch)[1].equip(rig)
+            progress.stop()
+            yield rig
+        progress.start()
+
+    return opened
 
 
 def _print(console, record: dict) -> None:

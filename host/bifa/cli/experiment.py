@@ -9,6 +9,7 @@ import typer
 EPILOG = """Examples:  bifa experiment all --port virtual --out out/bench   |
 bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
 bifa experiment locomotion --inclination 10 --port virtual --out out/uphill   |
+bifa experiment step_response --port /dev/ttyACM0 --watch records --out out/steps   |
 bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 8.5 --out out/pull"""
 
 
@@ -49,6 +50,9 @@ def experiment(
     profile: Annotated[str | None, typer.Option(help="Of a virtual rig: ideal, realistic or worn.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of a virtual rig: its noise.")] = None,
     known: Annotated[list[str], typer.Option(help="What you measured: NAME=VALUE, as head_mass_kg=0.182.")] = [],  # noqa: B006
+    watch: Annotated[
+        Path | None, typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")
+    ] = None,
     instrument: Annotated[Path | None, typer.Option(help="CSV of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).")] = None,
 ) -> None:
@@ -56,6 +60,8 @@ def experiment(
 
     Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments have
     clocks of their own and are synchronised with the Uno's by its sampling strobe (D10); each trial notes how well.
+    On a serial port your own instruments measure: what to mount and start is said, trial by trial, and the CSV that
+    they save is the record (docs/bench.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
     from bifa.measure import plan
@@ -79,7 +85,19 @@ def experiment(
         _import(console, instrument, telemetry, trials[0], out, parse_known(known))
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
-    _run(console, port, options, out, trials, name.value, parse_known(known))
+    try:
+        _run(console, port, options, out, trials, name.value, parse_known(known), watch)
+    except KeyboardInterrupt:
+        console.print(f"valves off; {kept_of(out)}; run the same command to resume", highlight=False, soft_wrap=True)
+        raise typer.Exit(130) from None
+
+
+def kept_of(out: Path) -> str:
+    """What an interrupted session has on disk, in words."""
+    from bifa.data.write import PARTIAL_SUFFIX
+
+    partial = out.with_name(out.name + PARTIAL_SUFFIX)
+    return f"{len(list(partial.glob('*.csv')))} finished trials are kept in {partial}"
 
 
 def _load(path: Path):
@@ -91,9 +109,12 @@ def _load(path: Path):
     return file.gait
 
 
-def _run(console, port, options, out, trials, name, known) -> None:
+def _run(console, port, options, out, trials, name, known, watch) -> None:
+    from contextlib import nullcontext
+
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from bifa.cli.campaign import at_desk
     from bifa.measure.known import known_of
     from bifa.measure.session import provenance, run_session
     from bifa.rig import open_rig
@@ -105,25 +126,30 @@ def _run(console, port, options, out, trials, name, known) -> None:
         TimeRemainingColumn(),
     )
     errors = []
-    with open_rig(port, **options) as rig, Progress(*columns, console=console) as progress:
-        task = progress.add_task(name, total=len(trials))
+    with open_rig(port, **options) as rig:
+        by_hand = rig.instruments is None
+        if by_hand:
+            at_desk(console, watch)[1].equip(rig)
+        bars = Progress(*columns, console=console)
+        task = bars.add_task(name, total=len(trials))
 
         def show(event) -> None:
-            progress.update(task, description=event.planned.file, completed=event.number - 1 + event.share)
+            bars.update(task, description=event.planned.file, completed=event.number - 1 + event.share)
             if event.clock_error_s is not None:
                 errors.append(event.clock_error_s)
-            if event.misfit:
-                progress.console.print(f"[yellow]warning[/yellow] {event.misfit}", highlight=False)
+            if event.misfit and not by_hand:
+                console.print(f"[yellow]warning[/yellow] {event.misfit}", highlight=False)
 
-        dataset = run_session(
-            rig,
-            out,
-            trials,
-            name=f"{name} on the bench",
-            known=known_of(rig, known),
-            provenance=provenance(port, options),
-            on_event=show,
-        )
+        with nullcontext() if by_hand else bars:  # a bar would redraw itself over questions and answers
+            dataset = run_session(
+                rig,
+                out,
+                trials,
+                name=f"{name} on the bench",
+                known=known_of(rig, known),
+                provenance=provenance(port, options),
+                on_event=show,
+            )
     console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them just recorded.")
     if errors:
         console.print(

@@ -36,8 +36,13 @@ class Finding:
 
 def check_dataset(dataset: Dataset) -> list[Finding]:
     """Every finding, those of single trials first, in the order of the data set."""
-    findings = [found for trial in dataset.trials for check in TRIAL_CHECKS for found in check(trial)]
+    findings = [found for trial in dataset.trials for found in check_trial(trial)]
     return findings + [found for check in DATASET_CHECKS for found in check(dataset)]
+
+
+def check_trial(trial: Trial) -> list[Finding]:
+    """What looks wrong in one trial by itself."""
+    return [found for check in TRIAL_CHECKS for found in check(trial)]
 
 
 def _line(row: int) -> int:

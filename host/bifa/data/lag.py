@@ -76,14 +76,18 @@ def shift_of_all(lags: Sequence[Lag]) -> str | None:
     )
 
 
-def misfit_of_last(trials: Sequence[Trial]) -> str | None:
-    """What is wrong with the lag of the trial that was recorded last, beside the earlier ones', with its file."""
-    last = displacement_lag(trials[-1])
+def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
+    """What is wrong with a trial's lag beside those of `earlier` ones, with its file."""
+    last = displacement_lag(trial)
     if last is None:
         return None
-    others = [lag for trial in trials[:-1] if (lag := displacement_lag(trial)) is not None]
-    text = misfit(last, others)
-    return f"{trials[-1].file}: {text}" if text else None
+    text = misfit(last, [lag for other in earlier if (lag := displacement_lag(other)) is not None])
+    return f"{trial.file}: {text}" if text else None
+
+
+def misfit_of_last(trials: Sequence[Trial]) -> str | None:
+    """`misfit_of` the trial that was recorded last beside the earlier ones."""
+    return misfit_of(trials[-1], trials[:-1])
 
 
 def _in_words(late_s: float) -> str:

@@ -14,7 +14,7 @@ from bifa.link.units import set_point_psi
 from bifa.measure.alignment import AlignmentError, resampled
 from bifa.measure.locomotion import noted, record_walk
 from bifa.measure.plan import PULL_MM, PlannedTrial
-from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, instruments_of
+from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, idle, instruments_of, mount
 
 CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
@@ -24,12 +24,16 @@ RELIEF_S = 12.0  # the regulator lets air out more slowly
 
 # The second switch is 5 ms off the sampling grid of the first: together they are known to 5 ms instead of 10.
 STEP_UP_S, STEP_DOWN_S, STEP_END_S = 0.5, 5.005, 14.0
-_ATTEMPTS = 3  # at a trial in which no telemetry is lost and the clocks line up
+MOVED_MM = 0.1  # by which a cross-head has moved: well over its noise
+STILL_S = 1.0  # kept before and after the motion
+ATTEMPTS = 3  # at a trial in which no telemetry is lost and the clocks line up
 
 Progress = Callable[[float], None]
 
 
-def record_trial(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None) -> Trial:
+def record_trial(
+    rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
+) -> Trial:
     """Run one planned trial and return it as a data set holds it; the valves are off afterwards.
 
     `extra` notes how well the clocks were lined up (`clock_error_s`), what the regulator was really asked for
@@ -38,7 +42,7 @@ def record_trial(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = l
     """
     instruments_of(rig)
     why = ""
-    for _ in range(_ATTEMPTS):
+    for _ in range(attempts):
         try:
             columns, extra, lost = _RUNS[planned.experiment](rig, uno, planned, on_progress)
         except AlignmentError as error:
@@ -49,11 +53,11 @@ def record_trial(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = l
         if not lost:
             return planned.as_trial(columns, extra=extra)
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
-    raise BifaError(f"{planned.file}, {_ATTEMPTS} times over: {why}")
+    raise BifaError(f"{planned.file}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
 
 
 def _static(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
-    rig.instruments.mount("static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
+    mount(rig, uno, "static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
     chamber = CHAMBER_OF[planned.actuator]
     _pressurise(rig, uno, chamber, planned.pressure_psi)
     with Recording(rig, uno, on_progress) as tape:
@@ -61,12 +65,12 @@ def _static(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         rig.instruments.move()
         tape.wait_while(lambda: rig.instruments.moving, 2 * 54.0 / planned.rate_mm_s)
         tape.wait(LEAD_S)
-    moved = _moving_span(tape.instrument_s)
+    moved = _moving_span(tape)
     return _machine_columns(tape, chamber, moved), noted(tape.clock), tape.lost_samples
 
 
 def _pull(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
-    rig.instruments.mount("anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
+    mount(rig, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
     # Extended first: a head holds with no pressure at all, but it has to snap out for that.
     _pressurise(rig, uno, "head", SNAP_PSI)
     if planned.pressure_psi < SNAP_PSI:
@@ -78,17 +82,17 @@ def _pull(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         rig.instruments.move()
         tape.wait_while(lambda: rig.instruments.moving, PULL_MM / planned.rate_mm_s)
         tape.wait(LEAD_S)
-    moved = _moving_span(tape.instrument_s)
+    moved = _moving_span(tape)
     return _machine_columns(tape, "head", moved), noted(tape.clock), tape.lost_samples
 
 
 def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
-    rig.instruments.mount("step_response", actuator=planned.actuator)
+    mount(rig, uno, "step_response", actuator=planned.actuator)
     chamber = CHAMBER_OF[planned.actuator]
     _off(uno)
     uno.set("pressure_psi", planned.pressure_psi)
     uno.hold(chamber, "vacuum")
-    _pass(rig, uno, SETTLE_S)
+    idle(rig, uno, SETTLE_S)
     with Recording(rig, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         uno.schedule([(STEP_UP_S, chamber, "positive"), (STEP_DOWN_S, chamber, "vacuum")])
@@ -140,15 +144,7 @@ def _pressurise(rig, uno: Uno, chamber: str, pressure_psi: float, settle_s: floa
         uno.hold(chamber, "positive")
     elif pressure_psi < 0.0:
         uno.hold(chamber, "vacuum")
-    _pass(rig, uno, settle_s)
-
-
-def _pass(rig, uno: Uno, duration_s: float) -> None:
-    """Let time pass without letting the Uno think that the host has gone."""
-    until_s = rig.clock.now() + duration_s
-    while (left_s := until_s - rig.clock.now()) > 0:
-        rig.clock.sleep(min(left_s, 0.25))
-        uno.keep_alive()
+    idle(rig, uno, settle_s)
 
 
 def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, float]:
@@ -165,11 +161,20 @@ def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, flo
     return float(0.5 * (low + high)), float(0.5 * (high - low))
 
 
-def _moving_span(time_s: np.ndarray) -> slice:
-    """The record about the motion, without most of the lead on both sides."""
-    begin_s, end_s = time_s[0] + BEFORE_MARK_S + 0.8 * LEAD_S, time_s[-1] - 0.5 * LEAD_S
-    inside = np.flatnonzero((time_s >= begin_s) & (time_s <= end_s))
-    return slice(inside[0], inside[-1] + 1)
+def _moving_span(tape: Recording) -> slice:
+    """The record about the motion, as far as the Uno recorded as well, without most of the lead on both sides."""
+    time_s, place_mm = tape.instrument_s, tape.record["displacement_mm"]
+    begin_s = max(time_s[0] + BEFORE_MARK_S + 0.8 * LEAD_S, tape.pressures_s[0])
+    end_s = min(time_s[-1] - 0.5 * LEAD_S, tape.pressures_s[-1])
+    inside = (time_s >= begin_s) & (time_s <= end_s)
+    if not inside.any():
+        raise BifaError("the instrument's record and the Uno's do not overlap in time: repeat")
+    moved = time_s[inside & (np.abs(place_mm - place_mm[inside][0]) > MOVED_MM)]
+    if not len(moved):
+        raise BifaError("the cross-head did not move while the Uno recorded: repeat")
+    inside &= (time_s >= moved[0] - STILL_S) & (time_s <= moved[-1] + STILL_S)
+    kept = np.flatnonzero(inside)
+    return slice(kept[0], kept[-1] + 1)
 
 
 def _machine_columns(tape: Recording, chamber: str, span: slice) -> dict[str, np.ndarray]:

@@ -20,18 +20,13 @@ from bifa.data import Dataset, DatasetWriter
 from bifa.errors import BifaError
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, align, align_after_restart, resampled
+from bifa.measure.instruments import CHANNELS
 from bifa.measure.locomotion import noted
 from bifa.measure.plan import PlannedTrial
 
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
 _CHAMBERS = ("body", "head", "tail")
-_MEASURES = {
-    "static_loading": ("displacement_mm", "force_N"),
-    "anchor_pull": ("displacement_mm", "force_N"),
-    "step_response": ("displacement_mm",),
-    "locomotion": ("displacement_head_mm",),
-}
 
 
 class InstrumentFileError(BifaError):
@@ -48,9 +43,9 @@ def import_trial(
     Raises InstrumentFileError where a column is missing, the two do not overlap or their clocks do not line up,
     DatasetError where `folder` exists.
     """
-    measured = _columns(instrument, ("time_s", *_MEASURES[planned.experiment]))
-    edges = _columns(instrument.with_suffix(".sync.csv"), ("sync_time_s",))["sync_time_s"]
-    uno = _columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
+    measured = read_columns(instrument, ("time_s", *CHANNELS[planned.experiment]))
+    edges = read_columns(instrument.with_suffix(".sync.csv"), ("sync_time_s",))["sync_time_s"]
+    uno = read_columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
     columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
@@ -68,7 +63,7 @@ def _telemetry_file(path: Path) -> Path:
     return files[0]
 
 
-def _columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
+def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Columns of numbers; an empty field is NaN (a chamber that is off), text columns are left out."""
     try:
         with path.open(newline="", encoding="utf-8") as file:

@@ -9,7 +9,7 @@ from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, resampled
-from bifa.measure.recording import LEAD_S, Recording
+from bifa.measure.recording import LEAD_S, Recording, mount
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
 
@@ -48,7 +48,7 @@ def record_walk(
     """
     tape = Recording(rig, uno, on_progress)
     uno.halt()
-    rig.instruments.mount("locomotion", **settings)
+    mount(rig, uno, "locomotion", **settings)
     uno.upload(gait.as_dict())
     with tape:
         tape.wait(LEAD_S, report=False)

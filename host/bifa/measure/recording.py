@@ -10,6 +10,7 @@ from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, align
+from bifa.measure.instruments import are_asked, until_ready
 
 LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
 _PIECE_S = 0.25
@@ -24,6 +25,20 @@ def instruments_of(rig):
             "with --instrument"
         )
     return rig.instruments
+
+
+def mount(rig, uno: Uno, experiment: str, **settings) -> None:
+    """Have `experiment` put on the stand, and wait until it is there."""
+    rig.instruments.mount(experiment, **settings)
+    until_ready(rig.instruments, lambda: idle(rig, uno, _PIECE_S))
+
+
+def idle(rig, uno: Uno, duration_s: float) -> None:
+    """Let time pass without letting the Uno think that the host has gone."""
+    until_s = rig.clock.now() + duration_s
+    while (left_s := until_s - rig.clock.now()) > 0:
+        rig.clock.sleep(min(left_s, _PIECE_S))
+        uno.keep_alive()
 
 
 class Recording:
@@ -45,12 +60,16 @@ class Recording:
         self._uno.samples(0.0)  # what is left of an earlier recording
         self._uno.stream(True)
         self._instruments.start()
+        until_ready(self._instruments, lambda: self.wait(_PIECE_S, report=False))
         self.wait(BEFORE_MARK_S, report=False)
         self._marked = self._uno.mark_strobe()
         return self
 
     def __exit__(self, kind, *_) -> None:
         self._uno.halt()
+        if kind is None and are_asked(self._instruments):
+            self._instruments.save()
+            until_ready(self._instruments, lambda: self._uno.samples(_PIECE_S))
         self.record = self._instruments.stop()
         self._uno.stream(False)
         if kind is None:
@@ -65,13 +84,14 @@ class Recording:
                 self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
 
     def wait_while(self, condition: Callable[[], bool], expected_s: float) -> None:
-        """Wait for as long as `condition()` holds, about `expected_s`; BifaError after three times as long."""
+        """Wait for as long as `condition()` holds, about `expected_s`; BifaError after three times as long, unless
+        it is a person who moves things."""
         begun_s = self._rig.clock.now()
         while condition():
             self.samples += self._uno.samples(_PIECE_S)
             elapsed_s = self._rig.clock.now() - begun_s
             self._on_progress(min(elapsed_s / expected_s, 1.0))
-            if elapsed_s > 3.0 * expected_s + 5.0:
+            if not are_asked(self._instruments) and elapsed_s > 3.0 * expected_s + 5.0:
                 raise BifaError(f"the cross-head is still moving after {elapsed_s:.0f} s: look at the stand")
 
     def _line_up(self) -> None:

@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import bifa
-from bifa.data import Dataset, DatasetWriter
+from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.data.lag import misfit_of_last
 from bifa.link import Uno
 from bifa.measure.experiments import record_trial
@@ -34,6 +34,32 @@ class Event:
     misfit: str | None = None
 
 
+class Recorder(Protocol):
+    """Records one planned trial, `number` of `total`, for the data set that `writer` grows."""
+
+    def __call__(
+        self,
+        rig,
+        uno: Uno,
+        planned: PlannedTrial,
+        on_progress: Callable[[float], None],
+        *,
+        number: int,
+        total: int,
+        writer: DatasetWriter,
+    ) -> Trial: ...
+
+
+def by_itself(rig, uno, planned, on_progress, **_) -> Trial:
+    """The `Recorder` of a rig that needs nobody."""
+    return record_trial(rig, uno, planned, on_progress)
+
+
+def recorder_of(rig) -> Recorder:
+    """What records on this rig: its own (`rig.recorder`, a person who works the instruments), or `by_itself`."""
+    return getattr(rig, "recorder", None) or by_itself
+
+
 def run_session(
     rig,
     folder: Path,
@@ -49,6 +75,7 @@ def run_session(
     Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session.
     """
     writer = DatasetWriter(folder, name, known, provenance, resume=True)
+    record = recorder_of(rig)
     with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         uno.connect()
         uno.clear()
@@ -57,8 +84,14 @@ def run_session(
                 on_event(Event(planned, number, len(trials), 1.0, skipped=True))
                 continue
             on_event(Event(planned, number, len(trials), 0.0))
-            trial = record_trial(
-                rig, uno, planned, lambda share, p=planned, n=number: on_event(Event(p, n, len(trials), share))
+            trial = record(
+                rig,
+                uno,
+                planned,
+                lambda share, p=planned, n=number: on_event(Event(p, n, len(trials), share)),
+                number=number,
+                total=len(trials),
+                writer=writer,
             )
             writer.add(planned.as_trial(trial.columns, session_order=number, extra=_measured(trial.extra, planned)))
             wrong = misfit_of_last(writer.trials)

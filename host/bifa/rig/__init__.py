@@ -1,6 +1,16 @@
 """Rigs: what `--port` opens."""
 
 from bifa.rig.ports import SerialPort, serial_ports, uno_ports
-from bifa.rig.rig import Rig, RigError, SerialRig, find_port, open_rig
+from bifa.rig.rig import Rig, RigError, SerialRig, find_port, is_offered, open_rig
 
-__all__ = ["Rig", "RigError", "SerialPort", "SerialRig", "find_port", "open_rig", "serial_ports", "uno_ports"]
+__all__ = [
+    "Rig",
+    "RigError",
+    "SerialPort",
+    "SerialRig",
+    "find_port",
+    "is_offered",
+    "open_rig",
+    "serial_ports",
+    "uno_ports",
+]

@@ -80,6 +80,11 @@ def find_port() -> str:
     )
 
 
+def is_offered(port: str | None) -> bool:
+    """Whether `port` is the name of a rig that a package offers, and not a serial port."""
+    return port in entry_points(group=ENTRY_POINTS).names
+
+
 def open_rig(port: str | None = None, **options: Any) -> Rig:
     """Open what `port` names: a rig registered under the entry points `bifa.rigs`, a serial port, or, if None, the Uno
     found by its USB identity.

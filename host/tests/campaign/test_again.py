@@ -61,7 +61,11 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
         seen.append([trial.file for trial in dataset.trials])
         return next(answers), ("hysteresis",)
 
-    trades = Trades(complete, lambda model: next(gaits), lambda number, gait: walked({f"round-{number}": gait}, number))
+    def walk_into(number, gait, folder):
+        write_dataset(folder, walked({f"round-{number}": gait}, number))
+        return read_dataset(folder)
+
+    trades = Trades(complete, lambda model: next(gaits), walk_into)
     again(inputs, outputs, Dataset(None, "day", {}, ()), (), trades)
     return json.loads((outputs / "rounds.json").read_text()), seen
 

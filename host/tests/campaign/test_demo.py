@@ -17,9 +17,9 @@ from bifa.robot.gait import BASELINE
 pytestmark = pytest.mark.uno
 
 
-def test_the_baseline_walks_as_fast_as_in_the_paper():
+def test_the_baseline_walks_as_fast_as_in_the_paper(tmp_path):
     with open_rig("virtual") as rig:
-        dataset = measure_walks(rig, {"baseline": BASELINE}, cycles=4)
+        dataset = measure_walks(rig, tmp_path / "walks", {"baseline": BASELINE}, cycles=4)
     (speed,) = speeds(dataset)["baseline"]
     assert speed.mean_mm_s == pytest.approx(10.8, abs=0.4)
     (trial,) = dataset.trials

@@ -105,3 +105,21 @@ def test_a_stage_that_resumes_finds_what_an_interrupted_run_left(tmp_path):
     assert not (tmp_path / "data").exists()
     run_stages(tmp_path, [stage])
     assert sorted(p.name for p in tmp_path.iterdir()) == ["data", PROVENANCE]
+
+
+def by_hand(text, settings=None):
+    return Stage(
+        "measure", "m", (), ("data",), lambda i, o: (o / "data").write_text(text), settings or {}, by_hand=True
+    )
+
+
+def test_what_somebody_measured_is_measured_again_only_on_request_and_kept_beside(tmp_path, monkeypatch):
+    run_stages(tmp_path, [by_hand("monday")])
+    monkeypatch.setattr("bifa.__version__", "9.9")
+    run_stages(tmp_path, [by_hand("with another version")])
+    assert (tmp_path / "data").read_text() == "monday"
+    with pytest.raises(StageError, match=r"quick = None, not True.*--rerun measure"):
+        run_stages(tmp_path, [by_hand("with other settings", {"quick": True})])
+    run_stages(tmp_path, [by_hand("tuesday", {"quick": True})], rerun=["measure"])
+    assert (tmp_path / "data").read_text() == "tuesday"
+    assert (tmp_path / "data.earlier-1").read_text() == "monday"

@@ -1,0 +1,68 @@
+"""Files that people ask for: their places checked before long work, and written whole or not at all."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bifa.errors import BifaError
+
+
+class TargetError(BifaError):
+    """A file cannot be written where it was asked for; the text says why."""
+
+
+def check_targets(*files: Path | None, folders: tuple[Path | None, ...] = ()) -> None:
+    """Raise TargetError unless each of `files` can be written, and each of `folders` written into or made.
+
+    None is skipped, so that a command hands over its options as they are.
+    """
+    for path in files:
+        if path is None:
+            continue
+        if path.is_dir():
+            raise TargetError(f"{path} is a folder; name a file in it")
+        if not path.resolve().parent.is_dir():
+            raise TargetError(f"the folder {path.resolve().parent} does not exist; create it first")
+        _check_writable(path if path.exists() else path.resolve().parent, path)
+    for path in folders:
+        if path is None:
+            continue
+        there = path.resolve()
+        while not there.exists():
+            there = there.parent
+        if not there.is_dir():
+            raise TargetError(f"{there} is a file, so that {path} cannot be a folder; choose another name")
+        _check_writable(there, path)
+
+
+def _check_writable(there: Path, asked: Path) -> None:
+    if not os.access(there, os.W_OK):
+        raise TargetError(f"{asked} cannot be written (no permission); choose another place")
+
+
+@contextmanager
+def written(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """`with written(path) as aside:` write to `aside`, a file beside it; after the block it takes the place of `path`.
+
+    Whatever happens (an error, a full disk, a power cut), `path` is the old file or the whole new one. An OSError in
+    the block becomes a TargetError.
+    """
+    target = Path(path)
+    aside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    try:
+        yield aside
+        with aside.open("rb") as file:
+            os.fsync(file.fileno())
+        os.replace(aside, target)
+    except OSError as error:
+        raise TargetError(f"{target} cannot be written ({error.strerror or error})") from None
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """`text` as UTF-8 with \\n, whole or not at all; TargetError."""
+    with written(path) as aside:
+        aside.write_text(text, encoding="utf-8", newline="\n")

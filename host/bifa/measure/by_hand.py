@@ -1,0 +1,84 @@
+"""A bench with a lab's own instruments: each trial is announced, recorded, shown, and kept or repeated.
+
+`ByHand.equip(rig)` gives a rig without instruments these; sessions then go as on any rig.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from bifa.data import DatasetWriter, Trial
+from bifa.data.check import check_trial
+from bifa.data.lag import misfit_of
+from bifa.errors import BifaError
+from bifa.link import LinkError, PortGoneError, Uno
+from bifa.measure.desk import Desk
+from bifa.measure.experiments import record_trial
+from bifa.measure.own_instruments import STOP, OwnInstruments, Turn
+from bifa.measure.plan import PlannedTrial
+from bifa.measure.recording import idle
+from bifa.measure.sketch import sketch
+
+RAW = "raw"  # folder in a data set: the instruments' files as they came
+_REPEAT = ("r", "repeat")
+_LOOK_S = 0.25
+
+
+class ByHand:
+    """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; `before`
+    is called before anything is asked, so that no bar redraws itself over questions and answers."""
+
+    def __init__(self, desk: Desk, watch: Path | None = None, plain: bool = False) -> None:
+        self._desk, self._plain = desk, plain
+        self._instruments = OwnInstruments(desk, watch)
+        self.before: Callable[[], None] = lambda: None
+
+    def equip(self, rig) -> None:
+        """Let `rig`, which has no instruments of its own, use the lab's."""
+        self.before()
+        rig.instruments = self._instruments
+        rig.recorder = self
+
+    def __call__(
+        self, rig, uno: Uno, planned: PlannedTrial, on_progress, *, number: int, total: int, writer: DatasetWriter
+    ) -> Trial:
+        """One trial, as often as the person likes; see session.Recorder.
+
+        Raises KeyboardInterrupt where the answer is to stop.
+        """
+        turn = Turn(planned, number, total)
+        self._instruments.begin(turn)
+        while True:
+            self._desk.say(f"\nTrial {number} of {total}: {turn.planned.as_trial().label}, repeat {planned.repeat}")
+            try:
+                trial = record_trial(rig, uno, planned, on_progress, attempts=1)
+            except (LinkError, PortGoneError):
+                raise
+            except BifaError as error:
+                uno.halt()
+                self._review(rig, uno, turn, f"Not usable: {error}.", "Enter repeats it", keep=False)
+                continue
+            if self._accepted(rig, uno, turn, trial, writer):
+                self._instruments.keep(writer.partial / RAW)
+                self._desk.clear()
+                return trial
+
+    def _accepted(self, rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
+        for line in sketch(trial, self._plain):
+            self._desk.say(line)
+        wrong = [str(finding) for finding in check_trial(trial)]
+        if misfit := misfit_of(trial, writer.trials):
+            wrong.append(misfit)
+        seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."
+        return self._review(rig, uno, turn, seen, "Enter keeps it, r repeats it", keep=True, findings=wrong)
+
+    def _review(self, rig, uno: Uno, turn: Turn, seen: str, choice: str, *, keep: bool, findings=()) -> bool:
+        self._desk.ask(
+            "review", f"{seen} {choice}, q stops here without it.", turn.told() | {"findings": list(findings)}
+        )
+        while (answer := self._desk.answer()) is None:
+            idle(rig, uno, _LOOK_S)
+        if answer.lower() in STOP:
+            raise KeyboardInterrupt
+        return keep and answer.lower() not in _REPEAT

@@ -1,0 +1,112 @@
+"""The desk at the bench: questions to the person there, and to scripts that watch a folder.
+
+Answers are lines typed at the terminal. With a watched folder, what is asked stands in `next.toml` there as well, and a
+file `answer` (its text is the line; an empty file is Enter) answers it: bifa takes the file away.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from bifa.errors import BifaError
+from bifa.files import write_text
+
+ASKS, ANSWER = "next.toml", "answer"
+_LONGEST = 4096  # of an answer in a file
+_END = None
+
+
+class NobodyError(BifaError):
+    """There is nobody who could answer."""
+
+
+class Desk:
+    """`say(text)` shows a line to the person; `watch` is the folder for scripts, if there is one."""
+
+    def __init__(self, say: Callable[[str], None], watch: Path | None = None) -> None:
+        self.say = say
+        self._watch = watch
+        self._lines: queue.Queue[str | None] | None = None
+
+    def ask(self, step: str, text: str, about: Mapping[str, Any] | None = None) -> None:
+        """Show `text` and expect an answer to it; an answer to an earlier question does not count.
+
+        `about`: what else a script needs to know, plain values.
+        """
+        self._listen()
+        self._forget()
+        if self._watch is not None:
+            (self._watch / ANSWER).unlink(missing_ok=True)
+            write_text(self._watch / ASKS, tomli_w.dumps({"step": step, "asks": text, **(about or {})}))
+        self.say(text)
+
+    def answer(self) -> str | None:
+        """The line that answers what was asked last, without its ends' blanks; None: not yet. Does not wait.
+
+        Raises NobodyError where the terminal's input has ended and no folder is watched.
+        """
+        if self._watch is not None and (text := self._from_file()) is not None:
+            return text
+        try:
+            line = self._lines.get_nowait()
+        except queue.Empty:
+            return None
+        if line is _END:
+            self._lines.put(_END)
+            if self._watch is None:
+                raise NobodyError(
+                    "nobody can answer: the input has ended. Start it in a terminal, or name a folder to --watch"
+                )
+            return None
+        return line.strip()
+
+    def clear(self) -> None:
+        """Nothing is asked any more."""
+        if self._watch is not None:
+            (self._watch / ASKS).unlink(missing_ok=True)
+
+    def _from_file(self) -> str | None:
+        path = self._watch / ANSWER
+        try:
+            text = path.read_bytes()[:_LONGEST].decode("utf-8", "replace").strip()
+            path.unlink()
+        except OSError:
+            return None
+        return text
+
+    def _forget(self) -> None:
+        """What was typed ahead must not start anything; lines from a pipe were meant for what is to come."""
+        if not sys.stdin.isatty():
+            return
+        with contextlib.suppress(queue.Empty):
+            while self._lines.get_nowait() is not _END:
+                pass
+            self._lines.put(_END)
+
+    def _listen(self) -> None:
+        if self._lines is None:
+            self._lines = queue.Queue()
+            threading.Thread(target=_read_lines, args=(self._lines,), daemon=True).start()
+
+
+def _read_lines(lines: queue.Queue[str | None]) -> None:
+    """Unbuffered, so that nothing is locked when the program ends while this waits."""
+    rest = b""
+    try:
+        number = sys.stdin.fileno()
+        while block := os.read(number, 4096):
+            *whole, rest = (rest + block).split(b"\n")
+            for line in whole:
+                lines.put(line.decode("utf-8", "replace"))
+    except (OSError, ValueError, AttributeError):
+        pass
+    lines.put(_END)

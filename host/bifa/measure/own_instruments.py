@@ -1,0 +1,200 @@
+"""A lab's own instruments as files: what to mount and start is said, the CSV that comes is the record.
+
+The CSV has `time_s` and the channels under the data set's names; `<name>.sync.csv` beside it has `sync_time_s`, the
+rising edges of the strobe that its sync input saw. It appears in the watched folder, or its path is typed.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bifa.measure.desk import Desk
+from bifa.measure.instrument_csv import InstrumentFileError, read_columns
+from bifa.measure.instruments import CHANNELS
+from bifa.measure.plan import PULL_MM, PlannedTrial
+
+SETTLED_S = 0.5  # a file whose size and time stay for so long has been written to its end
+STOP = ("q", "quit", "stop")
+
+_STAND = {
+    "static_loading": "the {actuator} actuator in the testing machine, contracted",
+    "step_response": "the {actuator} actuator free to move, contracted, before the camera",
+    "anchor_pull": "the robot's head in the pipe on the load cell, contracted",
+    "locomotion": "the robot in the pipe, contracted, before the camera",
+}
+_MACHINE = ("static_loading", "anchor_pull")
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Which trial is being recorded: `number` of `total`."""
+
+    planned: PlannedTrial
+    number: int
+    total: int
+
+    def told(self) -> dict:
+        """For `next.toml`: the trial, plain values."""
+        planned, trial = self.planned, self.planned.as_trial()
+        settings = {"actuator": planned.actuator, "pressure_psi": planned.pressure_psi, "rate_mm_s": planned.rate_mm_s}
+        settings |= {"gait": trial.gait, "cycles": planned.cycles or None, **planned.settings}
+        known = {key: value for key, value in settings.items() if value is not None}
+        return {
+            "trial": self.number,
+            "of": self.total,
+            "file": planned.file,
+            "experiment": planned.experiment,
+            "repeat": planned.repeat,
+            "settings": known,
+        }
+
+
+class OwnInstruments:
+    """`AskedInstruments` that are worked by whoever is at `desk`; `watch` is the folder of their files, if any."""
+
+    def __init__(self, desk: Desk, watch: Path | None = None) -> None:
+        self._desk, self._watch = desk, watch
+        self._turn: Turn | None = None
+        self._step = ""
+        self._experiment = ""
+        self._known: dict[Path, tuple] = {}
+        self._seen: dict[Path, tuple[tuple, float]] = {}
+        self._record: tuple[Path, dict[str, np.ndarray]] | None = None
+
+    def begin(self, turn: Turn) -> None:
+        """What is asked from now on is for this trial."""
+        self._turn = turn
+
+    def mount(self, experiment: str, **settings) -> None:
+        """See Instruments."""
+        self._experiment, self._record = experiment, None
+        stand = _STAND[experiment].format(**settings)
+        slope = settings.get("inclination_deg")
+        if slope:
+            stand += f", the pipe at {slope:g} degrees"
+        if settings.get("direction") == "backward":
+            stand += ", to be pulled backward"
+        zero = "displacement and force" if on_machine(experiment) else "displacement"
+        self._ask("mount", f"All valves are off. Mount {stand}; {zero} at zero. Enter: valves may switch.")
+
+    def start(self) -> None:
+        """See Instruments."""
+        self._known = dict(self._signatures())
+        which, then = ("machine's record", "") if on_machine(self._experiment) else ("camera", ": then the robot moves")
+        self._ask("start", f"Start the {which}, the strobe (D10) on its sync input. Once it records, Enter{then}.")
+
+    def move(self) -> None:
+        """See Instruments."""
+        planned = self._turn.planned
+        static = self._experiment == "static_loading"
+        way = "to the extended state and back" if static else f"{PULL_MM:g} mm"
+        self._ask("move", f"Move the cross-head {way} at {planned.rate_mm_s:g} mm/s. Once it stands again, Enter.")
+
+    @property
+    def moving(self) -> bool:
+        """See Instruments: until that is said, or the record is there already."""
+        return not self.ready
+
+    @property
+    def ready(self) -> bool:
+        """See AskedInstruments. Raises KeyboardInterrupt where the answer is to stop."""
+        if self._step in ("move", "save") and self._watch is not None and self._take_new():
+            self._step = "saved"
+        if self._step in ("", "saved"):
+            return True
+        answer = self._desk.answer()
+        if answer is None:
+            return False
+        if answer.lower() in STOP:
+            raise KeyboardInterrupt
+        if self._step == "save":
+            return self._take_named(answer)
+        self._step = ""
+        return True
+
+    def save(self) -> None:
+        """See AskedInstruments."""
+        if self._record is not None:
+            return
+        where = f"into {self._watch}" if self._watch is not None else "and type its path"
+        name = Path(self._turn.planned.file).stem
+        channels = ", ".join(("time_s", *CHANNELS[self._experiment]))
+        self._ask(
+            "save",
+            f"Valves off. Stop the record and save it {where}, as {name}.csv ({channels}) and {name}.sync.csv "
+            "(sync_time_s).",
+        )
+
+    def stop(self) -> dict[str, np.ndarray]:
+        """See Instruments; {} where the recording was broken off."""
+        return dict(self._record[1]) if self._record else {}
+
+    def keep(self, folder: Path) -> None:
+        """Copy the files of the last record into `folder`, as they came, under the trial's name."""
+        if self._record is None:
+            return
+        folder.mkdir(parents=True, exist_ok=True)
+        target = folder / self._turn.planned.file
+        shutil.copyfile(self._record[0], target)
+        shutil.copyfile(sync_file(self._record[0]), sync_file(target))
+
+    def _ask(self, step: str, text: str) -> None:
+        self._step = step
+        self._desk.ask(step, text, self._turn.told())
+
+    def _signatures(self):
+        for path in sorted(self._watch.glob("*.csv")) if self._watch is not None else ():
+            if not path.name.endswith(".sync.csv") and (sync := sync_file(path)).exists():
+                try:
+                    yield path, tuple((s.st_mtime_ns, s.st_size) for s in (path.stat(), sync.stat()))
+                except FileNotFoundError:  # gone meanwhile
+                    continue
+
+    def _take_new(self) -> bool:
+        """Take the file that has come since the start, once it is whole; what cannot be used is said, once."""
+        for path, signature in self._signatures():
+            if self._known.get(path) == signature:
+                continue
+            before, since_s = self._seen.get(path, (None, 0.0))
+            if before != signature:
+                self._seen[path] = (signature, time.monotonic())
+            elif time.monotonic() - since_s >= SETTLED_S:
+                self._known[path] = signature
+                if self._take(path):
+                    return True
+        return False
+
+    def _take_named(self, answer: str) -> bool:
+        if not answer and self._watch is not None:
+            return False  # it is looked for anyway
+        path = Path(answer.strip("'\"")).expanduser()
+        if not answer or not path.is_file():
+            self._desk.say(f"There is no file {answer!r}; type the path of the CSV (q stops here).")
+            return False
+        return self._take(path)
+
+    def _take(self, path: Path) -> bool:
+        try:
+            columns = read_columns(path, ("time_s", *CHANNELS[self._experiment]))
+            edges = read_columns(sync_file(path), ("sync_time_s",))["sync_time_s"]
+        except InstrumentFileError as error:
+            self._desk.say(f"{error}. Save it anew.")
+            return False
+        self._record = (path, {**columns, "sync_time_s": edges})
+        self._step = "saved"
+        return True
+
+
+def on_machine(experiment: str) -> bool:
+    """Whether a testing machine moves and measures, and not a camera."""
+    return experiment in _MACHINE
+
+
+def sync_file(path: Path) -> Path:
+    """Where the edges of the strobe stand that belong to the record in `path`."""
+    return path.with_suffix(".sync.csv")

@@ -1,0 +1,108 @@
+"""A lab beside the virtual robot: somebody who does what `next.toml` asks, with a camera and a testing machine.
+
+As a program (`python -m harness.lab LINK FOLDER`) it serves the robot on a pty as well.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from virtual_robot.rig import VirtualRig, open_rig
+
+_MOUNTED_BY = {  # which of a trial's settings the stand is told
+    "static_loading": ("actuator", "rate_mm_s"),
+    "step_response": ("actuator",),
+    "anchor_pull": ("rate_mm_s",),
+    "locomotion": ("inclination_deg",),
+}
+_LOOK_S = 0.05
+
+
+class Lab:
+    """Answers each question once. `spoil(step, asked, record)` may change what is saved, to see it refused."""
+
+    def __init__(self, rig: VirtualRig, folder: Path, spoil: Callable[[dict, dict], dict] = lambda asked, r: r) -> None:
+        self._rig, self._folder, self._spoil = rig, folder, spoil
+        self._stand = rig.instruments
+        self._done: tuple | None = None
+        self.asked: list[dict] = []
+        self.review: Callable[[dict], str] = lambda asked: ""
+
+    def look(self) -> None:
+        """Do what is asked, if it has not been done yet."""
+        path = self._folder / "next.toml"
+        try:
+            stamp, asked = (path.stat().st_ino, path.stat().st_mtime_ns), tomllib.loads(path.read_text())
+        except FileNotFoundError:
+            return
+        if stamp == self._done:
+            return
+        with self._rig.world.turn:
+            answer = getattr(self, f"_{asked['step']}")(asked)
+        if answer is None:
+            return  # under way
+        self._done = stamp
+        self.asked.append(asked)
+        aside = self._folder / ".answer"
+        aside.write_text(answer)
+        os.replace(aside, self._folder / "answer")
+
+    def _known(self, asked: dict) -> str:
+        return ""
+
+    def _mount(self, asked: dict) -> str:
+        settings = {k: v for k, v in asked["settings"].items() if k in _MOUNTED_BY[asked["experiment"]]}
+        if asked["experiment"] == "anchor_pull":
+            settings["travel_mm"] = 40.0
+        self._stand.mount(asked["experiment"], **settings)
+        self._moved = False
+        return ""
+
+    def _start(self, asked: dict) -> str:
+        self._stand.start()
+        return ""
+
+    def _move(self, asked: dict) -> str | None:
+        if not self._moved:
+            self._stand.move()
+            self._moved = True
+        return None if self._stand.moving else ""
+
+    def _save(self, asked: dict) -> str:
+        record = self._spoil(asked, self._stand.stop())
+        name = Path(asked["file"]).stem
+        edges = {"sync_time_s": record.pop("sync_time_s")}
+        for file, columns in ((f"{name}.sync.csv", edges), (f"{name}.csv", record)):
+            rows = np.column_stack(list(columns.values()))
+            np.savetxt(self._folder / file, rows, "%.6f", ",", header=",".join(columns), comments="")
+        return ""
+
+    def _review(self, asked: dict) -> str:
+        return self.review(asked)
+
+
+def main() -> None:
+    """Serve until the process is ended."""
+    link, folder = Path(sys.argv[1]), Path(sys.argv[2])
+    with open_rig() as rig:
+        lab = Lab(rig, folder)
+
+        def work() -> None:
+            while True:
+                lab.look()
+                time.sleep(_LOOK_S)
+
+        threading.Thread(target=work, daemon=True).start()
+        rig.serve_pty(lambda path: print("ready", flush=True), link=link)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+"""A campaign at a bench of one's own: what is known is asked once, and only measuring needs the robot."""
+
+import pytest
+
+from bifa.campaign.bench import Bench
+from bifa.campaign.loop import Effort, campaign
+from bifa.campaign.stages import run_stages
+from bifa.data import Dataset, read_dataset, write_dataset
+from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench
+from bifa.measure.plan import PlannedTrial
+
+
+class Answering:
+    """A desk with somebody who says these lines."""
+
+    def __init__(self, *lines):
+        self.lines, self.said = list(lines), []
+
+    def say(self, text):
+        self.said.append(text)
+
+    def ask(self, step, text, about=None):
+        self.say(text)
+
+    def answer(self):
+        return self.lines.pop(0)
+
+    def clear(self):
+        pass
+
+
+def test_known_values_are_asked_once_and_kept(tmp_path):
+    path = tmp_path / "bench.toml"
+    desk = Answering("0.182", "", "9 bar", "8.4", "")
+    known = known_on(path, desk)
+    assert known == {"head_mass_kg": 0.182, "supply_positive_psi": 8.4}
+    assert "supply_positive_psi must be a number, not '9 bar'" in "\n".join(desk.said)
+    assert known_on(path, Answering()) == known
+    assert len(ASKED) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[known]\nhead_mass_kg = 50.0\n", "outside its range"),
+        ("[known]\nweight = 1.0\n", "no parameter 'weight'"),
+        ("head_mass_kg = 0.2\n", r"one table, \[known\]"),
+        ("[known\n", "cannot read"),
+    ],
+)
+def test_a_bench_file_that_is_wrong_is_refused_by_name(tmp_path, text, message):
+    path = tmp_path / "bench.toml"
+    path.write_text(text)
+    with pytest.raises(BenchFileError, match=message) as caught:
+        read_bench(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
+    planned = PlannedTrial("static_loading", "large", 0.0, 2.0)
+    columns = {"time_s": [0.0, 0.02], "displacement_mm": [0.0, 1.0], "force_N": [0.0, 1.0], "pressure_psi": [0.0, 0.0]}
+
+    def stages(port, mass):
+        measure, declare, *_ = campaign(Bench(port, known={"head_mass_kg": mass}), Effort(), lambda what, share: None)
+        return measure, declare
+
+    def measured(inputs, outputs):
+        write_dataset(outputs / "measured", Dataset(None, "campaign", {}, (planned.as_trial(columns),)))
+
+    measure, declare = stages("/dev/ttyACM0", 0.18)
+    object.__setattr__(measure, "run", measured)
+    run_stages(tmp_path, [measure, declare])
+    run_stages(tmp_path, stages("/dev/ttyACM7", 0.19))  # no such port: nothing is opened
+    assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.19}
+
+
+def test_by_hand_only_measuring_stages_are_measured_by_hand():
+    stages = campaign(Bench("/dev/ttyACM0"), Effort(), lambda what, share: None)
+    assert [stage.name for stage in stages if stage.by_hand] == ["measure", "walk-base", "walk-completed", "again"]
+    assert not any(stage.by_hand for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None))

@@ -1,0 +1,87 @@
+"""`bifa campaign --port` at a bench: the real image behind a pty, a second process as camera and testing machine."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bifa.data import read_dataset
+from bifa.measure.plan import BRISK
+from bifa.robot.gait import save_gait
+
+pytestmark = pytest.mark.uno
+HOST = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """(pty, watched folder) of a bench served by another process."""
+    link, files = tmp_path / "uno", tmp_path / "files"
+    files.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness.lab", str(link), str(files)], cwd=HOST, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    yield link, files
+    process.terminate()
+    process.wait(10)
+
+
+def begin(lab, folder, command, *options):
+    link, files = lab
+    return subprocess.Popen(
+        [sys.executable, "-m", "bifa", command, "--port", str(link), "--watch", str(files), *options],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(HOST)},
+    )
+
+
+def wait_for(process, *words):
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        if all(word in "".join(said) for word in words):
+            return "".join(said)
+    raise AssertionError(f"never said {words}: {''.join(said)}")
+
+
+def interrupt(process) -> str:
+    process.send_signal(signal.SIGINT)
+    rest, _ = process.communicate(timeout=20)
+    assert process.returncode == 130, rest
+    return rest
+
+
+def test_a_campaign_measures_with_the_testing_machine_stops_and_goes_on(lab, tmp_path):
+    options = ("--quick", "--out", "run", "--bench", "bench.toml")
+    first = begin(lab, tmp_path, "campaign", *options)
+    said = wait_for(first, "Nothing looks wrong", "Trial 2 of 30")
+    assert "Kept in bench.toml" in said
+    assert (tmp_path / "bench.toml").read_text().startswith("[known]")
+    assert "run keeps 1 trial of the stage under way" in interrupt(first)
+    (trial,) = read_dataset(tmp_path / "run" / ".measure-unfinished" / "measured.partial").trials
+    assert trial.extra["clock_error_s"] < 1e-3
+    assert trial.columns["displacement_mm"].max() > 50.0
+
+    second = begin(lab, tmp_path, "campaign", *options)
+    said = wait_for(second, "Trial 2 of 30")
+    assert "Trial 1 of 30" not in said
+    assert "What has been measured directly" not in said
+    assert "1 trial " in interrupt(second)
+
+
+def test_an_experiment_records_a_walk_with_the_camera(lab, tmp_path):
+    save_gait(tmp_path / "brisk.toml", BRISK)
+    options = ("--gait", "brisk.toml", "--cycles", "1", "--repeats", "1", "--out", "walk")
+    output, _ = begin(lab, tmp_path, "experiment", *options, "locomotion").communicate(timeout=60)
+    assert "Nothing looks wrong" in output
+    (trial,) = read_dataset(tmp_path / "walk").trials
+    assert trial.columns["displacement_head_mm"].max() > 40.0
+    assert trial.extra["clock_error_s"] < 1e-3

@@ -1,0 +1,158 @@
+"""A lab's own instruments as files: announced, recorded, shown, kept or repeated; on the real firmware."""
+
+import numpy as np
+import pytest
+
+from bifa.data import read_dataset
+from bifa.data.check import check_trial
+from bifa.measure.by_hand import RAW, ByHand
+from bifa.measure.desk import Desk
+from bifa.measure.plan import BRISK, PlannedTrial
+from bifa.measure.session import run_session
+from bifa.rig import open_rig
+from harness.lab import Lab
+
+pytestmark = pytest.mark.uno
+
+STATIC = PlannedTrial("static_loading", "small", 4.0, 20.0)
+PULL = PlannedTrial("anchor_pull", None, 8.5, 40.0)
+PLAN = (STATIC, PlannedTrial("step_response", "small", 8.5), PULL, PlannedTrial("locomotion", gait=BRISK, cycles=1))
+
+
+class Bench:
+    """A virtual bench whose instruments only a lab's files tell of."""
+
+    def __init__(self, folder, **lab):
+        self.watch, self.said = folder / "files", []
+        self.watch.mkdir()
+        self.rig = open_rig("virtual", seed=3)
+        self.lab = Lab(self.rig, self.watch, **lab)
+        bench = self
+
+        class Attended(Desk):
+            def answer(self):
+                bench.lab.look()
+                return super().answer()
+
+        ByHand(Attended(self.said.append, self.watch), self.watch).equip(self.rig)
+
+    def run(self, folder, plan):
+        return run_session(self.rig, folder, plan, name="a day", known={}, provenance={"by": "a test"})
+
+
+@pytest.fixture
+def bench(tmp_path):
+    made = []
+
+    def make(**lab):
+        made.append(Bench(tmp_path, **lab))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.rig.close()
+
+
+def test_files_give_the_same_trials_as_instruments_that_are_driven(bench, tmp_path):
+    by_hand = bench().run(tmp_path / "day", PLAN)
+    with open_rig("virtual", seed=3) as rig:
+        driven = run_session(rig, tmp_path / "driven", PLAN, name="a day", known={}, provenance={"by": "a test"})
+    for ours, theirs in zip(by_hand.trials, driven.trials, strict=True):
+        assert ours.condition == theirs.condition
+        assert set(ours.columns) == set(theirs.columns)
+        assert ours.rate_hz == pytest.approx(ours.nominal_rate_hz, rel=0.01)
+        assert ours.extra["clock_error_s"] < 1e-4
+        assert check_trial(ours) == []
+        for name, values in ours.columns.items():
+            if not name.startswith("command") and name != "time_s":
+                assert values.max() == pytest.approx(theirs.columns[name].max(), abs=0.6)
+    step = by_hand.trials[1]
+    assert step.extra["switch_time_s"][0] == pytest.approx(0.5, abs=0.02)
+
+
+def test_each_trial_is_announced_shown_and_kept_with_its_files(bench, tmp_path):
+    here = bench()
+    here.run(tmp_path / "day", (STATIC,))
+    assert [asked["step"] for asked in here.lab.asked] == ["mount", "start", "move", "save", "review"]
+    assert here.lab.asked[0]["settings"] == {"actuator": "small", "pressure_psi": 4.0, "rate_mm_s": 20.0}
+    said = "\n".join(here.said)
+    assert "Trial 1 of 1: static loading, small, 4 psi, 20 mm/s" in said
+    assert "force [N]" in said
+    assert "Nothing looks wrong." in said
+    plot = here.said[here.said.index("         force [N]") :][:8]
+    assert max(map(len, plot)) <= 80
+    assert plot[-1].split() == ["-0.0", "displacement", "[mm]", "29.7"]
+    raw = tmp_path / "day" / RAW / STATIC.file
+    assert raw.read_text().startswith("time_s,displacement_mm,force_N")
+    assert raw.with_suffix(".sync.csv").exists()
+    assert not (here.watch / "next.toml").exists()
+
+
+def test_what_looks_wrong_is_said_and_the_trial_repeated_on_request(bench, tmp_path):
+    saved = []
+
+    def stuck_at_first(asked, record):
+        saved.append(asked["file"])
+        return record | ({"force_N": np.full_like(record["force_N"], 7.0)} if len(saved) == 1 else {})
+
+    here = bench(spoil=stuck_at_first)
+    here.lab.review = lambda asked: "r" if asked["findings"] else ""
+    dataset = here.run(tmp_path / "day", (PULL,))
+    assert len(saved) == 2
+    assert "Looks wrong: " in "\n".join(here.said)
+    assert "every sample reads 7" in "\n".join(here.said)
+    assert np.ptp(dataset.trials[0].columns["force_N"]) > 1.0
+
+
+def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_path):
+    here = bench()
+    save, tries = here.lab._save, []
+
+    def save_badly_first(asked):
+        save(asked) if not tries else None
+        path = here.watch / asked["file"]
+        if not tries:
+            tries.append(path.read_text())
+            path.write_text(tries[0].replace("force_N", "Load (N)"))
+        return ""
+
+    here.lab._save = save_badly_first
+    say = here.said.append
+
+    def corrected(text):
+        say(text)
+        if "lacks the column force_N" in text:
+            (here.watch / STATIC.file).write_text(tries[0])
+
+    here.rig.recorder._desk.say = corrected
+    assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
+    assert "lacks the column force_N; it has time_s, displacement_mm, Load (N)" in "\n".join(here.said)
+
+
+def test_clocks_that_cannot_be_lined_up_lead_to_another_try_and_nothing_is_kept_of_the_first(bench, tmp_path):
+    saved = []
+
+    def deaf_at_first(asked, record):
+        saved.append(asked["file"])
+        return record | ({"sync_time_s": record["sync_time_s"][40:]} if len(saved) == 1 else {})
+
+    here = bench(spoil=deaf_at_first)
+    dataset = here.run(tmp_path / "day", (PULL,))
+    assert len(saved) == 2
+    assert "do not show the pause" in "\n".join(here.said)
+    assert [trial.file for trial in dataset.trials] == [PULL.file]
+
+
+def test_it_stops_between_trials_with_valves_off_and_goes_on_another_day(bench, tmp_path):
+    here = bench()
+    plan = (PULL, STATIC)
+    here.lab.review = lambda asked: "q" if asked["file"] == STATIC.file else ""
+    with pytest.raises(KeyboardInterrupt):
+        here.run(tmp_path / "day", plan)
+    here.rig.clock.sleep(0.01)
+    assert not any(here.rig.uno.pin(pin) for pin in range(4, 10))
+    assert [t.file for t in read_dataset(tmp_path / "day.partial").trials] == [PULL.file]
+    here.lab.review = lambda asked: ""
+    before = len(here.lab.asked)
+    assert [t.file for t in here.run(tmp_path / "day", plan).trials] == [PULL.file, STATIC.file]
+    assert {asked["file"] for asked in here.lab.asked[before:]} == {STATIC.file}
