@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -66,3 +67,21 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     """`text` as UTF-8 with \\n, whole or not at all; TargetError."""
     with written(path) as aside:
         aside.write_text(text, encoding="utf-8", newline="\n")
+
+
+@contextmanager
+def written_into(folder: Path) -> Iterator[Path]:
+    """`with written_into(folder) as aside:` write files into `aside`; after the block they take their places in
+    `folder`, which is made if need be. Nothing is half-written; an OSError in the block becomes a TargetError.
+    """
+    aside = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}")
+    try:
+        aside.mkdir(parents=True)
+        yield aside
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in sorted(aside.iterdir()):
+            os.replace(path, folder / path.name)
+    except OSError as error:
+        raise TargetError(f"{folder} cannot be written into ({error.strerror or error})") from None
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)

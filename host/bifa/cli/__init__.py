@@ -6,14 +6,31 @@ Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, s
 import importlib
 import pkgutil
 import sys
+from typing import Annotated
 
 import typer
+import typer.core
 
+import bifa
 from bifa.errors import BifaError
 from bifa.printable import printable
 
+
+class _Commands(typer.core.TyperGroup):
+    """Ctrl-C ends each command with a line that says what became of its work."""
+
+    def invoke(self, ctx):
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            typer.echo("\nstopped; nothing is half-written: what was finished is named above", err=True)
+            raise typer.Exit(130) from None
+
+
 app = typer.Typer(
     name="bifa",
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Drive a soft in-pipe robot from an Arduino Uno and learn from data how it really behaves.",
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -21,12 +38,22 @@ app = typer.Typer(
 )
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"bifa {bifa.__version__}")
+        raise typer.Exit
+
+
 @app.callback()
-def _commands() -> None:
+def _commands(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
     """Drive a soft in-pipe robot from an Arduino Uno and learn from data how it really behaves."""
 
 
-for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
+for _module in sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name[0] != "_"):
     importlib.import_module(f"{__name__}.{_module}").register(app)
 
 

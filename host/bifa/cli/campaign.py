@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option, stoppable
+
 EPILOG = """Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
 bifa campaign --rerun diagnose   |
 bifa campaign --port /dev/ttyACM0 --watch records --out out/monday   |
 bifa campaign --port /dev/ttyACM0 --known head_mass_kg=0.182 --out out/monday"""
-
-PROFILE = typer.Option(help="Of a virtual robot: realistic, worn, or ideal (the paper's equations, white noise).")
 
 
 def register(app: typer.Typer) -> None:
@@ -21,18 +21,16 @@ def register(app: typer.Typer) -> None:
 
 def campaign(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/campaign"),
-    port: Annotated[str, typer.Option(help="`virtual`, a serial port, or a rig of your own by its name.")] = "virtual",
+    port: Annotated[str, port_option("`virtual`, a serial port, or a rig of your own by its name.")] = "virtual",
     seed: Annotated[int, typer.Option(min=0, help="Of the virtual robot, its undisclosed effect, all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Each condition twice, not three times; faster.")] = False,
-    watch: Annotated[
-        Path | None, typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")
-    ] = None,
+    watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path, typer.Option(help="What is known of the bench, asked for once (serial port).", show_default=True)
     ] = Path("bench.toml"),
-    known: Annotated[list[str], typer.Option(help="What you measured: NAME=VALUE, as head_mass_kg=0.182.")] = [],  # noqa: B006
-    profile: Annotated[str, PROFILE] = "realistic",
-    rerun: Annotated[list[str], typer.Option(help="Run this stage again even if it is up to date.")] = [],  # noqa: B006
+    known: Annotated[list[str], KNOWN] = [],  # noqa: B006
+    profile: Annotated[Profile, PROFILE] = "realistic",
+    rerun: Annotated[list[str], RERUN] = [],  # noqa: B006
 ) -> None:
     """Run the whole loop on a robot; a virtual one has an undisclosed effect.
 
@@ -74,7 +72,7 @@ def run_campaign(
     check_targets(folders=(out,))
     console = Console()
     bench = Bench(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
-    try:
+    with stoppable(lambda: f"{_kept(out)}. The same command goes on there"):
         if bench.is_by_hand:
             bench = _attended(console, bench, watch, bench_file)
         with stage_progress(console) as progress:
@@ -82,9 +80,6 @@ def run_campaign(
                 bench.hands.before = progress.close
             stages = campaign(bench, Effort(quick), progress.part)
             run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
-    except KeyboardInterrupt:
-        console.print(f"stopped; {_kept(out)}. The same command goes on there.", highlight=False, soft_wrap=True)
-        raise typer.Exit(130) from None
 
     summary = json.loads((out / "summary.json").read_text())
     effects = "; ".join(_sized(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"

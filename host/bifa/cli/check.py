@@ -5,28 +5,36 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import NO_PICTURES, PICTURES
+
 
 def register(app: typer.Typer) -> None:
     """Offer the command `check`."""
 
-    @app.command(epilog="Examples:  bifa check bench-2026-11-21   |   bifa check bench-2026-11-21 --plots pictures")
+    @app.command(
+        epilog="Examples:  bifa check bench-2026-11-21   |   bifa check bench-2026-11-21 --pictures out/pictures"
+    )
     def check(
         dataset: Annotated[Path, typer.Argument(help="The data set's folder.", show_default=False)],
-        plots: Annotated[Path | None, typer.Option(help="Folder for the pictures; DATASET-plots if left out.")] = None,
-        no_plots: Annotated[bool, typer.Option("--no-plots", help="Draw nothing.")] = False,
+        pictures: Annotated[Path | None, PICTURES] = None,
+        no_pictures: Annotated[bool, NO_PICTURES] = False,
         strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 where anything is found.")] = False,
     ) -> None:
-        """Say what is in a data set, plot it, and point out what looks wrong.
+        """Say what is in a data set, draw it (into DATASET-pictures if nothing else is said), and point out what looks
+        wrong.
 
         A malformed data set ends with status 2 and names file, line and column. What is well-formed but
         doubtful (a clipped sensor, a clock that jumps, missing repeats) is listed as a warning, status 0.
         """
         from bifa.data import read_dataset
         from bifa.data.check import check_dataset
-        from bifa.report.datasets import plot_dataset
+        from bifa.files import check_targets, written_into
         from bifa.screen import Console
 
         console = Console()
+        target = pictures or dataset.resolve().with_name(dataset.resolve().name + "-pictures")
+        if not no_pictures:
+            check_targets(folders=(target,))
         with console.status("reading"):
             content = read_dataset(dataset)
             findings = check_dataset(content)
@@ -36,10 +44,11 @@ def register(app: typer.Typer) -> None:
             console.print(str(finding), markup=False, highlight=False)
         if not findings:
             console.print("Nothing looks wrong.")
-        if not no_plots:
-            target = plots or dataset.resolve().with_name(dataset.resolve().name + "-plots")
-            with console.status("drawing"):
-                written = plot_dataset(content, target)
+        if not no_pictures:
+            from bifa.report.datasets import plot_dataset
+
+            with console.status("drawing"), written_into(target) as aside:
+                written = plot_dataset(content, aside)
             console.print(f"{len(written)} pictures in {target}", highlight=False)
         if strict and findings:
             raise typer.Exit(1)

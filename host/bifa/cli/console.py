@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import PORT
+
 EPILOG = (
     """Examples:  bifa console   |   bifa console --port virtual   |   echo show | bifa console --port /dev/ttyACM0"""
 )
@@ -16,7 +18,7 @@ def register(app: typer.Typer) -> None:
 
 
 def console(
-    port: Annotated[str | None, typer.Option(help="Serial port, `virtual`, or nothing: found by itself.")] = None,
+    port: Annotated[str | None, PORT] = None,
 ) -> None:
     """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D or Ctrl-C leaves, with all valves off.
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli.campaign import PROFILE
+from bifa.cli._options import PROFILE, RERUN, Profile, stoppable
 
 EPILOG = """Examples:  bifa demo   |   bifa demo --seed 3 --out out/three   |   bifa demo --quick   |
 bifa demo --rerun diagnose"""
@@ -21,15 +21,16 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/demo"),
     seed: Annotated[int, typer.Option(min=0, help="Of the robot, its undisclosed effect and all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Only walk two gaits and compare their speeds.")] = False,
-    profile: Annotated[str, PROFILE] = "realistic",
-    rerun: Annotated[list[str], typer.Option(help="Run this stage again even if it is up to date.")] = [],  # noqa: B006
+    profile: Annotated[Profile, PROFILE] = "realistic",
+    rerun: Annotated[list[str], RERUN] = [],  # noqa: B006
 ) -> None:
     """Characterise a virtual robot with an undisclosed effect, find the effect, optimise the gait, walk, compare.
 
     With --quick: walk the paper's baseline gait and an optimised one on the nominal robot.
     """
     if quick:
-        _walk_two_gaits(out, seed, rerun)
+        with stoppable(lambda: f"nothing is kept of the walks under way; what was finished before is in {out}"):
+            _walk_two_gaits(out, seed, rerun)
     else:
         from bifa.cli.campaign import run_campaign
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bifa import cluster
+from bifa.cli._options import WATCH, port_option
 
 
 def register(app: typer.Typer) -> None:
@@ -31,11 +32,9 @@ def diagnose(
         bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and continue.")
     ] = False,
     port: Annotated[
-        str | None, typer.Option(help="For --resolve: `virtual` (the robot that made the data), or a serial port.")
+        str | None, port_option("For --resolve: `virtual` (the robot that made the data), or a serial port.")
     ] = None,
-    watch: Annotated[
-        Path | None, typer.Option(help="For --resolve: folder in which your instruments' CSV files appear.")
-    ] = None,
+    watch: Annotated[Path | None, WATCH] = None,
     matters: Annotated[
         list[str] | None,
         typer.Option(
@@ -52,6 +51,10 @@ def diagnose(
     """Fit the base model, find what repeats agree on but the model does not, name its cause, add it, and
     report the error before and after on trials that were not fitted. Exit status 0 for any verdict."""
     from contextlib import nullcontext
+
+    from bifa.files import check_targets
+
+    check_targets(json, out, report)
 
     from bifa.data import read_dataset
     from bifa.pipe_robot.accuracy import accuracies
@@ -99,6 +102,7 @@ def _report(console, name: str, found, json: Path | None, model: Path | None, pa
     """Print the diagnosis, and write what was asked for."""
     from json import dumps
 
+    from bifa.files import write_text
     from bifa.identify.completed import completed_model
     from bifa.report.diagnosis import diagnosis_page
     from bifa.report.page import render
@@ -111,9 +115,9 @@ def _report(console, name: str, found, json: Path | None, model: Path | None, pa
         save_model(model, completed_model(found.final))
         console.print(f"model: {model}. Next: bifa optimize --model {model} --out gait.toml", highlight=False)
     if json is not None:
-        json.write_text(dumps(record, indent=2) + "\n")
+        write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:
-        page.write_text(render(diagnosis_page(name, record)))
+        write_text(page, render(diagnosis_page(name, record)))
         console.print(f"report: {page}", highlight=False)
 
 

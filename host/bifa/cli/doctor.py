@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import port_option
+
 EXAMPLES = "Examples:  bifa doctor   |   bifa doctor --port /dev/ttyACM0   |   bifa doctor --port virtual"
 
 
@@ -13,7 +15,7 @@ def register(app: typer.Typer) -> None:
 
 
 def doctor(
-    port: Annotated[str | None, typer.Option(help="Ask the board at this port as well (it restarts).")] = None,
+    port: Annotated[str | None, port_option("Ask the board at this port as well (it restarts).")] = None,
 ) -> None:
     """Say what is installed, which port and firmware there are, what is missing and how to get it.
 

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import KNOWN, PORT, PROFILE, WATCH, Profile, stoppable
+
 EPILOG = """Examples:  bifa experiment all --port virtual --out out/bench   |
 bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
 bifa experiment locomotion --inclination 10 --port virtual --out out/uphill   |
@@ -38,7 +40,7 @@ def register(app: typer.Typer) -> None:
 def experiment(
     name: Annotated[Experiment, typer.Argument(help="Which experiment; `all`: the paper's section IV, and walks.")],
     out: Annotated[Path, typer.Option(help="Folder of the data set: a new one, or that of an interrupted session.")],
-    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
+    port: Annotated[str | None, PORT] = None,
     actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed, mm/s.")] = None,
@@ -47,12 +49,10 @@ def experiment(
     inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
     repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
     quick: Annotated[bool, typer.Option(help="Fewer conditions, faster, twice each: for a first try.")] = False,
-    profile: Annotated[str | None, typer.Option(help="Of a virtual rig: ideal, realistic or worn.")] = None,
+    profile: Annotated[Profile | None, PROFILE] = None,
     seed: Annotated[int | None, typer.Option(help="Of a virtual rig: its noise.")] = None,
-    known: Annotated[list[str], typer.Option(help="What you measured: NAME=VALUE, as head_mass_kg=0.182.")] = [],  # noqa: B006
-    watch: Annotated[
-        Path | None, typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")
-    ] = None,
+    known: Annotated[list[str], KNOWN] = [],  # noqa: B006
+    watch: Annotated[Path | None, WATCH] = None,
     instrument: Annotated[Path | None, typer.Option(help="CSV of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).")] = None,
 ) -> None:
@@ -64,11 +64,15 @@ def experiment(
     they save is the record (docs/bench.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
+    from bifa.data.write import refuse_existing
+    from bifa.files import check_targets
     from bifa.measure import plan
     from bifa.measure.known import parse_known
     from bifa.screen import Console
 
     console = Console()
+    check_targets(folders=(out,))
+    refuse_existing(out)
     gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
@@ -85,14 +89,11 @@ def experiment(
         _import(console, instrument, telemetry, trials[0], out, parse_known(known))
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
-    try:
+    with stoppable(lambda: f"valves off; {_kept(out)}; run the same command to resume"):
         _run(console, port, options, out, trials, name.value, parse_known(known), watch)
-    except KeyboardInterrupt:
-        console.print(f"valves off; {kept_of(out)}; run the same command to resume", highlight=False, soft_wrap=True)
-        raise typer.Exit(130) from None
 
 
-def kept_of(out: Path) -> str:
+def _kept(out: Path) -> str:
     """What an interrupted session has on disk, in words."""
     from bifa.data.write import PARTIAL_SUFFIX
 

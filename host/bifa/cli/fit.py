@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-EPILOG = (
-    """Examples:  bifa fit out/bench --out model.toml   |   bifa fit out/bench --out model.toml --figures out/figures"""
-)
+from bifa.cli._options import PICTURES
+
+EPILOG = """Examples:  bifa fit out/bench --out model.toml   |
+bifa fit out/bench --out model.toml --pictures out/pictures"""
 
 
 def register(app: typer.Typer) -> None:
@@ -19,23 +20,25 @@ def fit(
     dataset: Annotated[Path, typer.Argument(help="Folder of the data set.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     model: Annotated[Path | None, typer.Option(help="Model to start from; the nominal one if left out.")] = None,
-    figures: Annotated[Path | None, typer.Option(help="Folder for figures like the paper's Figs. 4, 5 and 6.")] = None,
+    pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
     """Identify the model as the paper does (section IV): static loading, step responses, anchor pulls, then everything
     together. Reports each parameter with its 90 % interval, what the data do not determine, and the error in units of
-    the noise, and writes a model file for `bifa simulate` and `bifa optimize`.
+    the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's Figs. 4 to 6.
     """
     import time
 
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from bifa.data import read_dataset
+    from bifa.files import check_targets, written_into
     from bifa.identify.identification import identify
     from bifa.report.identification_tables import print_report
     from bifa.robot import load_model, save_model
     from bifa.screen import Console
 
     console = Console()
+    check_targets(out, folders=(pictures,))
     measured = read_dataset(dataset)
     begun = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -48,11 +51,12 @@ def fit(
         )
     save_model(out, found.model)
     print_report(console, found)
-    if figures is not None:
+    if pictures is not None:
         from bifa.report.identification import draw
 
-        for path in draw(found, figures):
-            console.print(f"figure: {path}")
+        with written_into(pictures) as aside:
+            draw(found, aside)
+        console.print(f"pictures: {pictures}", highlight=False)
     console.print(
         f"{out}: fitted to {len(measured.trials)} trials in {time.perf_counter() - begun:.1f} s. "
         f"Next: bifa simulate --model {out} --gait GAIT.toml, or bifa optimize --model {out} --out gait.toml"

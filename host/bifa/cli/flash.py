@@ -4,18 +4,18 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import port_option
+
 EXAMPLES = "Examples:  bifa flash   |   bifa flash --port /dev/ttyACM0   |   bifa flash --build-only"
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(epilog="Examples:  bifa flash   |   bifa flash --port /dev/ttyACM0   |   bifa flash --build-only")(
-        flash
-    )
+    app.command(epilog=EXAMPLES)(flash)
 
 
 def flash(
-    port: Annotated[str | None, typer.Option(help="The Uno's serial port; detected if left out.")] = None,
+    port: Annotated[str | None, port_option("The Uno's serial port; detected if left out.")] = None,
     build_only: Annotated[bool, typer.Option("--build-only", help="Build the image, write nothing.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show PlatformIO's whole output.")] = False,
 ) -> None:

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-EPILOG = """Examples:  bifa gaits   |   bifa gaits --make   |   bifa gaits --make --model mine.toml --folder my-gaits"""
+from bifa.cli._options import gait_names, stoppable
+
+EPILOG = """Examples:  bifa gaits   |   bifa gaits --make   |   bifa gaits --make --model mine.toml --out my-gaits"""
 
 
 def register(app: typer.Typer) -> None:
@@ -16,29 +18,38 @@ def register(app: typer.Typer) -> None:
 def gaits(
     make: Annotated[bool, typer.Option("--make", help="Search for them again (minutes) and write them.")] = False,
     model: Annotated[Path | None, typer.Option(help="Model to search on; the nominal one if left out.")] = None,
-    folder: Annotated[Path | None, typer.Option(help="Where --make writes; the package itself if left out.")] = None,
-    only: Annotated[list[str], typer.Option(help="Make only this one; may be repeated.")] = [],  # noqa: B006
+    out: Annotated[
+        Path | None, typer.Option(help="Folder where --make writes; the package itself if left out.")
+    ] = None,
+    only: Annotated[
+        list[str], typer.Option(help="Only this one; may be repeated.", metavar="GAIT", autocompletion=gait_names)
+    ] = [],  # noqa: B006
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches.")] = 0,
 ) -> None:
     """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or make them anew."""
     from rich.table import Table
 
+    from bifa.files import check_targets
     from bifa.gait import library
     from bifa.screen import Console
 
     console = Console()
+    names = [library.load_scenario(name).name for name in only] or list(library.SCENARIOS)
     if make:
-        _make(console, model, folder or library.FOLDER, only or list(library.SCENARIOS), seed)
+        folder = out or library.FOLDER
+        check_targets(folders=(folder,))
+        with stoppable(lambda: f"the gaits named above are in {folder}"):
+            _make(console, model, folder, names, seed)
         return
-    table = Table(title="Gaits of the nominal robot", title_justify="left")
-    for heading in ("gait", "for", "speed [mm/s]", "10th percentile", "period [s]", "psi12, psi13", "duties"):
-        table.add_column(heading)
-    for name, scenario in library.SCENARIOS.items():
+    title = "Gaits of the nominal robot, speeds in mm/s"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for heading in ("gait", "speed", "9 in 10", "period_s", "psi12, psi13", "duties"):
+        table.add_column(heading, no_wrap=True)
+    for name in names:
         entry = library.load(name)
         gait, notes = entry.gait, entry.provenance
         table.add_row(
             name,
-            scenario.purpose,
             f"{notes['predicted_speed_mm_s']:.1f}",
             f"{notes['predicted_10th_percentile_mm_s']:.1f}",
             f"{gait.period_s:.2f}",
@@ -46,7 +57,9 @@ def gaits(
             f"{gait.duty_body:.2f}, {gait.duty_head:.2f}, {gait.duty_tail:.2f}",
         )
     console.print(table)
-    console.print(f"files: {library.FOLDER / 'NAME.toml'}", highlight=False)
+    for name in names:
+        console.print(f"{name}: {library.SCENARIOS[name].purpose}", highlight=False)
+    console.print(f"files: {library.FOLDER / 'NAME.toml'}", highlight=False, soft_wrap=True)
 
 
 def _make(console, model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import PORT
+
 EPILOG = """Examples:  bifa monitor   |   bifa monitor --run   |   bifa monitor --port virtual --run --seconds 20"""
 
 
@@ -14,7 +16,7 @@ def register(app: typer.Typer) -> None:
 
 
 def monitor(
-    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
+    port: Annotated[str | None, PORT] = None,
     gait: Annotated[Path | None, typer.Option(help="Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after so long; otherwise Ctrl-C.")] = None,

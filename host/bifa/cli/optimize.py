@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bifa import cluster
+from bifa.cli._options import NO_PICTURES, PICTURES, Method
 
 EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
 bifa optimize --out fast.toml --nominal --method cma   |
@@ -23,7 +24,7 @@ def register(app: typer.Typer) -> None:
 def optimize(
     out: Annotated[Path, typer.Option(help="Gait file to write.", show_default=False)],
     model: Annotated[Path | None, typer.Option(help="Model file; the paper's nominal robot if left out.")] = None,
-    method: Annotated[str, typer.Option(help="de, cma, or bo (the paper's; slow).")] = "de",
+    method: Annotated[Method, typer.Option(help="Of the search; bo is the paper's, and slow.")] = "de",
     robust: Annotated[
         bool, typer.Option("--robust/--nominal", help="Speed that 9 robots in 10 reach, or on the model itself.")
     ] = True,
@@ -44,23 +45,26 @@ def optimize(
     dask_ca: Annotated[Path | None, typer.Option(help=cluster.CA_HELP)] = None,
     dask_cert: Annotated[Path | None, typer.Option(help=cluster.CERT_HELP)] = None,
     dask_key: Annotated[Path | None, typer.Option(help=cluster.KEY_HELP)] = None,
-    figures: Annotated[Path | None, typer.Option(help="Folder for the figures; beside GAIT if left out.")] = None,
-    no_figures: Annotated[bool, typer.Option("--no-figures", help="Only search.")] = False,
+    pictures: Annotated[Path | None, PICTURES] = None,
+    no_pictures: Annotated[bool, NO_PICTURES] = False,
 ) -> None:
     """Find the gait that maximises the settled speed: periodic, without slip, verified with a finer step.
 
     By default what is maximised is the speed at the 10th percentile over the model's uncertainty, since the fastest
-    nominal gait collapses under a 1 % change.
+    nominal gait collapses under a 1 % change. Pictures go to a folder beside the gait if nothing else is said.
     """
-    from bifa.gait import SearchError, Settings, paper_space, simulations
+    from bifa.files import check_targets
+
+    folder = pictures or out.with_suffix("")
+    check_targets(out, folders=() if no_pictures else (folder,))
+
+    from bifa.gait import Settings, paper_space, simulations
     from bifa.gait.library import provenance
     from bifa.robot import load_model, nominal, save_gait
     from bifa.screen import Console
 
     console = Console()
     robot = load_model(model) if model else nominal()
-    if not out.resolve().parent.is_dir():
-        raise SearchError(f"the folder {out.resolve().parent} does not exist; create it first")
     settings = [
         Settings(method, robust, seed + run, evaluations, spread, paper_space(period_s=period), refine=method != "bo")
         for run in range(runs or (3 if method == "bo" else 1))
@@ -70,8 +74,8 @@ def optimize(
         save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
         console.print(_summary(best))
         console.print(f"gait: {out}", highlight=False)
-        if not no_figures:
-            _explain(console, robot, pool, best, figures or out.with_suffix(""))
+        if not no_pictures:
+            _explain(console, robot, pool, best, folder)
 
 
 def _best(console, robot, pool, settings):
@@ -87,12 +91,15 @@ def _best(console, robot, pool, settings):
 
 
 def _explain(console, robot, pool, best, folder: Path) -> None:
-    """Draw the figures into `folder` and print why the gait is faster."""
-    with console.status("figures: what changed and why, sensitivity, front, distribution"):
-        reasons = _figures(robot, pool, best, folder)
+    """Draw the pictures into `folder` and print why the gait is faster."""
+    from bifa.files import written_into
+
+    what = "pictures: what changed and why, sensitivity, front, distribution"
+    with console.status(what), written_into(folder) as aside:
+        reasons = _pictures(robot, pool, best, aside)
     for sentence in reasons:
         console.print(f"- {sentence}", highlight=False)
-    console.print(f"figures: {folder}", highlight=False)
+    console.print(f"pictures: {folder}", highlight=False)
 
 
 @contextmanager
@@ -138,7 +145,7 @@ def _summary(optimum):
     return table
 
 
-def _figures(robot, pool, optimum, folder: Path) -> list[str]:
+def _pictures(robot, pool, optimum, folder: Path) -> list[str]:
     from bifa.gait import Settings, library, optimise
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
@@ -147,7 +154,6 @@ def _figures(robot, pool, optimum, folder: Path) -> list[str]:
     from bifa.robot import BASELINE
     from bifa.simulate import gait_rows, plant
 
-    folder.mkdir(parents=True, exist_ok=True)
     flat, settings = plant(robot), optimum.settings
     draws = optimum.spread.plants(robot, 48, settings.seed + 3_000_017)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)

@@ -5,8 +5,10 @@ from typing import Annotated
 
 import typer
 
-EPILOG = """Examples:  bifa record out/walks --port virtual --gait gait.toml --cycles 10 --repeats 3   |
-bifa record out/telemetry --seconds 60"""
+from bifa.cli._options import PORT, stoppable
+
+EPILOG = """Examples:  bifa record --out out/walks --port virtual --gait gait.toml --cycles 10   |
+bifa record --out out/telemetry --seconds 60"""
 
 
 def register(app: typer.Typer) -> None:
@@ -15,9 +17,11 @@ def register(app: typer.Typer) -> None:
 
 
 def record(
-    out: Annotated[Path, typer.Argument(help="New folder.")],
-    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
-    gait: Annotated[Path | None, typer.Option(help="Gait to walk; otherwise the baseline.")] = None,
+    out: Annotated[Path, typer.Option(help="New folder, or that of an interrupted recording.", show_default=False)],
+    port: Annotated[str | None, PORT] = None,
+    gait: Annotated[
+        Path | None, typer.Option(help="Gait to walk; otherwise the baseline, or no walk (without instruments).")
+    ] = None,
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk (with instruments).")] = 6,
     repeats: Annotated[int, typer.Option(min=1, help="Walks (with instruments).")] = 1,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length (without instruments); else Ctrl-C.")] = None,
@@ -28,18 +32,28 @@ def record(
     it comes. If the port vanishes, what was recorded is kept, and recording resumes when it is back. A command that is
     interrupted is resumed by giving it again.
     """
+    from bifa.files import check_targets
     from bifa.live.record import record_telemetry, record_walks
     from bifa.rig import open_rig
+    from bifa.robot.gait import BASELINE, read_gait_file
     from bifa.screen import Console
 
     console = Console()
+    check_targets(folders=(out,))
+    steps = read_gait_file(gait).gait if gait else BASELINE
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None
         if has_instruments:
-            try:
+            console.print(f"gait: {gait or 'the baseline'}, {_words(steps)}", highlight=False)
+            with stoppable(lambda: f"valves off; finished walks are kept in {out}.partial; the same command resumes"):
                 record_walks(rig, out, gait, cycles, repeats, console)
-            except KeyboardInterrupt:
-                console.print(f"valves off; finished walks are kept in {out}; run the same command to resume")
-                raise typer.Exit(130) from None
     if not has_instruments:
+        console.print(
+            f"gait: {gait}, {_words(steps)}" if gait else "no --gait: the Uno is only listened to", highlight=False
+        )
         record_telemetry(lambda: open_rig(port), out, gait, seconds, console)
+
+
+def _words(gait) -> str:
+    duties = ", ".join(f"{duty:g}" for duty in (gait.duty_body, gait.duty_head, gait.duty_tail))
+    return f"period {gait.period_s:g} s, phases {gait.psi12_deg:g} and {gait.psi13_deg:g} degrees, duties {duties}"

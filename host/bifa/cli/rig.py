@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import PROFILE, Profile, effects
 from bifa.errors import BifaError
 
 EPILOG = """[bold]Examples[/bold]
@@ -28,9 +29,10 @@ def register(app: typer.Typer) -> None:
 
     @app.command(epilog=EPILOG)
     def rig(
-        profile: Annotated[str, typer.Option(help="ideal, realistic or worn")] = "ideal",
+        profile: Annotated[Profile, PROFILE] = "ideal",
         effect: Annotated[
-            list[str] | None, typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; may be given several times")
+            list[str] | None,
+            typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; may be given several times", autocompletion=effects),
         ] = None,
         sealed: Annotated[int | None, typer.Option(help="seed that draws a robot with an undisclosed effect")] = None,
         seed: Annotated[int, typer.Option(help="seed of noise, clocks and run-to-run variation")] = 0,

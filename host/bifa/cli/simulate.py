@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --plot walk.png   |
+from bifa.cli._options import PICTURES, Obstacle
+
+EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk   |
 bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml   |
 bifa simulate --paper"""
 
@@ -22,12 +24,12 @@ def simulate(
     inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
     payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
     obstacle: Annotated[
-        str | None,
-        typer.Option(help="tunnel, subtunnels or arcs (the paper's), 10 cm ahead.", show_default=False),
+        Obstacle | None,
+        typer.Option(help="One of the paper's, 10 cm ahead.", show_default=False),
     ] = None,
     buckling: Annotated[float, typer.Option(help="Force that buckles a ring of supports, N (assumed).")] = 27.0,
-    plot: Annotated[Path | None, typer.Option(help="Picture of commands, pressures, displacement.")] = None,
-    csv: Annotated[Path | None, typer.Option(help="All channels at 100 Hz, as a data set's locomotion.")] = None,
+    pictures: Annotated[Path | None, PICTURES] = None,
+    out: Annotated[Path | None, typer.Option(help="CSV of all channels at 100 Hz, as a data set's locomotion.")] = None,
     paper: Annotated[
         bool,
         typer.Option(
@@ -36,15 +38,16 @@ def simulate(
         ),
     ] = False,
 ) -> None:
-    """Simulate a walk and print the advance of each cycle.
+    """Simulate a walk and print the advance of each cycle; its picture shows commands, pressures and displacement.
 
     The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
     """
-
     from bifa import robot
+    from bifa.files import check_targets, written_into
     from bifa.screen import Console
 
     console = Console()
+    check_targets(out, folders=(pictures,))
     chosen = robot.load_model(model) if model else robot.nominal()
     file = robot.read_gait_file(gait) if gait else robot.GaitFile(robot.BASELINE)
     if file.others:
@@ -54,15 +57,16 @@ def simulate(
         return
     chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
     record, speed_mm_s = _walk(console, chosen, file.gait, cycles, inclination, obstacle, buckling)
-    if csv:
-        _write_csv(csv, record.columns)
-        console.print(f"channels: {csv}", highlight=False)
-    if plot:
+    if out:
+        _write_csv(out, record.columns)
+        console.print(f"channels: {out}", highlight=False)
+    if pictures:
         from bifa.report.walks import Walk, draw_walks
 
         title = f"{chosen.name}, {speed_mm_s:.1f} mm/s"
-        draw_walks([Walk(title, file.gait.period_s, record.columns)], plot, cycles)
-        console.print(f"picture: {plot}", highlight=False)
+        with written_into(pictures) as aside:
+            draw_walks([Walk(title, file.gait.period_s, record.columns)], aside / "walk.png", cycles)
+        console.print(f"picture: {pictures / 'walk.png'}", highlight=False)
 
 
 def _walk(console, model, gait, cycles, inclination, obstacle, buckling):
@@ -156,11 +160,8 @@ def _print_obstacles(console, model, fast) -> None:
 def _write_csv(path: Path, columns) -> None:
     import numpy as np
 
-    from bifa.simulate import SimulationError
+    from bifa.files import written
 
-    try:
-        np.savetxt(
-            path, np.column_stack(list(columns.values())), "%.6g", delimiter=",", header=",".join(columns), comments=""
-        )
-    except OSError as error:
-        raise SimulationError(f"cannot write {path}: {error}") from None
+    rows = np.column_stack(list(columns.values()))
+    with written(path) as aside:
+        np.savetxt(aside, rows, "%.6g", delimiter=",", header=",".join(columns), comments="")

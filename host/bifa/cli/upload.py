@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from bifa.cli._options import PORT
+
 EPILOG = """Examples:  bifa upload gait.toml   |   bifa upload gait.toml --save fast --run   |
 bifa upload gait.toml --run --seconds 60 --port /dev/ttyACM0"""
 
@@ -16,7 +18,7 @@ def register(app: typer.Typer) -> None:
 
 def upload(
     gait: Annotated[Path, typer.Argument(help="TOML file with period_s, psi12_deg, psi13_deg and the three duties.")],
-    port: Annotated[str | None, typer.Option(help="Serial port, or `virtual`; detected if left out.")] = None,
+    port: Annotated[str | None, PORT] = None,
     save: Annotated[str | None, typer.Option(help="Keep it on the Uno as a preset of this name.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Then walk until Ctrl-C.")] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="With --run: walk only for so long.")] = None,

@@ -9,6 +9,8 @@ from typing import Any
 
 import tomli_w
 
+from bifa.files import TargetError, write_text
+
 from .dataset import Dataset, Trial
 from .errors import DatasetError
 from .layout import FORMAT, SETTINGS, TABLE_FILE
@@ -25,7 +27,7 @@ def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
     Raises DatasetError where the folder exists or the data break the format.
     """
     target = Path(folder)
-    _refuse_existing(target)
+    refuse_existing(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     scratch = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
     scratch.mkdir()
@@ -57,7 +59,7 @@ class DatasetWriter:
     ):
         self.folder = Path(folder)
         self.partial = self.folder.with_name(self.folder.name + PARTIAL_SUFFIX)
-        _refuse_existing(self.folder)
+        refuse_existing(self.folder)
         head = Dataset(self.partial, name, dict(known or {}), (), dict(provenance or {}))
         if self.partial.exists():
             if not resume:
@@ -114,7 +116,7 @@ class DatasetWriter:
 
     def finish(self) -> Dataset:
         """Give the data set its name; returns it as read back from disk."""
-        _refuse_existing(self.folder)
+        refuse_existing(self.folder)
         for stray in self.partial.glob(".probe.*"):
             shutil.rmtree(stray)
         read_dataset(self.partial)
@@ -122,14 +124,15 @@ class DatasetWriter:
         return read_dataset(self.folder)
 
 
-def _refuse_existing(folder: Path) -> None:
+def refuse_existing(folder: Path) -> None:
+    """Raise DatasetError where `folder` exists: a data set is never overwritten."""
     if folder.exists() or folder.is_symlink():
         raise DatasetError(f"{folder} exists; a data set is never overwritten: choose another name")
 
 
 def _publish(scratch: Path, target: Path) -> None:
     """Rename, which is atomic; a folder that appeared meanwhile makes it fail unless it is empty."""
-    _refuse_existing(target)
+    refuse_existing(target)
     try:
         os.rename(scratch, target)
     except OSError as error:
@@ -176,14 +179,8 @@ def _head(trial: Trial) -> dict[str, Any]:
 
 
 def _write_durably(path: Path, text: str) -> None:
-    """Write beside the place and rename, so that a power cut leaves the old file or the new one."""
-    scratch = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    """Whole or not at all, and DatasetError where it cannot be written."""
     try:
-        with scratch.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(scratch, path)
-    except OSError as error:
-        scratch.unlink(missing_ok=True)
-        raise DatasetError(f"{path} cannot be written ({error.strerror})") from None
+        write_text(path, text)
+    except TargetError as error:
+        raise DatasetError(str(error)) from None

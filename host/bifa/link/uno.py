@@ -337,17 +337,22 @@ class Uno:
         if self._streaming:
             self.session.call("stream", 1)
 
-    def samples(self, timeout_s: float) -> list[Sample]:
-        """The samples that have arrived, waiting at most `timeout_s` for the first; keeps the link alive.
+    def samples(self, duration_s: float) -> list[Sample]:
+        """The samples since the last call and those of the next `duration_s`, which pass before this returns: 2.0 gives
+        some 200. Keeps the link alive.
 
-        Raises RestartedError as soon as the Uno says that it restarted.
+        Raises RestartedError as soon as the Uno says that it restarted; `taken_samples` then has what had arrived.
         """
-        deadline = self._clock.now() + timeout_s
+        deadline = self._clock.now() + duration_s
         self.keep_alive()
-        while not self._samples and (left := deadline - self._clock.now()) > 0:
+        while (left := deadline - self._clock.now()) > 0:
             self.session.poll(min(left, self._exchange_every_s))
             self.session.raise_if_restarted()
             self.keep_alive()
+        return self.taken_samples()
+
+    def taken_samples(self) -> list[Sample]:
+        """The samples that have arrived and that no call has returned yet; does not touch the link."""
         samples = list(self._samples)
         self._samples.clear()
         return samples

@@ -118,10 +118,13 @@ def _record_until_gone(
                 with path.open("x", newline="") as file:
                     writer = csv.writer(file)
                     writer.writerow(HEADER)
-                    while time.monotonic() < end_s:
-                        writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
-                        file.flush()
-                        status.update(f"recording  {uno.counters.text()}")
+                    try:
+                        while time.monotonic() < end_s:
+                            writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
+                            file.flush()
+                            status.update(f"recording  {uno.counters.text()}")
+                    finally:
+                        writer.writerows(_row(uno, sample, marked) for sample in uno.taken_samples())
     finally:
         if path.exists():
             console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)

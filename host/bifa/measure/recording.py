@@ -57,7 +57,7 @@ class Recording:
         self.samples: list = []
 
     def __enter__(self) -> Recording:
-        self._uno.samples(0.0)  # what is left of an earlier recording
+        self._uno.taken_samples()  # what is left of an earlier recording
         self._uno.stream(True)
         self._instruments.start()
         until_ready(self._instruments, lambda: self.wait(_PIECE_S, report=False))

@@ -10,6 +10,7 @@ from pathlib import Path
 import tomli_w
 
 from bifa.errors import BifaError
+from bifa.files import write_text
 from bifa.ranges import RANGES
 from bifa.robot.parameters import ModelParameterError, check_bounds
 from bifa.toml import parse_toml
@@ -60,7 +61,7 @@ def save_gait(path: str | Path, gait: Gait, provenance: dict | None = None) -> N
     document: dict = {"format": FORMAT, **gait.as_dict()}
     if provenance:
         document["provenance"] = provenance
-    Path(path).write_bytes(tomli_w.dumps(document).encode())
+    write_text(path, tomli_w.dumps(document))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 import tomli_w
 
 from bifa.errors import BifaError
+from bifa.files import write_text
 from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Covariance, Model
 from bifa.robot.parameters import BASE_PARAMETERS
@@ -62,7 +63,7 @@ def save_model(path: str | Path, model: Model) -> None:
     if model.covariance is not None:
         covariance = model.covariance
         document["covariance"] = {"names": list(covariance.names), "matrix": covariance.matrix.tolist()}
-    Path(path).write_bytes(tomli_w.dumps(document).encode())
+    write_text(path, tomli_w.dumps(document))
 
 
 def _entry(parameter) -> dict:

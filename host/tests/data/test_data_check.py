@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from bifa.cli import app
 from bifa.data import EXPERIMENTS, Dataset, write_dataset
 from bifa.data.check import check_dataset
+from bifa.files import TargetError
 
 from .data_sets import make_dataset, make_trial
 
@@ -111,12 +112,25 @@ def test_the_command_lists_plots_and_warns(tmp_path):
     assert result.exit_code == 0, result.output
     assert "12 trials" in result.output
     assert "Nothing looks wrong" in result.output
-    pictures = sorted((tmp_path / "set-plots").glob("*.png"))
+    pictures = sorted((tmp_path / "set-pictures").glob("*.png"))
     assert len(pictures) == len(EXPERIMENTS)
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
     lonely = write_dataset(tmp_path / "lonely", Dataset(None, "one", {}, (make_trial(),)))
-    result = CliRunner().invoke(app, ["check", str(lonely), "--no-plots", "--strict"])
+    result = CliRunner().invoke(app, ["check", str(lonely), "--no-pictures", "--strict"])
     assert result.exit_code == 1
     assert "[missing repeats]" in result.output
-    assert not (tmp_path / "lonely-plots").exists()
+    assert not (tmp_path / "lonely-pictures").exists()
+
+
+def test_pictures_on_a_full_disk_end_in_a_sentence_and_leave_none(tmp_path, monkeypatch):
+    def full(figure, path, **_):
+        path.write_bytes(b"\x89PNG")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
+    write_dataset(tmp_path / "day", sound())
+    result = CliRunner().invoke(app, ["check", str(tmp_path / "day")])
+    assert isinstance(result.exception, TargetError)
+    assert "No space left" in str(result.exception)
+    assert [path.name for path in tmp_path.iterdir()] == ["day"]

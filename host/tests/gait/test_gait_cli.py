@@ -1,12 +1,14 @@
 """`bifa optimize` and `bifa gaits` from the outside."""
 
 import tomllib
+from typing import get_args
 
 import pytest
 from typer.testing import CliRunner
 
-from bifa.cli import app
+from bifa.cli import _options, app
 from bifa.errors import BifaError
+from bifa.gait.methods import METHODS
 from bifa.robot import load_gait, nominal, save_model
 
 
@@ -32,7 +34,6 @@ def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--method", "sgd"], "'sgd' is not one of de, cma, bo"),
         (["--spread", "0.9"], "spread = 0.9 must be above 0"),
         (["--period", "0.1", "4"], "period_s: 0.1 to 4 must be a range within 0.5 to 60 s"),
         (["--period", "4", "2"], "must be a range"),
@@ -46,6 +47,13 @@ def test_bad_input_names_the_range(tmp_path, arguments, words):
     assert not (tmp_path / "gait.toml").exists()
 
 
+def test_a_method_that_does_not_exist_is_refused_before_anything_is_loaded(tmp_path):
+    result = invoke("optimize", "--out", tmp_path / "gait.toml", "--method", "sgd")
+    assert result.exit_code == 2
+    assert "'sgd' is not one of 'de', 'cma'" in result.output
+    assert tuple(METHODS) == get_args(_options.Method)
+
+
 def test_a_folder_that_is_not_there_is_noticed_before_the_search(tmp_path):
     result = invoke("optimize", "--out", tmp_path / "no" / "gait.toml")
     assert "does not exist" in str(result.exception)
@@ -56,8 +64,19 @@ def test_gaits_lists_the_library():
     assert result.exit_code == 0, result.output
     for name in ("fast", "robust", "obstacle", "vertical", "backward", "quiet"):
         assert name in result.output
+    alone = invoke("gaits", "--only", "quiet").output
+    assert "quiet" in alone
+    assert "vertical" not in alone
 
 
-def test_gaits_refuses_an_unknown_scenario(tmp_path):
-    result = invoke("gaits", "--make", "--only", "moon", "--folder", tmp_path)
+def test_the_list_of_gaits_is_readable_at_80_columns():
+    result = CliRunner().invoke(app, ["gaits"], env={"COLUMNS": "80"})
+    lines = result.output.splitlines()[:-1]  # the last is the place of the files
+    assert max(map(len, lines)) <= 80
+    assert any("robust" in line and "197, 323" in line and "0.65, 0.43, 0.43" in line for line in lines)
+
+
+@pytest.mark.parametrize("make", [["--make"], []])
+def test_gaits_refuses_an_unknown_scenario(tmp_path, make):
+    result = invoke("gaits", *make, "--only", "moon", "--out", tmp_path)
     assert "the library has fast" in str(result.exception)

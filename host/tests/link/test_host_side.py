@@ -93,7 +93,7 @@ def test_lost_samples_are_counted():
     for sequence in (65533, 65534, 65535, 2, 3, 3, 7):
         uno._take_sample(Report("sample", sequence % 256, {**fields, "sequence": sequence, "time_us": sequence * 10}))
     assert (uno.counters.samples, uno.counters.lost) == (7, 5)
-    samples = uno.samples(0)
+    samples = uno.taken_samples()
     assert [s.sequence for s in samples] == [65533, 65534, 65535, 65538, 65539, 65543]
     assert samples[0].command[1:] == (0.0, 1.0)
 
@@ -129,7 +129,10 @@ def test_a_serial_port_exclusive_and_unplugged():
         with pytest.raises(PortGoneError, match="another program"):
             SerialRig(plugged.device)
         uno.stream(True)
-        assert uno.samples(2.0)
+        began_s = rig.clock.now()
+        samples = uno.samples(1.5)
+        assert rig.clock.now() - began_s >= 1.5
+        assert len(samples) > 20, "all that came in that time, and not only the first"
         plugged.unplug()
         with pytest.raises(PortGoneError, match="gone"):
             uno.set("period_s", 4.0)
@@ -152,7 +155,7 @@ def test_upload_and_console_on_the_virtual_robot(tmp_path):
 def test_a_recording_is_a_data_set(tmp_path):
     from bifa.data import read_dataset
 
-    command = ["record", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2"]
+    command = ["record", "--out", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
     assert "lost 0" in done.output

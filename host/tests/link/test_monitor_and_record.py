@@ -117,7 +117,7 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
 def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, tmp_path):
     path, out = tmp_path / "gait.toml", tmp_path / "out"
     path.write_text(GAIT)
-    arguments = ["record", str(out), "--port", uno.device, "--gait", str(path)]
+    arguments = ["record", "--out", str(out), "--port", uno.device, "--gait", str(path)]
     with Terminal(tmp_path, *arguments) as terminal:
         terminal.sees("recording  samples")
         terminal.until(lambda: uno.board.valves != 0 and len(rows(out / "telemetry_1.csv")) > 2 * MARK_PAUSE)

@@ -100,7 +100,7 @@ def test_any_sample_can_be_shown_and_recorded(connected, raw):
     uno = connected
     uno._last_sequence = None
     uno._take_sample(Report("sample", 0, frames._unpack(REPORTS["sample"], raw)))
-    (sample,) = uno.samples(0)
+    (sample,) = uno.taken_samples()
     assert sample.state in STATES or sample.state == f"unknown ({raw[6]})"
     monitor = Monitor(uno)
     monitor.take([sample])

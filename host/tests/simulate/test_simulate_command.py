@@ -17,8 +17,8 @@ def _run(*arguments):
 
 
 def test_nominal_model_and_baseline_by_default(tmp_path):
-    picture, table = tmp_path / "walk.png", tmp_path / "walk.csv"
-    result = _run("--cycles", 4, "--plot", picture, "--csv", table)
+    picture, table = tmp_path / "pictures" / "walk.png", tmp_path / "walk.csv"
+    result = _run("--cycles", 4, "--pictures", picture.parent, "--out", table)
     assert result.exit_code == 0, result.output
     assert "10.83 mm/s" in result.output
     assert picture.read_bytes().startswith(b"\x89PNG")
@@ -88,10 +88,13 @@ def test_the_papers_observation_is_in_the_table(monkeypatch):
         assert outcome.extension.enough == (gait != "fastest" or obstacle == "arcs"), row
 
 
+def test_an_obstacle_that_does_not_exist_is_refused_with_those_that_do():
+    assert "'moon' is not one of 'tunnel'" in _run("--obstacle", "moon").output
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--obstacle", "moon"], "'moon' is not one of tunnel, subtunnels, arcs"),
         (["--buckling", "-1"], "outside its range 0 to 1000 N"),
         (["--payload", "4"], "tail_mass_kg = 4.175 is outside its range 0.02 to 1 kg"),
         (["--inclination", "91"], "outside its range -90 to 90"),

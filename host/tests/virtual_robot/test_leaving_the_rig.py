@@ -136,7 +136,7 @@ def signalled(number: int, command: str) -> Callable[[Bench, random.Random], sub
     """A signal at any moment, from before the program has begun to after it has walked for a while."""
 
     def leave(bench: Bench, rng: random.Random) -> subprocess.Popen:
-        recording = ["record", str(bench.folder / f"out{time.monotonic_ns()}"), "--gait"]
+        recording = ["record", "--out", str(bench.folder / f"out{time.monotonic_ns()}"), "--gait"]
         arguments = {"monitor": ["monitor", "--run"], "record": recording, "upload": ["upload", "--run"]}[command]
         program = bench.start(*arguments, *([str(bench.folder / "gait.toml")] if command != "monitor" else []))
         if rng.random() < 0.5:

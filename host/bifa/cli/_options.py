@@ -1,0 +1,80 @@
+"""What several commands share: options under one name each, with their values completed, and how they end."""
+
+import pkgutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Literal
+
+import typer
+
+Profile = Literal["ideal", "realistic", "worn"]
+Method = Literal["de", "cma", "bo"]  # bifa.gait.methods.METHODS, which would be seconds to import
+Obstacle = Literal["tunnel", "subtunnels", "arcs"]  # bifa.simulate.obstacles
+
+
+def ports(incomplete: str = "") -> list[str]:
+    """Rigs by name and serial ports, for completion."""
+    from importlib.metadata import entry_points
+
+    from bifa.rig.ports import serial_ports
+
+    names = [*entry_points(group="bifa.rigs").names, *(port.device for port in serial_ports())]
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def effects(incomplete: str = "") -> list[str]:
+    """Effects of the library, one a file, for completion."""
+    import bifa.effects
+
+    names = sorted(module.name for module in pkgutil.iter_modules(bifa.effects.__path__) if module.name != "effect")
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def known_names(incomplete: str = "") -> list[str]:
+    """Parameters that can be declared, as NAME=, for completion."""
+    from bifa.robot.parameters import BASE_PARAMETERS
+
+    return [f"{name}=" for name in BASE_PARAMETERS if name.startswith(incomplete)]
+
+
+def gait_names(incomplete: str = "") -> list[str]:
+    """Gaits of the library, one a file, for completion."""
+    from importlib.resources import files
+
+    names = sorted(path.name.removesuffix(".toml") for path in files("bifa.gait.library").iterdir())
+    return [name for name in names if name.startswith(incomplete) and "." not in name and "_" not in name]
+
+
+def stages(incomplete: str = "") -> list[str]:
+    """Stages of a campaign, for completion."""
+    from bifa.campaign.bench import Bench
+    from bifa.campaign.loop import Effort, campaign
+
+    names = [stage.name for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None)]
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def port_option(text: str = "Serial port, `virtual`, or a rig by its name; detected if left out."):
+    """The option --port."""
+    return typer.Option(help=text, metavar="PORT", autocompletion=ports)
+
+
+PORT = port_option()
+KNOWN = typer.Option(
+    help="What you measured: NAME=VALUE, as head_mass_kg=0.182.", metavar="NAME=VALUE", autocompletion=known_names
+)
+RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
+WATCH = typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")
+PROFILE = typer.Option(help="Of a virtual robot; ideal: the paper's equations and white noise.")
+PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
+NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
+
+
+@contextmanager
+def stoppable(kept: Callable[[], str]) -> Iterator[None]:
+    """Ctrl-C inside ends the command with status 130 and a line that says what `kept()` says was kept."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(f"\nstopped; {kept()}")
+        raise typer.Exit(130) from None

@@ -1,0 +1,71 @@
+"""Files are written whole or not at all, and their places checked before any work."""
+
+import errno
+from pathlib import Path
+
+import pytest
+
+from bifa.files import TargetError, check_targets, write_text, written, written_into
+
+
+def full_disk(path: Path) -> None:
+    path.write_text("half of it")
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_full_disk_leaves_the_old_file_and_nothing_beside_it(tmp_path):
+    target = tmp_path / "model.toml"
+    write_text(target, "old\n")
+    with (
+        pytest.raises(TargetError, match=r"model\.toml cannot be written \(No space left on device\)"),
+        written(target) as a,
+    ):
+        full_disk(a)
+    assert target.read_text() == "old\n"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_the_file_beside_has_the_same_suffix_so_that_writers_know_the_format(tmp_path):
+    with written(tmp_path / "walk.png") as aside:
+        assert aside.suffix == ".png"
+        aside.write_text("x")
+
+
+def test_an_error_or_ctrl_c_leaves_nothing_half_written(tmp_path):
+    for error in (ValueError, KeyboardInterrupt):
+        with pytest.raises(error), written(tmp_path / "a.csv") as aside:
+            aside.write_text("half")
+            raise error
+        with pytest.raises(error), written_into(tmp_path / "pictures") as aside:
+            (aside / "1.png").write_text("half")
+            raise error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_come_together_and_others_in_the_folder_stay(tmp_path):
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    (folder / "mine.txt").write_text("mine")
+    (folder / "1.png").write_text("old")
+    with written_into(folder) as aside:
+        (aside / "1.png").write_text("new")
+        (aside / "2.png").write_text("new")
+    assert {path.name: path.read_text() for path in folder.iterdir()} == {
+        "mine.txt": "mine",
+        "1.png": "new",
+        "2.png": "new",
+    }
+    with pytest.raises(TargetError, match="No space"), written_into(folder) as aside:
+        full_disk(aside / "3.png")
+    assert not (folder / "3.png").exists()
+
+
+def test_targets_are_refused_before_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    check_targets(None, tmp_path / "model.toml", folders=(None, tmp_path / "a" / "b"))
+    with pytest.raises(TargetError, match="does not exist; create it first"):
+        check_targets(tmp_path / "no" / "model.toml")
+    with pytest.raises(TargetError, match="is a folder"):
+        check_targets(tmp_path)
+    with pytest.raises(TargetError, match="is a file, so that"):
+        check_targets(folders=(tmp_path / "file" / "pictures",))
