@@ -32,13 +32,15 @@ def test_the_file_beside_has_the_same_suffix_so_that_writers_know_the_format(tmp
 
 
 def test_an_error_or_ctrl_c_leaves_nothing_half_written(tmp_path):
+    def fail(path: Path, error: type) -> None:
+        path.write_text("half")
+        raise error
+
     for error in (ValueError, KeyboardInterrupt):
         with pytest.raises(error), written(tmp_path / "a.csv") as aside:
-            aside.write_text("half")
-            raise error
+            fail(aside, error)
         with pytest.raises(error), written_into(tmp_path / "pictures") as aside:
-            (aside / "1.png").write_text("half")
-            raise error
+            fail(aside / "1.png", error)
     assert list(tmp_path.iterdir()) == []
 
 

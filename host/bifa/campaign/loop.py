@@ -15,7 +15,7 @@ from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.gait import Optimum, Settings, optimise, simulations
-from bifa.gait.library import provenance
+from bifa.gait.library.scenarios import provenance
 from bifa.gait.uncertainty import SPREAD
 from bifa.identify.completed import completed_model
 from bifa.identify.identification import identify

@@ -38,11 +38,10 @@ def known_names(incomplete: str = "") -> list[str]:
 
 
 def gait_names(incomplete: str = "") -> list[str]:
-    """Gaits of the library, one a file, for completion."""
-    from importlib.resources import files
+    """Gaits of the library, for completion."""
+    from bifa.gait.library import NAMES
 
-    names = sorted(path.name.removesuffix(".toml") for path in files("bifa.gait.library").iterdir())
-    return [name for name in names if name.startswith(incomplete) and "." not in name and "_" not in name]
+    return [name for name in NAMES if name.startswith(incomplete)]
 
 
 def stages(incomplete: str = "") -> list[str]:
@@ -59,6 +58,12 @@ def port_option(text: str = "Serial port, `virtual`, or a rig by its name; detec
     return typer.Option(help=text, metavar="PORT", autocompletion=ports)
 
 
+def file_option(text: str):
+    """An option that names a file to read, which has to be there."""
+    return typer.Option(help=text, exists=True, dir_okay=False)
+
+
+DATASET = typer.Argument(help="The data set's folder.", show_default=False, exists=True, file_okay=False)
 PORT = port_option()
 KNOWN = typer.Option(
     help="What you measured: NAME=VALUE, as head_mass_kg=0.182.", metavar="NAME=VALUE", autocompletion=known_names

@@ -42,6 +42,8 @@ def campaign(
     declared in the bench's file or with --known; everything else is fitted, or stands at the nominal value where no
     experiment can tell it. A virtual robot comes with its masses and its supply pressure.
     """
+    _check(out, port)
+
     from bifa.measure.known import parse_known
 
     run_campaign(out, port, seed, quick, rerun, parse_known(known), profile, watch, bench)
@@ -59,22 +61,24 @@ def run_campaign(
     bench_file: Path | None = None,
 ) -> None:
     """Bring all stages up to date with progress on the terminal, then print what came of it."""
+    _check(out, port)
+
     import json
 
     from bifa.campaign.bench import Bench
-    from bifa.campaign.loop import Effort, campaign
-    from bifa.campaign.page import error_table, prediction_table, speed_table
-    from bifa.campaign.progress import stage_progress
-    from bifa.campaign.stages import run_stages
-    from bifa.files import check_targets
     from bifa.screen import Console
 
-    check_targets(folders=(out,))
     console = Console()
     bench = Bench(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
     with stoppable(lambda: f"{_kept(out)}. The same command goes on there"):
         if bench.is_by_hand:
             bench = _attended(console, bench, watch, bench_file)
+
+        from bifa.campaign.loop import Effort, campaign  # slow to import: the person is asked first
+        from bifa.campaign.page import error_table, prediction_table, speed_table
+        from bifa.campaign.progress import stage_progress
+        from bifa.campaign.stages import run_stages
+
         with stage_progress(console) as progress:
             if bench.hands is not None:
                 bench.hands.before = progress.close
@@ -98,6 +102,14 @@ def run_campaign(
             highlight=False,
         )
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
+
+
+def _check(out: Path, port: str) -> None:
+    from bifa.files import check_targets
+    from bifa.rig import check_port
+
+    check_targets(folders=(out,))
+    check_port(port)
 
 
 def _attended(console, bench, watch: Path | None, bench_file: Path | None):

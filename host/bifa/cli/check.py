@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import NO_PICTURES, PICTURES
+from bifa.cli._options import DATASET, PICTURES
 
 
 def register(app: typer.Typer) -> None:
@@ -15,26 +15,24 @@ def register(app: typer.Typer) -> None:
         epilog="Examples:  bifa check bench-2026-11-21   |   bifa check bench-2026-11-21 --pictures out/pictures"
     )
     def check(
-        dataset: Annotated[Path, typer.Argument(help="The data set's folder.", show_default=False)],
+        dataset: Annotated[Path, DATASET],
         pictures: Annotated[Path | None, PICTURES] = None,
-        no_pictures: Annotated[bool, NO_PICTURES] = False,
         strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 where anything is found.")] = False,
     ) -> None:
-        """Say what is in a data set, draw it (into DATASET-pictures if nothing else is said), and point out what looks
-        wrong.
+        """Say what is in a data set, point out what looks wrong, and draw it where --pictures names a folder.
 
         A malformed data set ends with status 2 and names file, line and column. What is well-formed but
         doubtful (a clipped sensor, a clock that jumps, missing repeats) is listed as a warning, status 0.
         """
+        from bifa.files import check_targets, written_into
+
+        check_targets(folders=(pictures,))
+
         from bifa.data import read_dataset
         from bifa.data.check import check_dataset
-        from bifa.files import check_targets, written_into
         from bifa.screen import Console
 
         console = Console()
-        target = pictures or dataset.resolve().with_name(dataset.resolve().name + "-pictures")
-        if not no_pictures:
-            check_targets(folders=(target,))
         with console.status("reading"):
             content = read_dataset(dataset)
             findings = check_dataset(content)
@@ -44,12 +42,12 @@ def register(app: typer.Typer) -> None:
             console.print(str(finding), markup=False, highlight=False)
         if not findings:
             console.print("Nothing looks wrong.")
-        if not no_pictures:
+        if pictures is not None:
             from bifa.report.datasets import plot_dataset
 
-            with console.status("drawing"), written_into(target) as aside:
+            with console.status("drawing"), written_into(pictures) as aside:
                 written = plot_dataset(content, aside)
-            console.print(f"{len(written)} pictures in {target}", highlight=False)
+            console.print(f"{len(written)} pictures in {pictures}", highlight=False)
         if strict and findings:
             raise typer.Exit(1)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bifa import cluster
-from bifa.cli._options import WATCH, port_option
+from bifa.cli._options import DATASET, WATCH, file_option, port_option
 
 
 def register(app: typer.Typer) -> None:
@@ -22,11 +22,11 @@ def register(app: typer.Typer) -> None:
 
 
 def diagnose(
-    dataset: Annotated[Path, typer.Argument(help="The data set's folder.", show_default=False)],
+    dataset: Annotated[Path, DATASET],
     json: Annotated[Path | None, typer.Option(help="Write the verdict as JSON.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write the model, completed by the effects found.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with the evidence.")] = None,
-    model: Annotated[Path | None, typer.Option(help="Model to start from; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
     seed: Annotated[int, typer.Option(help="Of the search; the same seed gives the same verdict.")] = 0,
     resolve: Annotated[
         bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and continue.")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import KNOWN, PORT, PROFILE, WATCH, Profile, stoppable
+from bifa.cli._options import KNOWN, PORT, PROFILE, WATCH, Profile, file_option, stoppable
 
 EPILOG = """Examples:  bifa experiment all --port virtual --out out/bench   |
 bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
@@ -44,7 +44,7 @@ def experiment(
     actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed, mm/s.")] = None,
-    gait: Annotated[list[Path] | None, typer.Option(help="Gait file to walk; otherwise three built-in gaits.")] = None,
+    gait: Annotated[list[Path] | None, file_option("Gait file to walk; otherwise three built-in gaits.")] = None,
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk.")] = 5,
     inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
     repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
@@ -53,8 +53,10 @@ def experiment(
     seed: Annotated[int | None, typer.Option(help="Of a virtual rig: its noise.")] = None,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     watch: Annotated[Path | None, WATCH] = None,
-    instrument: Annotated[Path | None, typer.Option(help="CSV of your own instrument, instead of a rig's.")] = None,
-    telemetry: Annotated[Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).")] = None,
+    instrument: Annotated[Path | None, file_option("CSV of your own instrument, instead of a rig's.")] = None,
+    telemetry: Annotated[
+        Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).", exists=True)
+    ] = None,
 ) -> None:
     """Run a characterisation experiment and write what it measured as a data set.
 
@@ -64,14 +66,18 @@ def experiment(
     they save is the record (docs/bench.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
-    from bifa.data.write import refuse_existing
     from bifa.files import check_targets
+    from bifa.rig import check_port
+
+    check_targets(folders=(out,))
+    check_port(port)
+
+    from bifa.data.write import refuse_existing
     from bifa.measure import plan
     from bifa.measure.known import parse_known
     from bifa.screen import Console
 
     console = Console()
-    check_targets(folders=(out,))
     refuse_existing(out)
     gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(

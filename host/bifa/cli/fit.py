@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PICTURES
+from bifa.cli._options import DATASET, PICTURES, file_option
 
 EPILOG = """Examples:  bifa fit out/bench --out model.toml   |
 bifa fit out/bench --out model.toml --pictures out/pictures"""
@@ -17,28 +17,30 @@ def register(app: typer.Typer) -> None:
 
 
 def fit(
-    dataset: Annotated[Path, typer.Argument(help="Folder of the data set.")],
+    dataset: Annotated[Path, DATASET],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
-    model: Annotated[Path | None, typer.Option(help="Model to start from; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
     """Identify the model as the paper does (section IV): static loading, step responses, anchor pulls, then everything
     together. Reports each parameter with its 90 % interval, what the data do not determine, and the error in units of
     the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's Figs. 4 to 6.
     """
+    from bifa.files import check_targets, written_into
+
+    check_targets(out, folders=(pictures,))
+
     import time
 
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from bifa.data import read_dataset
-    from bifa.files import check_targets, written_into
     from bifa.identify.identification import identify
     from bifa.report.identification_tables import print_report
     from bifa.robot import load_model, save_model
     from bifa.screen import Console
 
     console = Console()
-    check_targets(out, folders=(pictures,))
     measured = read_dataset(dataset)
     begun = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import gait_names, stoppable
+from bifa.cli._options import file_option, gait_names, stoppable
 
 EPILOG = """Examples:  bifa gaits   |   bifa gaits --make   |   bifa gaits --make --model mine.toml --out my-gaits"""
 
@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 def gaits(
     make: Annotated[bool, typer.Option("--make", help="Search for them again (minutes) and write them.")] = False,
-    model: Annotated[Path | None, typer.Option(help="Model to search on; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model to search on; the nominal one if left out.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder where --make writes; the package itself if left out.")
     ] = None,
@@ -34,7 +34,7 @@ def gaits(
     from bifa.screen import Console
 
     console = Console()
-    names = [library.load_scenario(name).name for name in only] or list(library.SCENARIOS)
+    names = [library.checked(name) for name in only] or list(library.NAMES)
     if make:
         folder = out or library.FOLDER
         check_targets(folders=(folder,))
@@ -58,7 +58,7 @@ def gaits(
         )
     console.print(table)
     for name in names:
-        console.print(f"{name}: {library.SCENARIOS[name].purpose}", highlight=False)
+        console.print(f"{name}: {library.load(name).purpose}", highlight=False)
     console.print(f"files: {library.FOLDER / 'NAME.toml'}", highlight=False, soft_wrap=True)
 
 
@@ -66,17 +66,17 @@ def _make(console, model_path: Path | None, folder: Path, names: list[str], seed
     from dataclasses import replace
 
     from bifa.cli.optimize import search_progress
-    from bifa.gait import library, optimise, simulations
+    from bifa.gait import optimise, simulations
+    from bifa.gait.library import scenarios
     from bifa.robot import load_model, nominal
 
     model = load_model(model_path) if model_path else nominal()
-    scenarios = [library.load_scenario(name) for name in names]
     folder.mkdir(parents=True, exist_ok=True)
     with simulations() as runs, search_progress(console) as progress:
-        for scenario in scenarios:
+        for scenario in map(scenarios.load_scenario, names):
             settings = replace(scenario.settings, seed=seed)
             optimum = optimise(model, runs, settings, progress(scenario.name))
-            path = library.save(folder, scenario, optimum, model.name)
+            path = scenarios.save(folder, scenario, optimum, model.name)
             console.print(
                 f"{scenario.name}: {optimum.nominal_mm_s:.2f} mm/s, 10th percentile {optimum.quantile_mm_s:.2f} "
                 f"({optimum.simulations} simulations): {path.name}",

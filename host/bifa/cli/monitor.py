@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT
+from bifa.cli._options import PORT, file_option
 
 EPILOG = """Examples:  bifa monitor   |   bifa monitor --run   |   bifa monitor --port virtual --run --seconds 20"""
 
@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 def monitor(
     port: Annotated[str | None, PORT] = None,
-    gait: Annotated[Path | None, typer.Option(help="Upload this gait first.")] = None,
+    gait: Annotated[Path | None, file_option("Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after so long; otherwise Ctrl-C.")] = None,
 ) -> None:
@@ -25,6 +25,10 @@ def monitor(
 
     Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
     """
+    from bifa.rig import check_port
+
+    check_port(port)
+
     from bifa.link import Uno
     from bifa.live.monitor import watch
     from bifa.rig import open_rig

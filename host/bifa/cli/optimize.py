@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bifa import cluster
-from bifa.cli._options import NO_PICTURES, PICTURES, Method
+from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
 
 EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
 bifa optimize --out fast.toml --nominal --method cma   |
@@ -23,7 +23,7 @@ def register(app: typer.Typer) -> None:
 
 def optimize(
     out: Annotated[Path, typer.Option(help="Gait file to write.", show_default=False)],
-    model: Annotated[Path | None, typer.Option(help="Model file; the paper's nominal robot if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model file; the paper's nominal robot if left out.")] = None,
     method: Annotated[Method, typer.Option(help="Of the search; bo is the paper's, and slow.")] = "de",
     robust: Annotated[
         bool, typer.Option("--robust/--nominal", help="Speed that 9 robots in 10 reach, or on the model itself.")
@@ -59,7 +59,7 @@ def optimize(
     check_targets(out, folders=() if no_pictures else (folder,))
 
     from bifa.gait import Settings, paper_space, simulations
-    from bifa.gait.library import provenance
+    from bifa.gait.library.scenarios import provenance
     from bifa.robot import load_model, nominal, save_gait
     from bifa.screen import Console
 

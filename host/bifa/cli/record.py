@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT, stoppable
+from bifa.cli._options import PORT, file_option, stoppable
 
 EPILOG = """Examples:  bifa record --out out/walks --port virtual --gait gait.toml --cycles 10   |
 bifa record --out out/telemetry --seconds 60"""
@@ -20,7 +20,7 @@ def record(
     out: Annotated[Path, typer.Option(help="New folder, or that of an interrupted recording.", show_default=False)],
     port: Annotated[str | None, PORT] = None,
     gait: Annotated[
-        Path | None, typer.Option(help="Gait to walk; otherwise the baseline, or no walk (without instruments).")
+        Path | None, file_option("Gait to walk; otherwise the baseline, or no walk (without instruments).")
     ] = None,
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk (with instruments).")] = 6,
     repeats: Annotated[int, typer.Option(min=1, help="Walks (with instruments).")] = 1,
@@ -33,13 +33,17 @@ def record(
     interrupted is resumed by giving it again.
     """
     from bifa.files import check_targets
+    from bifa.rig import check_port
+
+    check_targets(folders=(out,))
+    check_port(port)
+
     from bifa.live.record import record_telemetry, record_walks
     from bifa.rig import open_rig
     from bifa.robot.gait import BASELINE, read_gait_file
     from bifa.screen import Console
 
     console = Console()
-    check_targets(folders=(out,))
     steps = read_gait_file(gait).gait if gait else BASELINE
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PICTURES, Obstacle
+from bifa.cli._options import PICTURES, Obstacle, file_option
 
 EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk   |
 bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml   |
@@ -18,8 +18,8 @@ def register(app: typer.Typer) -> None:
 
 
 def simulate(
-    model: Annotated[Path | None, typer.Option(help="Model file; the nominal model if left out.")] = None,
-    gait: Annotated[Path | None, typer.Option(help="Gait file; the paper's baseline if left out.")] = None,
+    model: Annotated[Path | None, file_option("Model file; the nominal model if left out.")] = None,
+    gait: Annotated[Path | None, file_option("Gait file; the paper's baseline if left out.")] = None,
     cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = 10,
     inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
     payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
@@ -42,12 +42,14 @@ def simulate(
 
     The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
     """
-    from bifa import robot
     from bifa.files import check_targets, written_into
+
+    check_targets(out, folders=(pictures,))
+
+    from bifa import robot
     from bifa.screen import Console
 
     console = Console()
-    check_targets(out, folders=(pictures,))
     chosen = robot.load_model(model) if model else robot.nominal()
     file = robot.read_gait_file(gait) if gait else robot.GaitFile(robot.BASELINE)
     if file.others:

@@ -17,7 +17,12 @@ def register(app: typer.Typer) -> None:
 
 
 def upload(
-    gait: Annotated[Path, typer.Argument(help="TOML file with period_s, psi12_deg, psi13_deg and the three duties.")],
+    gait: Annotated[
+        Path,
+        typer.Argument(
+            help="TOML file with period_s, psi12_deg, psi13_deg and the three duties.", exists=True, dir_okay=False
+        ),
+    ],
     port: Annotated[str | None, PORT] = None,
     save: Annotated[str | None, typer.Option(help="Keep it on the Uno as a preset of this name.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Then walk until Ctrl-C.")] = False,
@@ -28,6 +33,10 @@ def upload(
     Opening the port restarts an Uno: it stops walking, and comes back with its start preset. At the end of --run all
     valves are off.
     """
+    from bifa.rig import check_port
+
+    check_port(port)
+
     from bifa.link import Uno
     from bifa.live.walk import walk
     from bifa.rig import open_rig

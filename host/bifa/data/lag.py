@@ -7,13 +7,14 @@ derivative explains the bump best is the lag: to some 0.2 ms from trial to trial
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from .dataset import Trial
+
+Motion = Callable[..., np.ndarray]  # (time_s, derivative's order) -> mm/s, as SciPy's splines
 
 LIMIT_S = 3e-3  # between trials: a third of a sample; what a robot does in them shifts it by less than 1 ms
 LIMIT_OF_ALL_S = 9e-3  # a pressure sensor's own filter may well take 8 ms; a whole sample is 10
@@ -39,6 +40,8 @@ def displacement_lag(trial: Trial) -> Lag | None:
     """The lag of a step response or a walk; None where nothing in the trial tells it."""
     if trial.experiment not in ("step_response", "locomotion") or len(trial.time_s) < 4:
         return None
+    from scipy.interpolate import CubicSpline  # slow to import
+
     time_s, (length_mm, pressure_psi) = trial.time_s, _body(trial)
     motion = CubicSpline(time_s, length_mm)
     found = [_of_snap(time_s[k], motion, pressure_psi[k]) for k in _snaps(time_s, motion(time_s, 1))]
@@ -118,7 +121,7 @@ def _snaps(time_s: np.ndarray, speed_mm_s: np.ndarray) -> list[slice]:
     return windows
 
 
-def _of_snap(time_s: np.ndarray, motion: CubicSpline, pressure_psi: np.ndarray) -> tuple[float, float] | None:
+def _of_snap(time_s: np.ndarray, motion: Motion, pressure_psi: np.ndarray) -> tuple[float, float] | None:
     """Lag and standard deviation [s] by least squares over the lag; None where speed does not explain the bump."""
     slow, _ = np.linalg.qr(np.vander(time_s - time_s.mean(), _CURVATURE))
     late_s = np.arange(-REACH_S, REACH_S + _STEP_S / 2, _STEP_S)

@@ -3,25 +3,31 @@
 from bifa.gait import Settings, optimise, simulations
 with simulations() as runs:
     optimum = optimise(model, runs, Settings(robust=True, seed=1))
+
+Names are loaded when they are used: the library of gaits is read without the seconds that the search takes to import.
 """
 
-from bifa.gait.metric import Metric, Passage
-from bifa.gait.search import Optimum, SearchError, Settings, optimise
-from bifa.gait.simulations import simulations
-from bifa.gait.space import SearchSpace, SpaceError, paper_space
-from bifa.gait.uncertainty import UncertaintyError, spread_of
+import importlib
 
-__all__ = [
-    "Metric",
-    "Optimum",
-    "Passage",
-    "SearchError",
-    "SearchSpace",
-    "Settings",
-    "SpaceError",
-    "UncertaintyError",
-    "optimise",
-    "paper_space",
-    "simulations",
-    "spread_of",
-]
+_PLACES = {
+    "Metric": "metric",
+    "Optimum": "search",
+    "Passage": "metric",
+    "SearchError": "search",
+    "SearchSpace": "space",
+    "Settings": "search",
+    "SpaceError": "space",
+    "UncertaintyError": "uncertainty",
+    "optimise": "search",
+    "paper_space": "space",
+    "simulations": "pool",
+    "spread_of": "uncertainty",
+}
+
+__all__ = list(_PLACES)
+
+
+def __getattr__(name: str):
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bifa.gait.metric import Metric, Passage
-from bifa.gait.simulations import Simulations
+from bifa.gait.pool import Simulations
 from bifa.gait.space import SearchSpace
 from bifa.simulate import Plant, gait_rows
 

@@ -11,7 +11,7 @@ from bifa.gait.methods.cma_es import climb
 from bifa.gait.methods.common import Recorder
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
-from bifa.gait.simulations import Simulations
+from bifa.gait.pool import Simulations
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Spread, spread_of
 from bifa.robot.gait import Gait

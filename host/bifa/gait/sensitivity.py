@@ -7,7 +7,7 @@ import numpy as np
 
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, distribution
-from bifa.gait.simulations import Simulations
+from bifa.gait.pool import Simulations
 from bifa.ranges import RANGES
 from bifa.robot.gait import Gait
 from bifa.simulate import Plant, gait_rows

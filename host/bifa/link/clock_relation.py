@@ -7,8 +7,7 @@ is good to 0.5 %.
 
 from collections import deque
 from dataclasses import dataclass
-
-import numpy as np
+from statistics import fmean
 
 LARGEST_DRIFT = 0.01
 EXCHANGES_KEPT = 64
@@ -39,7 +38,7 @@ class ClockRelation:
 
     def to_host(self, uno_s: float) -> HostTime:
         """When the Uno's clock showed `uno_s`; raises ValueError before the first exchange."""
-        low, high = self._extremes(np.array([1.0, uno_s - self._origin()[0]]))
+        low, high = self._extremes((1.0, uno_s - self._origin()[0]))
         return HostTime(self._origin()[1] + (low + high) / 2, (high - low) / 2)
 
     def estimate(self, uno_s: float) -> float:
@@ -59,7 +58,7 @@ class ClockRelation:
     @property
     def drift(self) -> float:
         """How much faster the host's clock runs, as a fraction."""
-        low, high = self._extremes(np.array([0.0, 1.0]))
+        low, high = self._extremes((0.0, 1.0))
         return (low + high) / 2 - 1
 
     @property
@@ -71,14 +70,15 @@ class ClockRelation:
         """Middle of the exchanges: (Uno time, host time)."""
         if not self._exchanges:
             raise ValueError("no exchange of clocks yet")
-        table = np.array(self._exchanges)
-        return float(table[:, 1].mean()), float((table[:, 0] + table[:, 2]).mean() / 2)
+        sent, uno, received = zip(*self._exchanges, strict=True)
+        return fmean(uno), (fmean(sent) + fmean(received)) / 2
 
-    def _extremes(self, objective: np.ndarray) -> tuple[float, float]:
+    def _extremes(self, objective: tuple[float, float]) -> tuple[float, float]:
         """Least and greatest objective . (offset, rate) that all exchanges allow, relative to the origin.
 
         A resonator that warms up bends the line; the exchanges are then widened by as little as makes them agree.
         """
+        import numpy as np
         from scipy.optimize import linprog  # takes half a second, and a console needs it never
 
         uno_0, host_0 = self._origin()
@@ -91,5 +91,5 @@ class ClockRelation:
         slack = linprog([0, 0, 1], rows, limits, bounds=[(None, None), rate, (0, None)]).x[2] * (1 + 1e-9)
         bounds = [(None, None), rate, (0, slack + 1e-12)]
         low = linprog([*objective, 0], rows, limits, bounds=bounds).fun
-        high = -linprog([*-objective, 0], rows, limits, bounds=bounds).fun
+        high = -linprog([-objective[0], -objective[1], 0], rows, limits, bounds=bounds).fun
         return low, high

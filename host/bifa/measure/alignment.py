@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from math import fsum
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from bifa.errors import BifaError
 from bifa.link.uno import MARK_PAUSE
@@ -74,6 +73,8 @@ def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) 
 
     A snap-through lasts a few samples: a cubic through them follows it, a straight line would not.
     """
+    from scipy.interpolate import CubicSpline  # slow to import
+
     return CubicSpline(instrument_s, values)(np.clip(time_s, instrument_s[0], instrument_s[-1]))
 
 

@@ -1,13 +1,14 @@
 """Rigs: what `--port` opens."""
 
 from bifa.rig.ports import SerialPort, serial_ports, uno_ports
-from bifa.rig.rig import Rig, RigError, SerialRig, find_port, is_offered, open_rig
+from bifa.rig.rig import Rig, RigError, SerialRig, check_port, find_port, is_offered, open_rig
 
 __all__ = [
     "Rig",
     "RigError",
     "SerialPort",
     "SerialRig",
+    "check_port",
     "find_port",
     "is_offered",
     "open_rig",

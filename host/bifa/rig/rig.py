@@ -85,6 +85,13 @@ def is_offered(port: str | None) -> bool:
     return port in entry_points(group=ENTRY_POINTS).names
 
 
+def check_port(port: str | None) -> None:
+    """Raise RigError where `port` cannot be one, before anything slow is done."""
+    rigs = entry_points(group=ENTRY_POINTS).names
+    if port is not None and port not in rigs and "/" not in port and not port.upper().startswith("COM"):
+        raise RigError(f"{port!r} is neither a rig (available: {', '.join(sorted(rigs)) or 'none'}) nor a device")
+
+
 def open_rig(port: str | None = None, **options: Any) -> Rig:
     """Open what `port` names: a rig registered under the entry points `bifa.rigs`, a serial port, or, if None, the Uno
     found by its USB identity.
@@ -99,8 +106,7 @@ def open_rig(port: str | None = None, **options: Any) -> Rig:
             if getattr(error, "for_the_user", False):  # a rig cannot know BifaError
                 raise RigError(str(error)) from error
             raise
-    if port is not None and "/" not in port and not port.upper().startswith("COM"):
-        raise RigError(f"{port!r} is neither a rig (available: {', '.join(rigs) or 'none'}) nor a device")
+    check_port(port)
     if options:
         raise RigError(f"{', '.join(options)}: only a virtual rig takes these options")
     return SerialRig(port if port is not None else find_port())

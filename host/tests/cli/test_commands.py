@@ -1,5 +1,6 @@
 """What holds for every command: help, version, names of options, targets checked first, completion, Ctrl-C."""
 
+import json
 import os
 import subprocess
 import sys
@@ -35,28 +36,87 @@ def test_every_command_has_both_helps_and_the_same_names_for_the_same_things(com
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["fit", "nowhere", "--out", "{}/x.toml"],
-        ["fit", "nowhere", "--out", "x.toml", "--pictures", "{}/file/pictures"],
-        ["diagnose", "nowhere", "--json", "{}/x.json"],
-        ["diagnose", "nowhere", "--report", "{}/x.html"],
-        ["optimize", "--model", "nowhere.toml", "--out", "{}/x.toml"],
-        ["simulate", "--model", "nowhere.toml", "--out", "{}/x.csv"],
-        ["check", "nowhere", "--pictures", "{}/file/pictures"],
-        ["campaign", "--out", "{}/file/run"],
-        ["record", "--out", "{}/file/run", "--port", "virtual"],
-        ["gaits", "--make", "--out", "{}/file/gaits"],
-        ["experiment", "all", "--out", "{}/file/bench", "--port", "nowhere"],
+        ["fit", "{day}", "--out", "{missing}/x.toml"],
+        ["fit", "{day}", "--out", "x.toml", "--pictures", "{file}/pictures"],
+        ["diagnose", "{day}", "--json", "{missing}/x.json"],
+        ["diagnose", "{day}", "--report", "{missing}/x.html"],
+        ["optimize", "--model", "{file}", "--out", "{missing}/x.toml"],
+        ["simulate", "--model", "{file}", "--out", "{missing}/x.csv"],
+        ["simulate", "--model", "{file}", "--pictures", "{file}/pictures"],
+        ["check", "{day}", "--pictures", "{file}/pictures"],
+        ["campaign", "--out", "{file}/run", "--port", "nowhere"],
+        ["record", "--out", "{file}/run", "--port", "nowhere"],
+        ["gaits", "--make", "--out", "{file}/gaits", "--model", "{file}"],
+        ["experiment", "all", "--out", "{file}/bench", "--port", "nowhere"],
     ],
-    ids=lambda arguments: f"{arguments[0]} {arguments[-2]}",
+    ids=" ".join,
 )
 def test_where_it_cannot_write_a_command_says_so_before_it_does_anything(tmp_path, arguments):
-    """What it would read does not exist either, and that is not what it complains of."""
-    missing = tmp_path / "missing"
-    if any("/file/" in argument for argument in arguments):
-        missing.mkdir()
-        (missing / "file").write_text("")
-    result = invoke(*(argument.format(missing) for argument in arguments))
+    """What it would read is no data set, model or port either, and that is not what it complains of."""
+    places = {name: tmp_path / name for name in ("day", "file", "missing")}
+    places["day"].mkdir()
+    places["file"].write_text("")
+    result = invoke(*(argument.format(**places) for argument in arguments))
     assert isinstance(result.exception, TargetError), result.output
+
+
+USAGE = [
+    ["check", "nowhere"],
+    ["fit", "nowhere", "--out", "x.toml"],
+    ["diagnose", "nowhere"],
+    ["optimize", "--out", "nowhere/x.toml"],
+    ["optimize", "--out", "x.toml", "--model", "nowhere.toml"],
+    ["optimize", "--out", "x.toml", "--method", "sgd"],
+    ["simulate", "--gait", "nowhere.toml"],
+    ["simulate", "--out", "nowhere/x.csv"],
+    ["upload", "nowhere.toml"],
+    ["record", "--out", "x", "--port", "nowhere"],
+    ["experiment", "all", "--out", "x", "--port", "nowhere"],
+    ["campaign", "--out", "x", "--port", "nowhere"],
+    ["monitor", "--port", "nowhere"],
+    ["console", "--port", "nowhere"],
+    ["rig", "--profile", "perfect"],
+]
+LISTING = [["--help"], ["gaits"], ["doctor"], *([command, "--help"] for command in COMMANDS)]
+SECONDS = {"scipy", "numba", "matplotlib", "cma", "bayes_opt", "jinja2", "prompt_toolkit", "distributed"}
+
+
+_TRIED = """
+import contextlib, io, json, sys
+from bifa.cli import main
+sys.argv[0] = "bifa"
+found = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv[1:] = arguments
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        try:
+            main()
+        except SystemExit as end:
+            status = end.code
+    found.append([status, sorted({name.partition(".")[0] for name in sys.modules})])
+print(json.dumps(found))
+"""
+
+
+def tried(commands, folder) -> list[tuple[int, set[str]]]:
+    """Status of each command, one after the other in one process, and the packages that are imported by its end."""
+    ended = subprocess.run(
+        [sys.executable, "-c", _TRIED, json.dumps(commands)], cwd=folder, capture_output=True, text=True
+    )
+    assert ended.returncode == 0, ended.stderr
+    return [(status, set(packages)) for status, packages in json.loads(ended.stdout)]
+
+
+def test_an_error_of_usage_is_told_before_anything_is_computed_with(tmp_path):
+    for arguments, (status, packages) in zip(USAGE, tried(USAGE, tmp_path), strict=True):
+        assert status == 2, arguments
+        assert packages & (SECONDS | {"numpy"}) == set(), arguments
+
+
+def test_what_only_lists_imports_nothing_that_takes_seconds(tmp_path):
+    for arguments, (status, packages) in zip(LISTING, tried(LISTING, tmp_path), strict=True):
+        assert status in (0, 1), arguments
+        assert packages & SECONDS == set(), arguments
 
 
 def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
@@ -64,7 +124,7 @@ def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("bifa.data.read_dataset", interrupted)
-    result = invoke("check", "day", "--no-pictures")
+    result = invoke("check", ".")
     assert result.exit_code == 130
     assert "stopped; nothing is half-written" in result.output
 

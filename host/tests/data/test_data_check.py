@@ -108,7 +108,7 @@ def test_session_order_given_in_part_or_twice():
 
 def test_the_command_lists_plots_and_warns(tmp_path):
     folder = write_dataset(tmp_path / "set", sound())
-    result = CliRunner().invoke(app, ["check", str(folder)])
+    result = CliRunner().invoke(app, ["check", str(folder), "--pictures", str(tmp_path / "set-pictures")])
     assert result.exit_code == 0, result.output
     assert "12 trials" in result.output
     assert "Nothing looks wrong" in result.output
@@ -117,10 +117,9 @@ def test_the_command_lists_plots_and_warns(tmp_path):
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
     lonely = write_dataset(tmp_path / "lonely", Dataset(None, "one", {}, (make_trial(),)))
-    result = CliRunner().invoke(app, ["check", str(lonely), "--no-pictures", "--strict"])
+    result = CliRunner().invoke(app, ["check", str(lonely), "--strict"])
     assert result.exit_code == 1
     assert "[missing repeats]" in result.output
-    assert not (tmp_path / "lonely-pictures").exists()
 
 
 def test_pictures_on_a_full_disk_end_in_a_sentence_and_leave_none(tmp_path, monkeypatch):
@@ -130,7 +129,7 @@ def test_pictures_on_a_full_disk_end_in_a_sentence_and_leave_none(tmp_path, monk
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
     write_dataset(tmp_path / "day", sound())
-    result = CliRunner().invoke(app, ["check", str(tmp_path / "day")])
+    result = CliRunner().invoke(app, ["check", str(tmp_path / "day"), "--pictures", str(tmp_path / "p")])
     assert isinstance(result.exception, TargetError)
     assert "No space left" in str(result.exception)
     assert [path.name for path in tmp_path.iterdir()] == ["day"]

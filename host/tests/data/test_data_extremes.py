@@ -30,7 +30,7 @@ def put(folder, file: str, row: int, column: int, text: str) -> None:
 
 
 def check(folder):
-    return CliRunner().invoke(app, ["check", "--no-pictures", str(folder)])
+    return CliRunner().invoke(app, ["check", str(folder)])
 
 
 @pytest.mark.parametrize("text", ["1e308", "-1.1e12"])

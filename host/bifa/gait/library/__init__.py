@@ -1,104 +1,48 @@
-"""Gaits for the nominal robot that ship with the package: made by `bifa gaits --make`, never by hand."""
+"""Gaits for the nominal robot that ship with the package: made by `bifa gaits --make`, never by hand.
 
-import tomllib
-from dataclasses import dataclass, field
+To read them takes nothing that is slow to import; how they are found stands in `scenarios`.
+"""
+
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bifa.errors import BifaError
-from bifa.gait.metric import Metric, Passage
-from bifa.gait.search import Optimum, Settings
-from bifa.gait.space import paper_space
-from bifa.robot.gait import Gait, load_gait, save_gait
+from bifa.robot.gait import Gait, load_gait
+from bifa.toml import parse_toml
 
 FOLDER = Path(__file__).parent
+NAMES = ("fast", "robust", "obstacle", "vertical", "backward", "quiet")
 
 
 class LibraryError(BifaError):
-    """A scenario that the library does not have; the text lists those it has."""
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """What a gait is for, and the search that finds it."""
-
-    name: str
-    purpose: str
-    settings: Settings = field(default_factory=Settings)
-
-
-SCENARIOS: dict[str, Scenario] = {
-    scenario.name: scenario
-    for scenario in (
-        Scenario("fast", "the fastest on the model itself; brittle", Settings(robust=False)),
-        Scenario("robust", "the fastest that nine robots in ten reach"),
-        Scenario(
-            "obstacle",
-            "through the paper's 97 mm tunnel: full strokes, so that the supports bend",
-            Settings(metric=Passage(), space=paper_space(period_s=(4.0, 8.0)), evaluations=300),
-        ),
-        Scenario(
-            "vertical",
-            "straight up a pipe",
-            Settings(metric=Metric(inclination_deg=90.0), space=paper_space(period_s=(2.0, 6.0))),
-        ),
-        Scenario("backward", "out again, tail first", Settings(metric=Metric(direction=-1))),
-        Scenario(
-            "quiet",
-            "at most three valve switches in four seconds: a period of 8 s or more",
-            Settings(space=paper_space(period_s=(8.0, 12.0)), evaluations=300),
-        ),
-    )
-}
+    """A gait that the library does not have; the text lists those it has."""
 
 
 @dataclass(frozen=True)
 class LibraryGait:
-    """A gait of the library with what was predicted for it when it was made."""
+    """A gait of the library, what it is for, and what was predicted for it when it was made."""
 
-    scenario: Scenario
+    name: str
+    purpose: str
     gait: Gait
     provenance: dict[str, Any]
 
 
-def load_scenario(name: str) -> Scenario:
-    """The scenario of a name; LibraryError for an unknown one."""
-    if name not in SCENARIOS:
-        raise LibraryError(f"there is no gait {name!r}; the library has {', '.join(SCENARIOS)}")
-    return SCENARIOS[name]
+def checked(name: str) -> str:
+    """`name`, if the library has it; else LibraryError."""
+    if name not in NAMES:
+        raise LibraryError(f"there is no gait {name!r}; the library has {', '.join(NAMES)}")
+    return name
+
+
+def path_of(name: str) -> Path:
+    """The gait file of a scenario, as `bifa upload` takes it."""
+    return FOLDER / f"{checked(name)}.toml"
 
 
 def load(name: str) -> LibraryGait:
     """The gait for a scenario; LibraryError for an unknown one."""
     path = path_of(name)
-    return LibraryGait(SCENARIOS[name], load_gait(path), tomllib.loads(path.read_text("utf-8"))["provenance"])
-
-
-def path_of(name: str) -> Path:
-    """The gait file of a scenario, as `bifa upload` takes it."""
-    return FOLDER / f"{load_scenario(name).name}.toml"
-
-
-def provenance(optimum: Optimum, model_name: str, made_by: str) -> dict[str, Any]:
-    """What a gait file says of its origin: model, search, predicted speeds."""
-    settings = optimum.settings
-    return {
-        "made_by": made_by,
-        "model": model_name,
-        "method": settings.method,
-        "seed": settings.seed,
-        "objective": "10th percentile of the speed" if settings.robust else "speed on the model itself",
-        "evaluations": optimum.evaluations,
-        "simulations": optimum.simulations,
-        "predicted_speed_mm_s": round(optimum.nominal_mm_s, 3),
-        "predicted_10th_percentile_mm_s": round(optimum.quantile_mm_s, 3),
-        "uncertainty": optimum.spread.text,
-    }
-
-
-def save(folder: Path, scenario: Scenario, optimum: Optimum, model_name: str) -> Path:
-    """Write the gait of a scenario into `folder`."""
-    path = folder / f"{scenario.name}.toml"
-    notes = provenance(optimum, model_name, "bifa gaits --make")
-    save_gait(path, optimum.gait, {"scenario": scenario.name, "purpose": scenario.purpose, **notes})
-    return path
+    notes = parse_toml(path.read_text("utf-8"))["provenance"]
+    return LibraryGait(name, notes["purpose"], load_gait(path), notes)
