@@ -110,19 +110,25 @@ def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool
         return False
     made = record.get("artefacts", {})
     intact = all((folder / name).exists() and made.get(name) == digest(folder / name) for name in stage.makes)
-    if stage.by_hand and intact and record.get("settings") != asked["settings"]:
+    if not stage.by_hand:
+        return intact and all(record.get(key) == value for key, value in asked.items())
+    if intact and (differing := _differing(record.get("settings", {}), asked["settings"])):
         raise StageError(
-            f"{', '.join(stage.makes)} in {folder} was measured with {_differing(record, asked)}: run with the same, "
+            f"{', '.join(stage.makes)} in {folder} was measured with {', '.join(differing)}: run with the same, "
             f"name another folder, or measure again with --rerun {stage.name}"
         )
-    counting = ("settings", "inputs") if stage.by_hand else tuple(asked)
-    return intact and all(record.get(key) == asked[key] for key in counting)
+    return intact and record.get("inputs") == asked["inputs"]
 
 
-def _differing(record: dict, asked: dict) -> str:
-    old, new = record.get("settings") or {}, asked["settings"]
-    names = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
-    return ", ".join(f"{name} = {old.get(name)}, not {new.get(name)}" for name in names)
+def _differing(old: Mapping, new: Mapping) -> list[str]:
+    """Settings that both know and that differ, in words; another version may have more or fewer."""
+    found = []
+    for name in old.keys() & new.keys():
+        if isinstance(old[name], Mapping) and isinstance(new[name], Mapping):
+            found += _differing(old[name], new[name])
+        elif old[name] != new[name]:
+            found.append(f"{name} = {old[name]}, not {new[name]}")
+    return sorted(found)
 
 
 def _run(folder: Path, stage: Stage) -> None:

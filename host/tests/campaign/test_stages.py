@@ -114,12 +114,12 @@ def by_hand(text, settings=None):
 
 
 def test_what_somebody_measured_is_measured_again_only_on_request_and_kept_beside(tmp_path, monkeypatch):
-    run_stages(tmp_path, [by_hand("monday")])
+    run_stages(tmp_path, [by_hand("monday", {"effort": {"quick": False}})])
     monkeypatch.setattr("bifa.__version__", "9.9")
-    run_stages(tmp_path, [by_hand("with another version")])
+    run_stages(tmp_path, [by_hand("with another version", {"effort": {"quick": False, "cycles": 7}})])
     assert (tmp_path / "data").read_text() == "monday"
-    with pytest.raises(StageError, match=r"quick = None, not True.*--rerun measure"):
-        run_stages(tmp_path, [by_hand("with other settings", {"quick": True})])
-    run_stages(tmp_path, [by_hand("tuesday", {"quick": True})], rerun=["measure"])
+    with pytest.raises(StageError, match=r"quick = False, not True.*--rerun measure"):
+        run_stages(tmp_path, [by_hand("with other settings", {"effort": {"quick": True}})])
+    run_stages(tmp_path, [by_hand("tuesday", {"effort": {"quick": True}})], rerun=["measure"])
     assert (tmp_path / "data").read_text() == "tuesday"
     assert (tmp_path / "data.earlier-1").read_text() == "monday"
