@@ -10,7 +10,7 @@ from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.link import Uno
 from bifa.measure.locomotion import record_walk
-from bifa.report.walks import Walk, draw_walks
+from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model
 from bifa.robot.gait import Gait
 from bifa.simulate import walk
@@ -85,8 +85,7 @@ def walks_stage(
             Walk(
                 gaits[trial.file.rsplit("_", 1)[0]][0],
                 trial.gait["period_s"],
-                trial.columns,
-                predict(model, trial),
+                {MEASURED: trial.columns, f"{model.name} model": predict(model, trial)},
             )
             for trial in dataset.trials
         ]

@@ -43,9 +43,10 @@ def run_campaign(
 
     from bifa.campaign.bench import Bench
     from bifa.campaign.loop import Effort, campaign
-    from bifa.campaign.page import error_table, prediction_table, speed_table
+    from bifa.campaign.page import prediction_table, speed_table
     from bifa.campaign.progress import stage_progress
     from bifa.campaign.stages import run_stages
+    from bifa.report.diagnosis import noise_table
     from bifa.screen import Console
 
     console = Console()
@@ -60,7 +61,7 @@ def run_campaign(
     if summary["truth"] is not None:
         inside = "; ".join(_sized(name, values) for name, values in summary["truth"].items())
         console.print(f"the seal opened: {inside or 'nothing'}", highlight=False)
-    errors = prediction_table(summary["prediction_error"]), error_table(summary["error"])
+    errors = prediction_table(summary["prediction_error"]), noise_table(summary["error"])
     for table in (*errors, speed_table(summary["gaits"])):
         _print_table(console, table)
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)

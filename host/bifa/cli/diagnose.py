@@ -62,7 +62,7 @@ def diagnose(
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     found = _found(console, measured, robot, good_enough, seed, folder, port, workers)
-    _report(console, measured.name, found, json, out, report)
+    _report(console, measured, found, json, out, report)
 
 
 def _found(console, measured, robot, good_enough, seed: int, resolved: Path | None, port: str | None, workers):
@@ -91,10 +91,11 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
     return found
 
 
-def _report(console, name: str, found, json: Path | None, model: Path | None, page: Path | None) -> None:
+def _report(console, measured, found, json: Path | None, model: Path | None, page: Path | None) -> None:
     """Print the diagnosis, and write what was asked for."""
     from json import dumps
 
+    from bifa.data.dataset import labels_of
     from bifa.identify.completed import completed_model
     from bifa.report.diagnosis import diagnosis_page
     from bifa.report.page import render
@@ -109,7 +110,7 @@ def _report(console, name: str, found, json: Path | None, model: Path | None, pa
     if json is not None:
         json.write_text(dumps(record, indent=2) + "\n")
     if page is not None:
-        page.write_text(render(diagnosis_page(name, record)))
+        page.write_text(render(diagnosis_page(measured.name, record, labels_of(measured))))
         console.print(f"report: {page}", highlight=False)
 
 

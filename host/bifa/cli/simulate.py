@@ -58,10 +58,10 @@ def simulate(
         _write_csv(csv, record.columns)
         console.print(f"channels: {csv}", highlight=False)
     if plot:
-        from bifa.report.walks import Walk, draw_walks
+        from bifa.report.walks import SIMULATED, Walk, draw_walks
 
         title = f"{chosen.name}, {speed_mm_s:.1f} mm/s"
-        draw_walks([Walk(title, file.gait.period_s, record.columns)], plot, cycles)
+        draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], plot)
         console.print(f"picture: {plot}", highlight=False)
 
 

@@ -92,7 +92,7 @@ def draw_front(found: Front, robust_mm_s: tuple[float, float], path: Path) -> No
         axis.plot(found.nominal_mm_s, found.quantile_mm_s, "o", color=palette.before, markersize=4, label="gaits tried")
         x, y = found.nominal_mm_s[best][order], found.quantile_mm_s[best][order]
         axis.plot(x, y, "o-", color=palette.after, markersize=5, label="front")
-        axis.plot(*robust_mm_s, "*", color=palette.predicted, markersize=13, label="the gait chosen")
+        axis.plot(*robust_mm_s, "*", color=palette.ink, markersize=13, label="the gait chosen")
         axis.set_xlabel("speed on the model itself [mm/s]")
         axis.set_ylabel("10th percentile over the uncertain robot [mm/s]")
         axis.legend(loc="lower left")
@@ -108,7 +108,7 @@ def draw_distribution(optimum: Optimum, others: dict[str, np.ndarray], path: Pat
         figure, axis = plt.subplots(figsize=(6.8, 4.4), layout="constrained")
         top = max(optimum.speeds_mm_s.max(), *(speeds.max() for speeds in others.values()), 1.0)
         bins = np.linspace(0, 1.05 * top, 60)
-        for shade, (name, speeds) in zip((palette.before, palette.predicted), others.items(), strict=False):
+        for shade, (name, speeds) in zip((palette.quiet, palette.before), others.items(), strict=False):
             axis.hist(
                 speeds, bins, color=shade, alpha=0.7, label=f"{name}: 10th percentile {np.quantile(speeds, 0.1):.1f}"
             )
