@@ -63,7 +63,7 @@ def run_campaign(
         console.print(f"the seal opened: {inside or 'nothing'}", highlight=False)
     errors = prediction_table(summary["prediction_error"]), noise_table(summary["error"])
     for table in (*errors, speed_table(summary["gaits"])):
-        _print_table(console, table)
+        print_table(console, table)
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
 
 
@@ -71,12 +71,12 @@ def _sized(name: str, values) -> str:
     return f"{name} ({', '.join(f'{key} = {value:.3g}' for key, value in values.items())})"
 
 
-def _print_table(console, content) -> None:
+def print_table(console, content) -> None:
     from rich.table import Table
 
     table = Table(title=content.caption, title_justify="left")
     for i, heading in enumerate(content.columns):
         table.add_column(heading, justify="right" if i else "left")
     for row in content.rows:
-        table.add_row(*row)
+        table.add_row(*(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row))
     console.print(table)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 EPILOG = (
-    """Examples:  bifa fit out/bench --out model.toml   |   bifa fit out/bench --out model.toml --figures out/figures"""
+    """Examples:  bifa fit out/bench --out model.toml   |   bifa fit out/bench --out model.toml --report fit.html"""
 )
 
 
@@ -19,6 +19,7 @@ def fit(
     dataset: Annotated[Path, typer.Argument(help="Folder of the data set.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     model: Annotated[Path | None, typer.Option(help="Model to start from; the nominal one if left out.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with all of it.")] = None,
     figures: Annotated[Path | None, typer.Option(help="Folder for figures like the paper's Figs. 4, 5 and 6.")] = None,
 ) -> None:
     """Identify the model as the paper does (section IV): static loading, step responses, anchor pulls, then everything
@@ -48,6 +49,12 @@ def fit(
         )
     save_model(out, found.model)
     print_report(console, found)
+    if report is not None:
+        from bifa.report.fit import fit_page
+        from bifa.report.page import render
+
+        report.write_text(render(fit_page(found)))
+        console.print(f"report: {report}", highlight=False)
     if figures is not None:
         from bifa.report.identification import draw
 

@@ -20,7 +20,18 @@ def errors_chart(error: Mapping) -> Chart:
     error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
     """
     before, after = _bars(error["before"]), _bars(error["after"])
-    names = [name for name in before if name in after]
+    pairs = {name: (before[name], after[name]) for name in before if name in after}
+    return before_and_after(
+        pairs,
+        error["noise_floor"]["held_out"],
+        "Error of the base model and of the completed one by experiment, on a logarithmic axis",
+    )
+
+
+def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | None, alt: str) -> Chart:
+    """A row a name: the error of the base model and of the completed one, in units of the noise floor."""
+    names = list(pairs)
+    before, after = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
     rows = np.arange(len(names), 0, -1, dtype=float)
     links = [
         Series((BASE, COMPLETED), np.array([before[name], after[name]]), np.array([row, row]), "quiet")
@@ -30,7 +41,6 @@ def errors_chart(error: Mapping) -> Chart:
         Series((BASE,), np.array([before[name] for name in names]), rows, "before", "dots"),
         Series((COMPLETED,), np.array([after[name] for name in names]), rows, "after", "dots"),
     ]
-    floor = error["noise_floor"]["held_out"]
     everything = [*(before[n] for n in names), *(after[n] for n in names), floor or 1.0]
     reach = (0.7 * min(everything), 1.5 * max(everything))
     panel = Panel(
@@ -44,7 +54,7 @@ def errors_chart(error: Mapping) -> Chart:
     return Chart(
         [Column([panel])],
         keys,
-        "Error of the base model and of the completed one by experiment, on a logarithmic axis",
+        alt,
         "1 is the noise floor: no model can predict better than runs of the same condition agree.",
         across=1,
     )

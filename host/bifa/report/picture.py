@@ -40,6 +40,7 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
                 _draw(axis, panel, palette)
             for axis in mine[:-1]:
                 axis.sharex(mine[-1])
+                axis.set_xlabel("")
                 axis.tick_params(labelbottom=False)
         if chart.keys:
             handles = [_handle(key, palette) for key in chart.keys]
@@ -77,6 +78,7 @@ def _draw_series(axis, series: Series, colour: str) -> None:
 def _scale(axis, name: str, one: Axis) -> None:
     if one.log:
         axis.set(**{f"{name}scale": "log"})
+        getattr(axis, f"{name}axis").set_major_formatter("{x:g}")
     if one.range is not None:
         axis.set(**{f"{name}lim": one.range})
     if one.ticks is not None:

@@ -154,7 +154,12 @@ def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
     """Text of the engine with its identifiers in words; `labels`: what trials are called, by file."""
     if labels:
         text = _FILE.sub(lambda found: condition_words(labels.get(found[0], found[0])), text)
-    text = _IDENTIFIER.sub(lambda found: _said(found[0]), text).replace("locomotion", "walking")
+    text = (
+        _IDENTIFIER.sub(lambda found: _said(found[0]), text)
+        .replace("locomotion", "walking")
+        .replace(" x the ", " × the ")
+        .replace("+-", "±")
+    )
     return text[:1].upper() + text[1:]
 
 

@@ -1,10 +1,15 @@
 """A campaign's results of a made-up robot, for pages: nothing is simulated."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 
 from bifa.campaign.page import campaign_page
 from bifa.report.evidence import BASE, COMPLETED
 from bifa.report.walks import MEASURED, Walk
+from bifa.robot import nominal, save_model
+from bifa.robot.gait import BASELINE, save_gait
 
 EFFECT = {
     "name": "hysteresis",
@@ -178,3 +183,19 @@ def page(sealed=True):
     """The campaign's page."""
     made = [("measured", "2026-11-21"), ("command", "bifa campaign --port virtual --seed 0"), ("seed", "0")]
     return campaign_page(summary(sealed), DIAGNOSIS, traces(), walks(), LABELS, "virtual robot 0", made)
+
+
+def finished(folder, area_N_psi=9.0, effects=None):
+    """A campaign as `bifa campaign` leaves it."""
+    folder.mkdir()
+    told = summary()
+    if effects is not None:
+        told |= {"effects": effects, "verdict": "unexplained"}
+    (folder / "summary.json").write_text(json.dumps(told))
+    model = nominal()
+    area = model.parameters["body_area_N_psi"].with_value(area_N_psi, sd=0.01)
+    model = replace(model, parameters={**model.parameters, "body_area_N_psi": area})
+    for which in ("base", "completed"):
+        save_model(folder / f"model-{which}.toml", model)
+        save_gait(folder / f"gait-{which}.toml", BASELINE, {})
+    return folder

@@ -6,6 +6,7 @@ from unicodedata import normalize
 import pytest
 from pypdf import PdfReader
 
+from bifa.campaign.side_by_side import compare_page, read_runs
 from bifa.report.diagnosis import diagnosis_page
 from bifa.report.page import render
 from tests.report import sample
@@ -18,8 +19,10 @@ WIDE, NARROW = 1280, 390
 def pages(tmp_path_factory):
     """Where each page is."""
     folder = tmp_path_factory.mktemp("pages")
+    runs = read_runs([sample.finished(tmp_path_factory.mktemp("runs") / day) for day in ("monday", "tuesday")])
     for name, page in {
         "campaign": sample.page(),
+        "compare": compare_page(runs),
         "diagnosis": diagnosis_page("the bench", sample.DIAGNOSIS, sample.LABELS),
     }.items():
         (folder / f"{name}.html").write_text(render(page))
@@ -60,7 +63,7 @@ def opened(tabs):
     assert complaints == []
 
 
-@pytest.mark.parametrize("name", ["campaign", "diagnosis"])
+@pytest.mark.parametrize("name", ["campaign", "compare", "diagnosis"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 def test_nothing_overlaps_is_cut_off_or_too_pale(opened, name, width, scheme):
