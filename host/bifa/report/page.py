@@ -13,7 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from bifa.report.chart import Chart
-from bifa.report.plot import as_plot, library_source
+from bifa.report.plot import as_plot, library_script
 from bifa.report.style import DARK, LIGHT
 
 
@@ -79,22 +79,23 @@ def render(page: Page) -> str:
     charts = [chart for section in page.sections for chart in section.charts]
     plots = [as_plot(column, chart.height) for chart in charts for column in chart.columns]
     return (
-        _environment()
+        environment()
         .get_template("page.html.jinja")
         .render(
             page=page,
             numbers=iter(range(len(plots))),
             palettes={"light": LIGHT.colours(), "dark": DARK.colours()},
             data=_embedded({"plots": plots, "light": LIGHT.colours(), "dark": DARK.colours()}),
-            style=Markup(_file("page.css")),
-            script=Markup(_file("page.js")),
-            library=_library() if plots else "",
+            style=template_file("page.css"),
+            script=template_file("page.js"),
+            library=library_script() if plots else "",
         )
     )
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """Where this package's templates are found; all text is escaped."""
     return jinja2.Environment(
         loader=jinja2.PackageLoader("bifa.report", "templates"),
         autoescape=True,
@@ -104,16 +105,11 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def _file(name: str) -> str:
-    return files("bifa.report").joinpath("templates", name).read_text(encoding="utf-8")
+def template_file(name: str) -> Markup:
+    """A file of this package that goes into a page as it is."""
+    return Markup(files("bifa.report").joinpath("templates", name).read_text(encoding="utf-8"))
 
 
 def _embedded(value) -> Markup:
     """As JSON that cannot end the element it stands in."""
     return Markup(json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))
-
-
-@cache
-def _library() -> Markup:
-    """The plots' script, without what would end the element that it stands in."""
-    return Markup(re.sub(r"</(?=script)", r"<\\/", library_source(), flags=re.IGNORECASE))

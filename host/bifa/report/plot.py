@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
 from math import log10
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from bifa.report.chart import Axis, Column, Panel, Series
 
@@ -17,9 +20,11 @@ _LEFT_PX, _RIGHT_PX = 62, 10
 _DASHES = {"dashed": "4px,3px", "dotted": "1px,3px"}
 
 
-def library_source() -> str:
-    """plotly.js as the package `plotly` ships it, to be put into the page itself."""
-    return files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8")
+@cache
+def library_script() -> Markup:
+    """plotly.js as the package `plotly` ships it, to be put into a page's script element, which it does not end."""
+    source = files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8")
+    return Markup(re.sub(r"</(?=script)", r"<\\/", source, flags=re.IGNORECASE))
 
 
 def as_plot(column: Column, height: int) -> dict[str, Any]:
