@@ -56,10 +56,10 @@ def run_campaign(
         run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
 
     summary = json.loads((out / "summary.json").read_text())
-    effects = "; ".join(_sized(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
+    effects = "; ".join(_said(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
     console.print(f"verdict: [bold]{summary['verdict']}[/bold], {effects}", highlight=False)
     if summary["truth"] is not None:
-        inside = "; ".join(_sized(name, values) for name, values in summary["truth"].items())
+        inside = "; ".join(_said(name, values) for name, values in summary["truth"].items())
         console.print(f"the seal opened: {inside or 'nothing'}", highlight=False)
     errors = prediction_table(summary["prediction_error"]), noise_table(summary["error"])
     for table in (*errors, speed_table(summary["gaits"])):
@@ -67,8 +67,10 @@ def run_campaign(
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
 
 
-def _sized(name: str, values) -> str:
-    return f"{name} ({', '.join(f'{key} = {value:.3g}' for key, value in values.items())})"
+def _said(name: str, values: Mapping[str, float]) -> str:
+    from bifa.report.words import effect_words
+
+    return effect_words(name, values).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def print_table(console, content) -> None:

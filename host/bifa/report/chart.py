@@ -68,13 +68,15 @@ class Column:
 class Chart:
     """Columns beside one another where there is room. `alt` says in words what it shows.
 
-    across: so many columns beside one another at most. height: of one unit of a panel's height, in pixels.
+    title: above a picture. across: so many columns beside one another at most. height: of one unit of a panel's
+    height, in pixels.
     """
 
     columns: Sequence[Column]
     keys: Sequence[Key]
     alt: str
     caption: str = ""
+    title: str = ""
     across: int = 3
     height: int = 150
 

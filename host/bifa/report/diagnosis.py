@@ -134,14 +134,18 @@ def noise_table(error: Mapping[str, Any]) -> Table:
     labels = {"fitted": "fitted", "held_out": "held-out", "held_out_conditions": "held-out, new conditions"}
     sides = ("before", "after", "noise_floor")
     rows = [
-        [label, *(f"{error[side][what]:.2f}" for side in sides)]
+        [label, *(_noise(error[side].get(what)) for side in sides)]
         for what, label in labels.items()
         if error["before"].get(what) is not None
     ]
     for name in error["before"]["by_experiment"]:
-        rows.append([experiment_words(name), *(f"{error[s]['by_experiment'][name]:.2f}" for s in sides[:2]), "1"])
+        rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1"])
     columns = ["RMS error, in units of the noise floor", "base model", "completed model", "noise floor"]
     return Table(columns, rows, strong_row=1)
+
+
+def _noise(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
 
 
 def next_sentence(coming: Mapping[str, Any]) -> str:

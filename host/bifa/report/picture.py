@@ -31,6 +31,8 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
         )
         for axis in axes.flat:
             axis.set_visible(False)
+        if chart.title:
+            figure.suptitle(chart.title)
         for number, column in enumerate(chart.columns):
             first = number // across * len(heights)
             mine = axes[first : first + len(heights), number % across]

@@ -38,8 +38,13 @@ def _column(trace: Mapping) -> Column:
         Series((key,), *thinned(trace["time_s"], trace[side], 240), colour)
         for key, side, colour in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
     ]
-    title = f"{condition_words(trace['label'])}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
+    title = f"{condition_words(_label(trace))}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
     return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)
+
+
+def _label(trace: Mapping) -> str:
+    """What the trial is called; records of earlier versions have only its file."""
+    return trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
 
 
 def _size(trace: Mapping) -> float:

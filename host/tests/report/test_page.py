@@ -8,7 +8,7 @@ import pytest
 
 from bifa.effects import library
 from bifa.report.animation import FRAMES_PER_S, animate_walks
-from bifa.report.diagnosis import diagnosis_page
+from bifa.report.diagnosis import diagnosis_page, verdict_sentence
 from bifa.report.page import Page, Section, Table, render
 from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
@@ -79,6 +79,20 @@ def test_the_page_says_how_many_robots_do_not_walk(html):
 def test_the_seal_is_explained_where_there_is_one(html):
     assert "keeps it sealed" in text_of(html)
     assert "seal" not in text_of(render(sample.page(sealed=False)))
+
+
+@pytest.mark.parametrize("verdict", ["none", "unexplained"])
+def test_a_verdict_without_an_effect_and_without_held_out_trials_has_its_page(verdict):
+    nothing = {"fitted": 1.2, "held_out": None, "held_out_conditions": None}
+    error = {
+        "before": nothing | {"by_experiment": {"locomotion": 1.2}},
+        "after": nothing | {"by_experiment": {"locomotion": 1.1}},
+        "noise_floor": nothing,
+    }
+    record = sample.DIAGNOSIS | {"verdict": verdict, "effects": [], "learnt": [], "error": error, "nearest": []}
+    page = text_of(render(diagnosis_page("bench", record)))
+    assert verdict_sentence(verdict, [], record["remainder"]) in page
+    assert "None" not in page
 
 
 def test_the_page_is_the_same_bytes_every_time(html):
