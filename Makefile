@@ -31,6 +31,7 @@ demo: setup
 
 test: setup
 	@failed=
+	$(MAKE) $(stamps)/browser || echo "The tests of the pages are skipped: they need a browser"
 	$(bin)/python tools/unity_suites.py native || failed="$$failed native"
 	$(bin)/python tools/unity_suites.py sanitized || failed="$$failed sanitized"
 	$(bin)/python tools/unity_suites.py simavr || failed="$$failed simavr"
@@ -90,7 +91,7 @@ $(stamps)/system: tools/system-packages.sh
 	tools/system-packages.sh build
 	touch $@
 
-$(stamps)/lint $(stamps)/fuzz: tools/system-packages.sh
+$(stamps)/lint $(stamps)/fuzz $(stamps)/browser: tools/system-packages.sh
 	@mkdir -p $(@D)
 	tools/system-packages.sh $(@F)
 	touch $@

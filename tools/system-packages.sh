@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs the Debian packages behind what is missing, or names them in one line where that is not allowed.
 #
-#   tools/system-packages.sh build|avr|lint|fuzz ...
+#   tools/system-packages.sh build|avr|lint|fuzz|browser ...
 #
 # Each need is checked by what the project uses of it, so other distributions pass with their own packages.
 set -eu
@@ -21,6 +21,8 @@ libfuzzer() {
         extern "C" int LLVMFuzzerTestOneInput(const uint8_t*, size_t) { return 0; }' |
         clang++ -x c++ -fsanitize=fuzzer,address,undefined -o /dev/null -
 }
+
+browser() { command -v "${BIFA_CHROMIUM:-chromium}" || command -v chromium-browser || command -v google-chrome; }
 
 for group in "$@"; do
     case $group in
@@ -51,8 +53,11 @@ for group in "$@"; do
         need clang command -v clang++
         need "libclang-rt-$major-dev" libfuzzer
         ;;
+    browser) # tests of the pages
+        need chromium browser
+        ;;
     *)
-        echo "error: $0 knows no group '$group' (build, avr, lint, fuzz)" >&2
+        echo "error: $0 knows no group '$group' (build, avr, lint, fuzz, browser)" >&2
         exit 2
         ;;
     esac

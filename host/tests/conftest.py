@@ -10,12 +10,24 @@ from functools import partial
 import pytest
 from hypothesis import settings
 
+from harness.browser import find_browser, open_browser
+
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 
 # A shell starts what it runs in the background deaf to Ctrl-C, and so would be all that the tests start.
 if threading.current_thread() is threading.main_thread():
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """A browser for the tests of pages; without one they are skipped, and say so."""
+    pytest.importorskip("playwright", reason="playwright is not installed: see host/requirements.in")
+    if find_browser() is None:
+        pytest.skip("no Chromium: install Debian's `chromium` (tools/system-packages.sh browser), or set BIFA_CHROMIUM")
+    with open_browser() as opened:
+        yield opened
 
 
 @pytest.fixture

@@ -1,30 +1,36 @@
 """What a campaign comes to: speeds predicted and measured, errors before and after, and the report."""
 
 import json
+import platform
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
-from bifa.campaign.page import campaign_page
+import bifa
+from bifa.campaign.page import campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import predict, predicted_speed, speeds
-from bifa.data import Trial, read_dataset
+from bifa.data import Dataset, Trial, read_dataset
+from bifa.data.dataset import labels_of
 from bifa.gait import simulations
 from bifa.gait.metric import Metric
 from bifa.gait.objectives import distribution
 from bifa.gait.uncertainty import SPREAD, spread_of
-from bifa.report.evidence import draw_errors
+from bifa.report.evidence import BASE, COMPLETED, errors_chart
 from bifa.report.page import render
-from bifa.report.walks import Walk, draw_walks
+from bifa.report.picture import draw_chart
+from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model, load_model
 from bifa.robot.gait import Gait
 from bifa.simulate import gait_rows
 
 TITLES = {
     "baseline": "baseline gait",
-    "base": "gait from the base model",
-    "completed": "gait from the completed model",
+    "base": "gait found with the base model",
+    "completed": "gait found with the completed model",
 }
 _ROBOTS = 256
 PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3}
@@ -42,15 +48,21 @@ class GaitResult:
     paper: float
 
 
-def compare(sealed: bool) -> Stage:
-    """The stage that makes `summary.json`, `report.html` and its two main figures."""
-    needs = ["model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
+def compare(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
+    """The stage that makes `summary.json`, `report.html`, its two main figures and the walk that moves.
+
+    robot: in words; made: how the campaign was made, for the report."""
+    needs = ["bench", "model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
-    makes = ("summary.json", "walks.png", "errors.png", "report.html")
-    return Stage("compare", "compare and report", tuple(needs), makes, _run)
+    makes = ("summary.json", "walks.png", "errors.png", "walk.svg", "report.html")
+
+    def run(inputs: Path, outputs: Path) -> None:
+        _run(inputs, outputs, robot, made)
+
+    return Stage("compare", "compare and report", tuple(needs), makes, run)
 
 
-def _run(inputs: Path, outputs: Path) -> None:
+def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]]) -> None:
     base, completed = (load_model(inputs / f"model-{which}.toml") for which in ("base", "completed"))
     datasets = [read_dataset(inputs / f"walks-{which}") for which in ("base", "completed")]
     trials = [trial for dataset in datasets for trial in dataset.trials]
@@ -84,19 +96,43 @@ def _run(inputs: Path, outputs: Path) -> None:
         "truth": truth,
     }
     (outputs / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
-    columns = [
-        Walk(TITLES[t.file.rsplit("_", 1)[0]], t.gait["period_s"], t.columns, predict(completed, t))
+    walks = {
+        _gait(t): Walk(
+            TITLES[_gait(t)],
+            t.gait["period_s"],
+            {MEASURED: t.columns, COMPLETED: predict(completed, t), BASE: predict(base, t)},
+        )
         for t in trials
         if t.repeat == 1
-    ]
-    draw_walks(columns, outputs / "walks.png")
-    draw_errors(diagnosis["error"], outputs / "errors.png")
-    (outputs / "report.html").write_text(render(campaign_page(summary, diagnosis, traces, columns)))
+    }
+    draw_walks(list(walks.values()), outputs / "walks.png")
+    draw_chart(errors_chart(diagnosis["error"]), outputs / "errors.png")
+    (outputs / "walk.svg").write_text(motion_of(most_missed(walks), standalone=True)[0])
+    measured = read_dataset(inputs / "bench")
+    page = campaign_page(
+        summary, diagnosis, traces, walks, labels_of(measured), robot, [*_when(measured, datasets), *made, _versions()]
+    )
+    (outputs / "report.html").write_text(render(page))
+
+
+def _gait(trial: Trial) -> str:
+    return trial.file.rsplit("_", 1)[0]
+
+
+def _when(measured: Dataset, walks: Sequence[Dataset]) -> list[tuple[str, str]]:
+    """When the data was measured, by its files, and by which firmware."""
+    day = datetime.fromtimestamp((measured.path / "dataset.toml").stat().st_mtime).date().isoformat()
+    firmware = walks[0].provenance.get("firmware")
+    return [("measured", day), *([("firmware", str(firmware))] if firmware else [])]
+
+
+def _versions() -> tuple[str, str]:
+    return "versions", f"bifa {bifa.__version__}, Python {platform.python_version()}, NumPy {np.__version__}"
 
 
 def _robustness(model: Model, trials: list[Trial]) -> dict[str, list[float]]:
     """Speeds in mm/s of every gait on robots that differ from the model by `SPREAD` in each parameter, sorted."""
-    gaits = {trial.file.rsplit("_", 1)[0]: Gait(**trial.gait) for trial in trials}
+    gaits = {_gait(trial): Gait(**trial.gait) for trial in trials}
     robots = spread_of(model, SPREAD).plants(model, _ROBOTS, 0)
     with simulations() as runs:
         speeds = distribution(runs, robots, gait_rows(list(gaits.values())), Metric())

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from bifa.campaign.about import about
 from bifa.campaign.again import Trades, again
 from bifa.campaign.bench import Bench
 from bifa.campaign.compare import compare
@@ -14,6 +15,7 @@ from bifa.campaign.resolve import joined, resolve
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import measure_walks
 from bifa.data import Dataset, read_dataset, write_dataset
+from bifa.data.dataset import labels_of
 from bifa.gait import Optimum, Settings, optimise, simulations
 from bifa.gait.library.scenarios import provenance
 from bifa.gait.uncertainty import SPREAD
@@ -68,7 +70,7 @@ def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
     ]
     if bench.is_virtual:
         stages.append(_unseal(bench))
-    stages.append(compare(sealed=bench.is_virtual))
+    stages.append(compare(bench.is_virtual, *about(bench, effort)))
     return stages
 
 
@@ -160,14 +162,14 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
         (outputs / "separating").mkdir()
         ran = ()
         if not bench.is_by_hand:
-            _, found, ran = resolve(
+            dataset, found, ran = resolve(
                 dataset, found, diagnosed, lambda n: bench.open(_SEPARATING + n), outputs / "separating", part
             )
         record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
         (outputs / "diagnosis.json").write_text(json.dumps(record, indent=1) + "\n")
         (outputs / "errors.json").write_text(json.dumps(prediction_errors(found), indent=1) + "\n")
-        (outputs / "residuals.json").write_text(json.dumps(residuals(found)) + "\n")
+        (outputs / "residuals.json").write_text(json.dumps(residuals(found, labels_of(dataset))) + "\n")
         save_model(outputs / "model-completed.toml", completed_model(found.final))
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")

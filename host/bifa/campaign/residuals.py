@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -10,9 +12,9 @@ from lacuna.estimation.fit import evaluate_on
 _POINTS = 400  # of a trace, enough for a small figure
 
 
-def residuals(found: Diagnosis) -> list[dict]:
+def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict]:
     """For each held-out condition the channel whose residual shrank most, in standard deviations of the noise, under
-    the base model and the final one; thinned. Plain types."""
+    the base model and the final one; thinned. Plain types. labels: what trials are called, by file."""
     held_out = found.split.held_out
     before, after = evaluate_on(found.base, held_out), evaluate_on(found.final, held_out)
     shown, seen = [], set()
@@ -25,6 +27,7 @@ def residuals(found: Diagnosis) -> list[dict]:
         shown.append(
             {
                 "trial": trial.name,
+                "label": labels.get(trial.name, trial.name),
                 "experiment": trial.experiment,
                 "channel": channel,
                 "time_s": [round(float(t), 3) for t in trial.time_s[keep]],

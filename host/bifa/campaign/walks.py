@@ -12,7 +12,7 @@ from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.link import Uno
 from bifa.measure.locomotion import record_walk
 from bifa.measure.plan import PlannedTrial
-from bifa.report.walks import Walk, draw_walks
+from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model
 from bifa.robot.gait import Gait
 from bifa.simulate import walk
@@ -102,8 +102,7 @@ def walks_stage(
             Walk(
                 gaits[trial.file.rsplit("_", 1)[0]][0],
                 trial.gait["period_s"],
-                trial.columns,
-                predict(model, trial),
+                {MEASURED: trial.columns, f"{model.name} model": predict(model, trial)},
             )
             for trial in dataset.trials
         ]

@@ -75,9 +75,10 @@ def run_campaign(
             bench = _attended(console, bench, watch, bench_file)
 
         from bifa.campaign.loop import Effort, campaign  # slow to import: the person is asked first
-        from bifa.campaign.page import error_table, prediction_table, speed_table
+        from bifa.campaign.page import prediction_table, speed_table
         from bifa.campaign.progress import stage_progress
         from bifa.campaign.stages import run_stages
+        from bifa.report.diagnosis import noise_table
 
         with stage_progress(console) as progress:
             if bench.hands is not None:
@@ -86,14 +87,14 @@ def run_campaign(
             run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
 
     summary = json.loads((out / "summary.json").read_text())
-    effects = "; ".join(_sized(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
+    effects = "; ".join(_said(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
     console.print(f"verdict: [bold]{summary['verdict']}[/bold], {effects}", highlight=False)
     if summary["truth"] is not None:
-        inside = "; ".join(_sized(name, values) for name, values in summary["truth"].items())
+        inside = "; ".join(_said(name, values) for name, values in summary["truth"].items())
         console.print(f"the seal opened: {inside or 'nothing'}", highlight=False)
-    errors = prediction_table(summary["prediction_error"]), error_table(summary["error"])
+    errors = prediction_table(summary["prediction_error"]), noise_table(summary["error"])
     for table in (*errors, speed_table(summary["gaits"])):
-        _print_table(console, table)
+        print_table(console, table)
     for number, one in enumerate(summary["rounds"], 1):
         console.print(
             f"round {number}, a gait that was not fitted: {one['predicted_mm_s']:.2f} mm/s predicted,"
@@ -153,16 +154,18 @@ def _kept(out: Path) -> str:
     return f"{out} keeps {kept}" if kept else "nothing has been finished yet"
 
 
-def _sized(name: str, values) -> str:
-    return f"{name} ({', '.join(f'{key} = {value:.3g}' for key, value in values.items())})"
+def _said(name: str, values: Mapping[str, float]) -> str:
+    from bifa.report.words import effect_words
+
+    return effect_words(name, values).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _print_table(console, content) -> None:
+def print_table(console, content) -> None:
     from rich.table import Table
 
     table = Table(title=content.caption, title_justify="left")
     for i, heading in enumerate(content.columns):
         table.add_column(heading, justify="right" if i else "left")
     for row in content.rows:
-        table.add_row(*row)
+        table.add_row(*(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row))
     console.print(table)

@@ -98,10 +98,11 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
     return found
 
 
-def _report(console, name: str, found, json: Path | None, model: Path | None, page: Path | None) -> None:
+def _report(console, measured, found, json: Path | None, model: Path | None, page: Path | None) -> None:
     """Print the diagnosis, and write what was asked for."""
     from json import dumps
 
+    from bifa.data.dataset import labels_of
     from bifa.files import write_text
     from bifa.identify.completed import completed_model
     from bifa.report.diagnosis import diagnosis_page
@@ -117,7 +118,7 @@ def _report(console, name: str, found, json: Path | None, model: Path | None, pa
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:
-        write_text(page, render(diagnosis_page(name, record)))
+        write_text(page, render(diagnosis_page(measured.name, record, labels_of(measured))))
         console.print(f"report: {page}", highlight=False)
 
 

@@ -8,7 +8,7 @@ import typer
 from bifa.cli._options import DATASET, PICTURES, file_option
 
 EPILOG = """Examples:  bifa fit out/bench --out model.toml   |
-bifa fit out/bench --out model.toml --pictures out/pictures"""
+bifa fit out/bench --out model.toml --report fit.html --pictures out/pictures"""
 
 
 def register(app: typer.Typer) -> None:
@@ -20,15 +20,16 @@ def fit(
     dataset: Annotated[Path, DATASET],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
+    report: Annotated[Path | None, file_option("Write a page (HTML, self-contained) with all of it.")] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
     """Identify the model as the paper does (section IV): static loading, step responses, anchor pulls, then everything
     together. Reports each parameter with its 90 % interval, what the data do not determine, and the error in units of
     the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's Figs. 4 to 6.
     """
-    from bifa.files import check_targets, written_into
+    from bifa.files import check_targets, write_text, written_into
 
-    check_targets(out, folders=(pictures,))
+    check_targets(out, report, folders=(pictures,))
 
     import time
 
@@ -53,6 +54,12 @@ def fit(
         )
     save_model(out, found.model)
     print_report(console, found)
+    if report is not None:
+        from bifa.report.fit import fit_page
+        from bifa.report.page import render
+
+        write_text(report, render(fit_page(found)))
+        console.print(f"report: {report}", highlight=False)
     if pictures is not None:
         from bifa.report.identification import draw
 

@@ -7,7 +7,8 @@ import typer
 
 from bifa.cli._options import PORT, file_option
 
-EPILOG = """Examples:  bifa monitor   |   bifa monitor --run   |   bifa monitor --port virtual --run --seconds 20"""
+EPILOG = """Examples:  bifa monitor   |   bifa monitor --run   |   bifa monitor --port virtual --run --seconds 20   |
+bifa monitor --web --model out/demo/model-completed.toml"""
 
 
 def register(app: typer.Typer) -> None:
@@ -19,9 +20,15 @@ def monitor(
     port: Annotated[str | None, PORT] = None,
     gait: Annotated[Path | None, file_option("Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="On a page in the browser, with sliders for the gait.")] = False,
+    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any that is free.")] = 8765,
+    model: Annotated[Path | None, typer.Option(help="What predicts on the page; the nominal one if left out.")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End after so long; otherwise Ctrl-C.")] = None,
 ) -> None:
     """Watch the robot: pressures with their last seconds, valves, phases, and what the link has lost.
+
+    With --web the page is served on this computer only, at an address that is printed; who has it can change the gait,
+    walk and stop. There is a stop button, which says when the Uno has confirmed.
 
     Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
     """
@@ -45,6 +52,25 @@ def monitor(
 
     with open_rig(port) as rig:
         try:
-            watch(Uno(rig.transport, rig.clock), rig.clock, Console(), seconds, begin)
+            if web:
+                _fly(rig, Console(), web_port, model, seconds, begin)
+            else:
+                watch(Uno(rig.transport, rig.clock), rig.clock, Console(), seconds, begin)
         except KeyboardInterrupt:
             typer.echo("valves off")
+
+
+def _fly(rig, console, port: int, model: Path | None, seconds: float | None, begin) -> None:
+    """Serve the page and fly until Ctrl-C or for `seconds`."""
+    from bifa.link import Uno
+    from bifa.live.web.pilot import Pilot
+    from bifa.live.web.server import LivePage, served
+    from bifa.report.live_page import live_page
+    from bifa.robot import load_model, nominal
+
+    robot = load_model(model) if model else nominal()
+    pilot = Pilot(Uno(rig.transport, rig.clock), rig.clock, getattr(rig.instruments, "position_mm", None))
+    page = LivePage(pilot, live_page(), robot)
+    with served(page, port) as address:
+        console.print(f"page: {address.url}   (Ctrl-C ends it, and the robot stops)", highlight=False, soft_wrap=True)
+        pilot.fly(page.tell, seconds, begin)

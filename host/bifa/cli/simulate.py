@@ -63,11 +63,11 @@ def simulate(
         _write_csv(out, record.columns)
         console.print(f"channels: {out}", highlight=False)
     if pictures:
-        from bifa.report.walks import Walk, draw_walks
+        from bifa.report.walks import SIMULATED, Walk, draw_walks
 
         title = f"{chosen.name}, {speed_mm_s:.1f} mm/s"
         with written_into(pictures) as aside:
-            draw_walks([Walk(title, file.gait.period_s, record.columns)], aside / "walk.png", cycles)
+            draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
         console.print(f"picture: {pictures / 'walk.png'}", highlight=False)
 
 

@@ -90,3 +90,8 @@ class Dataset:
         for trial in self.trials:
             groups.setdefault(trial.condition, []).append(trial)
         yield from (tuple(group) for group in groups.values())
+
+
+def labels_of(dataset: Dataset) -> dict[str, str]:
+    """What each trial is called in a few words, its repeat among them, by file."""
+    return {trial.file: f"{trial.label} (run {trial.repeat})" for trial in dataset.trials}

@@ -5,8 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bifa.report.evidence import draw_errors, draw_learnt, draw_probabilities
-from bifa.report.page import Page, Section, Table, both_palettes
+from bifa.report.evidence import errors_chart, learnt_chart
+from bifa.report.page import Page, Section, Table
+from bifa.report.words import (
+    effect_parameter,
+    effect_words,
+    experiment_words,
+    parameter_words,
+    quantity,
+    spoken,
+)
+
+BASE_MODEL = "The base model is the paper's, with its parameters fitted to this robot."
+COMPLETED_MODEL = "The completed model has what was found added to it, and was fitted anew."
+NOISE_FLOOR = "The noise floor is how far two runs of the same condition are apart anyway: no model can be nearer."
+HELD_OUT = "Held-out trials were measured, but neither model was fitted to them."
+
+Labels = Mapping[str, str]
 
 
 def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
@@ -15,67 +30,145 @@ def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remaind
         return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
     if verdict == "unexplained":
         return "The base model lacks something that no effect of the library accounts for."
-    names = _names([effect["name"] for effect in effects])
-    closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap"
-    rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
-    return f"What the base model lacks is {names}, which closes {closed}{rest}."
+    names = " and ".join(effect_words(effect["name"], effect["parameters"]) for effect in effects)
+    closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap to the noise floor"
+    rest = "what is left still matters" if remainder["matters"] else "nothing that matters is left"
+    return f"What the base model lacks is {names}: that closes {closed}, and {rest}."
 
 
-def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
-    """The page for a record of `bifa diagnose --json`."""
-    error, effects = record["error"], record["effects"]
-    lead = verdict_sentence(record["verdict"], effects, record["remainder"])
-    facts = [
-        (f"{error['before']['held_out']:.2f}", "error of the base model on trials not fitted, in units of the noise"),
-        (f"{error['after']['held_out']:.2f}", "after"),
-        (f"{error['noise_floor']['held_out']:.2f}", "noise floor"),
-    ]
-    errors = both_palettes(
-        lambda stream, dark: draw_errors(error, stream, dark), "error before and after by experiment, on a log axis"
+def diagnosis_page(name: str, record: Mapping[str, Any], labels: Labels | None = None) -> Page:
+    """The page for a record of `bifa diagnose --json`; `labels`: what trials are called, by file."""
+    effects = record["effects"]
+    return Page(
+        f"Diagnosis of {name}",
+        verdict_sentence(record["verdict"], effects, record["remainder"]),
+        lacking(record, labels) + further(record, labels),
+        (BASE_MODEL, COMPLETED_MODEL, NOISE_FLOOR, HELD_OUT),
+        (noise_table(record["error"]),),
     )
-    sections = [
-        Section("Where the residual lives", (record["signature"]["text"],)),
-        Section("Error before and after", figures=(errors,)),
-    ]
+
+
+def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[Section]:
+    """What was found, and how far each model is off."""
+    effects = record["effects"]
+    found = []
     if effects:
-        evidence = both_palettes(
-            lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
-        )
-        rows = [
-            (effect["name"].replace("_", " "), _sized(effect), f"{100 * effect['share_of_gap']:.0f} %")
-            for effect in effects
-        ]
-        table = Table(("effect", "parameters, with 90 % intervals", "of the gap"), rows)
-        sections.insert(0, Section("Evidence", tables=(table,), figures=(evidence,)))
-        sections.append(Section("What the named effects leave", (record["remainder"]["text"],)))
-    if record["nearest"]:
-        rows = [
-            (" + ".join(r["effects"]).replace("_", " "), f"{100 * r['share_of_gap']:.0f} %") for r in record["nearest"]
-        ]
-        sections.append(Section("Also tried", tables=(Table(("explanation", "of the gap that it would close"), rows),)))
+        found.append(Section("What was found", found_sentences(effects), (effects_table(effects),)))
+    found.append(Section("Where the base model is off", (spoken(record["signature"]["text"], labels),)))
+    found.append(Section("Error before and after", charts=[errors_chart(record["error"])]))
+    return found
+
+
+def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
+    """How much each effect explains, how probable it is, and what else it could be."""
+    said = ["The gap is what the base model is further off than the noise floor, on held-out trials."]
+    for effect in effects:
+        name = effect_words(effect["name"])
+        sentence = f"{name[:1].upper()}{name[1:]} closes {_percent(effect['share_of_gap'])} of it"
+        if effect["probability"] is not None:
+            sentence += f"; its probability is {effect['probability']:.2f}"
+        if effect["confusable_with"]:
+            others = " or ".join(effect_words(other) for other in effect["confusable_with"])
+            sentence += f", and this data cannot tell it from {others}"
+        said.append(f"{sentence}.")
+    return said
+
+
+def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Section]:
+    """What is left, what else was tried, what to heed and what to measure next: only what there is."""
+    sections = []
+    if record["learnt"]:
+        said = [f"Added to the model: {curve['term']}, a curve over {curve['variable']}." for curve in record["learnt"]]
+        sections.append(Section("Learnt from the data", said, charts=[learnt_chart(c) for c in record["learnt"]]))
+    if record["effects"]:
+        sections.append(Section("What the named effects leave", (spoken(record["remainder"]["text"], labels),)))
+    if tried := nearest_table(record):
+        sections.append(Section("Also tried", tables=(tried,)))
     if record["warnings"]:
-        sections.append(Section("Before you believe it", tuple(record["warnings"])))
-    for curve in record["learnt"]:
-        text = f"Added to the model: a curve for {curve['term']}."
-        figure = both_palettes(
-            lambda stream, dark, curve=curve: draw_learnt(curve, stream, dark), f"the curve over {curve['variable']}"
-        )
-        sections.append(Section("Learnt from the data", (text,), figures=(figure,)))
-    hidden = record["not_detectable_here"]
-    if hidden:
-        sections.append(Section("Not detectable in this data", (", ".join(hidden),)))
-    coming = record["next_experiment"]
-    if coming["experiment"]:
-        settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
-        text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
-        sections.append(Section("Next experiment", (text,)))
-    return Page(f"Diagnosis of {name}", lead, facts, sections)
+        sections.append(Section("Before you believe it", [spoken(line, labels) for line in record["warnings"]]))
+    if record["not_detectable_here"]:
+        hidden = ", ".join(effect_words(name) for name in record["not_detectable_here"])
+        sections.append(Section("Not detectable in this data", (f"{hidden}.",)))
+    if record["next_experiment"]["experiment"]:
+        sections.append(Section("Next experiment", (next_sentence(record["next_experiment"]),)))
+    return sections
 
 
-def _sized(effect: Mapping[str, Any]) -> str:
-    ends = effect["interval_90"]
-    return ", ".join(f"{k} = {v:g} ({ends[k][0]:g} to {ends[k][1]:g})" for k, v in effect["parameters"].items())
+def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> Table:
+    """Every number of every effect with its interval; `truth`: what the seal held, beside it."""
+    rows = []
+    names = dict.fromkeys([*(effect["name"] for effect in effects), *(truth or {})])
+    found = {effect["name"]: effect for effect in effects}
+    for name in names:
+        mine, true = found.get(name), (truth or {}).get(name, {})
+        for key in dict.fromkeys([*(mine["parameters"] if mine else ()), *true]):
+            meaning, unit = effect_parameter(name, key)
+            value, ends = ("not found", "") if mine is None else _sized(mine, key, unit)
+            row = [f"{effect_words(name)}: {meaning}", value, ends]
+            rows.append(row + ([quantity(true[key], unit, 3) if key in true else "not in it"] if truth else []))
+    columns = ["", "found", "90 % interval", *(["in the seal"] if truth is not None else [])]
+    return Table(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
 
 
-def _names(effects: Sequence[str]) -> str:
-    return " and ".join(effects).replace("_", " ")
+def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
+    value, (low, high) = effect["parameters"][key], effect["interval_90"][key]
+    ends = "" if low is None or high is None else f"{quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
+    return quantity(value, unit, 3), ends
+
+
+def nearest_table(record: Mapping[str, Any]) -> Table | None:
+    """Explanations that were not chosen, and what each would close."""
+    rows = [
+        (" and ".join(effect_words(name) for name in near["effects"]), _percent(near["share_of_gap"]))
+        for near in sorted(record["nearest"], key=lambda near: -(near["share_of_gap"] or 0.0))
+    ]
+    return Table(("explanation", "of the gap that it alone would close"), rows) if rows else None
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100 * share:.0f} %" if share >= 0.005 else "under 1 %"
+
+
+def noise_table(error: Mapping[str, Any]) -> Table:
+    """Errors before and after, of fitted and held-out trials and by experiment, against the floor."""
+    labels = {"fitted": "fitted", "held_out": "held-out", "held_out_conditions": "held-out, new conditions"}
+    sides = ("before", "after", "noise_floor")
+    rows = [
+        [label, *(_noise(error[side].get(what)) for side in sides)]
+        for what, label in labels.items()
+        if error["before"].get(what) is not None
+    ]
+    for name in error["before"]["by_experiment"]:
+        rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1"])
+    columns = ["RMS error, in units of the noise floor", "base model", "completed model", "noise floor"]
+    return Table(columns, rows, strong_row=1)
+
+
+def _noise(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"
+
+
+def next_sentence(coming: Mapping[str, Any]) -> str:
+    """The experiment that would tell apart what this data cannot."""
+    separated = " from ".join(effect_words(name) for name in coming["separates"])
+    return f"A further experiment would tell {separated}: {settings_words(coming)}."
+
+
+def settings_words(experiment: Mapping[str, Any]) -> str:
+    """ "static loading, large, 4 psi, 2 mm/s"."""
+    said = [experiment_words(experiment["experiment"])]
+    for key, value in experiment["settings"].items():
+        inner = value if isinstance(value, Mapping) else {key: value}
+        said += [_setting_words(name, of) for name, of in inner.items()]
+    return ", ".join(said)
+
+
+def _setting_words(name: str, value: Any) -> str:
+    return f"{parameter_words(name)} {value:g}{_unit_behind(name)}" if isinstance(value, float | int) else str(value)
+
+
+def _unit_behind(key: str) -> str:
+    for ending, unit in (("_mm_s", " mm/s"), ("_psi", " psi"), ("_deg", "°"), ("_s", " s")):
+        if key.endswith(ending):
+            return unit
+    return ""

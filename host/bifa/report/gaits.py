@@ -1,5 +1,6 @@
 """The optimiser's figures: what it changed (the paper's Fig. 7), sensitivity, front, distribution."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,24 +11,29 @@ from bifa.gait.search import Optimum
 from bifa.gait.sensitivity import Front, Scan
 from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, figure_style
 
-_SHOWN_CYCLES = 3
+_SHOWN_CYCLES = 3  # of the slower gait
+_SETTLED = CYCLES - 2  # cycles of a record, from rest
+_BESIDE = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
 
 
 def draw_changes(before: Anatomy, after: Anatomy, path: Path, titles: tuple[str, str]) -> None:
-    """Two gaits side by side, settled: CPG outputs, pressures, displacement; the reasons underneath."""
+    """Two gaits side by side, settled, over the same time: CPG outputs, pressures, displacement; the reasons
+    underneath."""
+    periods = [anatomy.gait.period_s for anatomy in (before, after)]
+    horizon_s = min(_SHOWN_CYCLES * max(periods), _SETTLED * min(periods))
     with figure_style() as palette:
         import matplotlib.pyplot as plt
 
-        figure, axes = plt.subplots(3, 2, figsize=(11, 8.2), sharex="col", sharey="row", height_ratios=(1.0, 1.3, 1.5))
+        figure, axes = plt.subplots(3, 2, figsize=(11, 8.2), sharex=True, sharey="row", height_ratios=(1.0, 1.3, 1.5))
         for column, anatomy, title in zip(axes.T, (before, after), titles, strict=True):
-            _draw_gait(column, anatomy, palette)
+            _draw_gait(column, anatomy, horizon_s, palette)
             column[0].set_title(f"{title}: {anatomy.speed_mm_s:.1f} mm/s")
         axes[0, 0].set_yticks([0.4, 1.6, 2.8], CHAMBERS)
         axes[0, 0].set_ylabel("CPG output")
         axes[1, 0].set_ylabel("pressure [psi]")
         axes[2, 0].set_ylabel("displacement [mm]")
-        axes[1, 0].legend(loc="lower right", ncols=3)
-        axes[2, 0].legend(loc="upper left")
+        axes[1, 1].legend(**_BESIDE)
+        axes[2, 1].legend(**_BESIDE)
         figure.tight_layout(rect=(0, 0.085, 1, 1))
         text = "\n".join(reasons(before, after))
         figure.text(0.02, 0.005, text, fontsize=7.5, va="bottom", wrap=True)
@@ -35,11 +41,11 @@ def draw_changes(before: Anatomy, after: Anatomy, path: Path, titles: tuple[str,
         plt.close(figure)
 
 
-def _draw_gait(axes, anatomy: Anatomy, palette) -> None:
+def _draw_gait(axes, anatomy: Anatomy, horizon_s: float, palette) -> None:
     outputs, pressures, displacement = axes
     record, gait = anatomy.record, anatomy.gait
-    start = (CYCLES - _SHOWN_CYCLES) * gait.period_s
-    shown = record["time_s"] >= start
+    start = (CYCLES - min(_SETTLED, math.ceil(horizon_s / gait.period_s))) * gait.period_s
+    shown = (record["time_s"] >= start) & (record["time_s"] <= start + horizon_s)
     time = record["time_s"][shown] - start
     for row, chamber in enumerate(CHAMBERS):
         on = record[f"command_{chamber}"][shown] == 1
@@ -76,7 +82,7 @@ def draw_sensitivity(scans: Sequence[Scan], path: Path) -> None:
             axis.set_xlabel(f"{scan.name}, room {scan.room[0]:.4g} to {scan.room[1]:.4g} {scan.unit}".rstrip())
         for axis in axes[:, 0]:
             axis.set_ylabel("settled speed [mm/s]")
-        axes[0, 0].legend(loc="lower center")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
         figure.savefig(path)
         plt.close(figure)
 
@@ -92,10 +98,10 @@ def draw_front(found: Front, robust_mm_s: tuple[float, float], path: Path) -> No
         axis.plot(found.nominal_mm_s, found.quantile_mm_s, "o", color=palette.before, markersize=4, label="gaits tried")
         x, y = found.nominal_mm_s[best][order], found.quantile_mm_s[best][order]
         axis.plot(x, y, "o-", color=palette.after, markersize=5, label="front")
-        axis.plot(*robust_mm_s, "*", color=palette.predicted, markersize=13, label="the gait chosen")
+        axis.plot(*robust_mm_s, "*", color=palette.ink, markersize=13, label="the gait chosen")
         axis.set_xlabel("speed on the model itself [mm/s]")
         axis.set_ylabel("10th percentile over the uncertain robot [mm/s]")
-        axis.legend(loc="lower left")
+        figure.legend(loc="outside upper left", ncols=3)
         figure.savefig(path)
         plt.close(figure)
 
@@ -108,7 +114,7 @@ def draw_distribution(optimum: Optimum, others: dict[str, np.ndarray], path: Pat
         figure, axis = plt.subplots(figsize=(6.8, 4.4), layout="constrained")
         top = max(optimum.speeds_mm_s.max(), *(speeds.max() for speeds in others.values()), 1.0)
         bins = np.linspace(0, 1.05 * top, 60)
-        for shade, (name, speeds) in zip((palette.before, palette.predicted), others.items(), strict=False):
+        for shade, (name, speeds) in zip((palette.quiet, palette.before), others.items(), strict=False):
             axis.hist(
                 speeds, bins, color=shade, alpha=0.7, label=f"{name}: 10th percentile {np.quantile(speeds, 0.1):.1f}"
             )
@@ -117,6 +123,6 @@ def draw_distribution(optimum: Optimum, others: dict[str, np.ndarray], path: Pat
         axis.axvline(optimum.quantile_mm_s, color=palette.after, linewidth=1)
         axis.set_xlabel(f"settled speed [mm/s], {optimum.spread.text}")
         axis.set_ylabel(f"robots of {optimum.speeds_mm_s.size}")
-        axis.legend(loc="upper left")
+        figure.legend(loc="outside upper left")
         figure.savefig(path)
         plt.close(figure)

@@ -47,15 +47,15 @@ class _Pair:
         self.above.plot(x, modelled, color=colour, lw=1.0, label=label)
         self.below.plot(x, measured - modelled, color=colour, alpha=0.6, lw=0.5)
 
-    def legend(self, palette: Palette, **place) -> None:
-        """Each label once, and which line is which."""
+    def legend(self, palette: Palette) -> None:
+        """Each label once, and which line is which; beside the curves."""
         from matplotlib.lines import Line2D
 
         handles, labels = self.above.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         unique["measured"] = Line2D([], [], color=palette.ink, alpha=0.35, lw=2.4)
         unique["model"] = Line2D([], [], color=palette.ink, lw=1.0)
-        self.above.legend(unique.values(), unique.keys(), **place)
+        self.above.legend(unique.values(), unique.keys(), loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _axes(heights: Sequence[float], columns: int, width: float = 5.2):
@@ -139,7 +139,7 @@ def _anchor(pairs, palette: Palette, path: Path) -> None:
         force.add(pulled_mm, trial.channels["force_N"], prediction["force_N"], colours[psi], f"{psi:.3g} psi")
     above.set(ylabel="anchoring force [N]")
     below.set(xlabel="pulled distance [mm]")
-    force.legend(palette, loc="upper left", bbox_to_anchor=(1.0, 1.0))  # the curves leave no room
+    force.legend(palette)
     _save(figure, path)
 
 

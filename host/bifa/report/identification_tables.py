@@ -9,7 +9,7 @@ from bifa.screen import Console
 from lacuna.estimation.uncertainty import effective_samples
 
 _CORRELATED = 0.9
-_AS_NOISE = 1.1  # an error of so many times the noise is noise
+AS_NOISE = 1.1  # an error of so many times the noise is noise
 
 
 def print_report(console: Console, found: Identification) -> None:
@@ -61,7 +61,7 @@ def remarks(found: Identification) -> list[str]:
     for experiment, names in needs.items():
         lines.append(f"Not determined by this data: {', '.join(names)}. What would determine it: {experiment}.")
     (experiment, channel), worst = max(found.error.items(), key=lambda item: item[1])
-    if worst > _AS_NOISE:
+    if worst > AS_NOISE:
         lines.append(
             f"The model does not describe this data: its error is {worst:.1f} times the noise in {channel} of "
             f"{experiment}. The intervals do not allow for that; `bifa diagnose` looks for what the model lacks."

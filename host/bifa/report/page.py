@@ -1,82 +1,115 @@
-"""A self-contained HTML page: text, tables, figures in light and dark; no script, no network."""
+"""A self-contained HTML page: text, tables, plots that can be zoomed; no network, and no other file."""
 
-import base64
-from collections.abc import Callable, Sequence
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
+from functools import cache
+from importlib.resources import files
 
 import jinja2
+from markupsafe import Markup
 
-
-@dataclass(frozen=True)
-class Figure:
-    """A drawing in both palettes; `alt` says in words what it shows."""
-
-    light_png: bytes
-    dark_png: bytes
-    alt: str
-    caption: str = ""
-
-    @property
-    def light(self) -> str:
-        return _data_uri(self.light_png)
-
-    @property
-    def dark(self) -> str:
-        return _data_uri(self.dark_png)
+from bifa.report.chart import Chart
+from bifa.report.plot import as_plot, library_script
+from bifa.report.style import DARK, LIGHT
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of text under column heads; columns after the first are figures and set to the right."""
+    """Rows of text under column heads; columns after the first are figures and set to the right.
+
+    words: the last column is text, and set to the left.
+    """
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str = ""
     strong_row: int | None = None
+    words: bool = False
 
 
 @dataclass(frozen=True)
 class Section:
-    """One heading with its paragraphs, then what it shows. `svg` is trusted markup made by this package."""
+    """One heading with its paragraphs, then what it shows. `motion` is trusted markup made by this package."""
 
     title: str
     paragraphs: Sequence[str] = ()
     tables: Sequence[Table] = ()
-    figures: Sequence[Figure] = ()
-    svg: str = ""
+    charts: Sequence[Chart] = ()
+    motion: Motion | None = None
+    links: Sequence[tuple[str, str]] = ()
+
+    @property
+    def anchor(self) -> str:
+        """Its name in a link."""
+        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """An animation: an SVG that runs by itself, so many seconds long. `keys` say what its colours are."""
+
+    svg: str
+    seconds: float
+    caption: str
 
 
 @dataclass(frozen=True)
 class Page:
-    """lead: the answer in one or two sentences; facts: (figure, what it is) pairs beside it."""
+    """The first screen, then sections, which the contents list.
+
+    lead: the answer in one or two sentences; words: what the words in it and in the tables mean; about: date, command
+    and the like, by name.
+    """
 
     title: str
     lead: str
-    facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
-    footer: str = ""
-
-
-def both_palettes(draw: Callable[[BytesIO, bool], None], alt: str, caption: str = "") -> Figure:
-    """A figure from `draw(stream, dark)`, which writes a PNG."""
-    light, dark = BytesIO(), BytesIO()
-    draw(light, False)
-    draw(dark, True)
-    return Figure(light.getvalue(), dark.getvalue(), alt, caption)
+    words: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    about: Sequence[tuple[str, str]] = ()
+    links: Sequence[tuple[str, str]] = ()
 
 
 def render(page: Page) -> str:
     """The page as one HTML document; all text is escaped."""
-    environment = jinja2.Environment(
+    charts = [chart for section in page.sections for chart in section.charts]
+    plots = [as_plot(column, chart.height) for chart in charts for column in chart.columns]
+    return (
+        environment()
+        .get_template("page.html.jinja")
+        .render(
+            page=page,
+            numbers=iter(range(len(plots))),
+            palettes={"light": LIGHT.colours(), "dark": DARK.colours()},
+            data=_embedded({"plots": plots, "light": LIGHT.colours(), "dark": DARK.colours()}),
+            style=template_file("page.css"),
+            script=template_file("page.js"),
+            library=library_script() if plots else "",
+        )
+    )
+
+
+@cache
+def environment() -> jinja2.Environment:
+    """Where this package's templates are found; all text is escaped."""
+    return jinja2.Environment(
         loader=jinja2.PackageLoader("bifa.report", "templates"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.get_template("page.html.jinja").render(page=page)
 
 
-def _data_uri(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode()
+def template_file(name: str) -> Markup:
+    """A file of this package that goes into a page as it is."""
+    return Markup(files("bifa.report").joinpath("templates", name).read_text(encoding="utf-8"))
+
+
+def _embedded(value) -> Markup:
+    """As JSON that cannot end the element it stands in."""
+    return Markup(json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))

@@ -1,43 +1,52 @@
 """Small multiples of residuals: where they live, before and after an effect was added."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 
-from bifa.report.style import figure_style
+from bifa.report.chart import Axis, Chart, Column, Panel, Series, thinned
+from bifa.report.evidence import BASE, COMPLETED, MODEL_KEYS
+from bifa.report.words import channel_words, condition_words
 
-_COLUMNS = 3
-
-
-def draw_residuals(traces: Sequence[Mapping], path: Path | BytesIO, dark: bool = False) -> None:
-    """One small figure a condition; `traces` as in residuals.json: time_s, before, after, in units of the noise."""
-    rows = max(1, int(np.ceil(len(traces) / _COLUMNS)))
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axes = plt.subplots(rows, _COLUMNS, figsize=(9.0, 1.55 * rows), squeeze=False, layout="constrained")
-        for axis in axes.flat[len(traces) :]:
-            axis.set_visible(False)
-        for axis, trace in zip(axes.flat, traces, strict=False):
-            axis.plot(trace["time_s"], trace["before"], color=palette.before, linewidth=1.0, label="base model")
-            axis.plot(trace["time_s"], trace["after"], color=palette.after, linewidth=0.8, label="completed model")
-            axis.set_title(_title(trace), fontsize=7.5, loc="left")
-            axis.tick_params(labelsize=7)
-        for axis in axes[:, 0]:
-            axis.set_ylabel("noise sd", fontsize=7.5)
-        for axis in axes.flat[max(0, len(traces) - _COLUMNS) : len(traces)]:
-            axis.set_xlabel("time, s", fontsize=7.5)
-        handles, labels = axes.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=2)
-        figure.savefig(path, format=path.suffix[1:] if isinstance(path, Path) else "png")
-        plt.close(figure)
+_QUANTITIES = ("force", "displacement", "pressure")
 
 
-def _title(trace: Mapping) -> str:
-    name = trace["trial"].removesuffix(".csv").rsplit("_", 1)[0].replace("_", " ")
-    if trace["experiment"] == "locomotion":
-        name = "walk, period " + name.split()[1]
-    what = trace["channel"].rsplit("_", 1)[0].replace("_", " ")
-    return f"{name}: {what}"
+def residual_charts(traces: Sequence[Mapping]) -> dict[str, Chart]:
+    """By quantity, the one that the base model misses most first: a small plot a condition, the worst first.
+
+    traces: as in residuals.json: label, channel, time_s, before, after, in units of the noise floor.
+    """
+    groups = {q: [t for t in traces if t["channel"].startswith(q)] for q in _QUANTITIES}
+    groups = {q: sorted(mine, key=_size, reverse=True) for q, mine in groups.items() if mine}
+    return {q: _chart(q, groups[q]) for q in sorted(groups, key=lambda q: _size(groups[q][0]), reverse=True)}
+
+
+def _chart(what: str, traces: Sequence[Mapping]) -> Chart:
+    return Chart(
+        [_column(trace) for trace in traces],
+        MODEL_KEYS,
+        f"Measured minus predicted {what} over time in each condition, before and after",
+        "Measured minus predicted, in standard deviations of the noise; each plot has its own scale.",
+        height=110,
+    )
+
+
+def _column(trace: Mapping) -> Column:
+    series = [
+        Series((key,), *thinned(trace["time_s"], trace[side], 240), colour)
+        for key, side, colour in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
+    ]
+    title = f"{condition_words(_label(trace))}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
+    return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)
+
+
+def _label(trace: Mapping) -> str:
+    """What the trial is called; records of earlier versions have only its file."""
+    return trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
+
+
+def _size(trace: Mapping) -> float:
+    """RMS of what the base model leaves."""
+    return float(np.sqrt(np.mean(np.square(trace["before"]))))

@@ -1,32 +1,37 @@
 """How fast gaits are on robots that differ a little from the one they were made for."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 
-from bifa.report.style import figure_style
+from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
+
+STANDING_MM_S = 0.5  # a robot that is slower slips in place
+_COLOURS = ("quiet", "before", "after")
 
 
-def draw_robustness(
-    speeds: Mapping[str, Sequence[float]], titles: Mapping[str, str], path: Path | BytesIO, dark: bool = False
-) -> None:
+def standing_share(speeds: Sequence[float]) -> float:
+    """The share of robots that do not walk, 0 to 1."""
+    return float(np.mean(np.asarray(speeds) < STANDING_MM_S))
+
+
+def robustness_chart(speeds: Mapping[str, Sequence[float]], titles: Mapping[str, str]) -> Chart:
     """The share of robots on which each gait is slower than a speed. `speeds`: by gait, mm/s, sorted."""
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axis = plt.subplots(figsize=(7.2, 2.6))
-        colours = (palette.quiet, palette.predicted, palette.after)
-        for (name, values), colour in zip(speeds.items(), colours, strict=False):
-            share = (np.arange(len(values)) + 0.5) / len(values)
-            axis.step(values, 100.0 * share, where="post", color=colour, linewidth=1.8, label=titles.get(name, name))
-        axis.axhline(10.0, color=palette.ink, linestyle=":", linewidth=1.0)
-        axis.text(0.3, 12.0, "one robot in ten is slower", fontsize=8)
-        axis.set_xlim(left=0.0)
-        axis.set_ylim(0, 100)
-        axis.set_xlabel("settled speed, mm/s")
-        axis.set_ylabel("% of robots slower")
-        axis.legend(loc="upper left", bbox_to_anchor=(0.02, 0.92))
-        figure.savefig(path, format=path.suffix[1:] if isinstance(path, Path) else "png")
-        plt.close(figure)
+    series, keys = [], []
+    for (name, values), colour in zip(speeds.items(), _COLOURS, strict=False):
+        share = 100.0 * np.arange(1, len(values) + 1) / len(values)
+        label = titles.get(name, name)
+        x, y = np.concatenate(([0.0], values)), np.concatenate(([0.0], share))
+        series.append(Series((label,), x, y, colour, "steps"))
+        keys.append(Key(label, colour))
+    fastest = max(values[-1] for values in speeds.values())
+    panel = Panel(
+        series,
+        Axis("settled speed, mm/s", (0.0, 1.05 * fastest)),
+        Axis("% of robots no faster", (0.0, 103.0)),
+        [("y", 10.0, "one robot in ten")],
+        1.4,
+    )
+    return Chart([Column([panel])], keys, "Speed of each gait on robots that differ slightly from this one", across=1)

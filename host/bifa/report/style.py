@@ -2,27 +2,32 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 CHAMBERS = ("body", "head", "tail")
-# Okabe and Ito's palette: distinct for readers with any colour vision, and on paper.
+# Okabe and Ito's palette: distinct for readers with any colour vision, and on paper. Nothing else has these colours.
 CHAMBER_COLOURS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
 
 
 @dataclass(frozen=True)
 class Palette:
-    """Colours that depend on the background."""
+    """Colours that depend on the background; all but `grid` stand out from it by 3 to 1 at least."""
 
+    paper: str
     ink: str
     quiet: str
+    grid: str
     measured: str
-    predicted: str
     before: str
     after: str
 
+    def colours(self) -> dict[str, str]:
+        """By role, chambers included."""
+        return asdict(self) | CHAMBER_COLOURS
 
-LIGHT = Palette("#222222", "#8a8a8a", "#222222", "#C2559D", "#B8B8B8", "#0072B2")
-DARK = Palette("#e6e6e6", "#8f8f8f", "#e6e6e6", "#E59CCB", "#6b6b6b", "#56B4E9")
+
+LIGHT = Palette("#ffffff", "#1d1f23", "#5d636d", "#d9dce1", "#1d1f23", "#8a7000", "#a3308f")
+DARK = Palette("#16181c", "#e6e6e6", "#a2a8b2", "#33373e", "#e6e6e6", "#d6b656", "#ee9fd8")
 
 _RC = {
     "font.size": 9,
@@ -31,7 +36,7 @@ _RC = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.alpha": 0.25,
+    "axes.axisbelow": True,
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.2,
     "legend.frameon": False,
@@ -51,6 +56,6 @@ def figure_style(dark: bool = False) -> Iterator[Palette]:
     matplotlib.use("Agg")
     palette = DARK if dark else LIGHT
     ink = dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), palette.ink)
-    background = {"figure.facecolor": "#16181c" if dark else "white", "axes.facecolor": "#16181c" if dark else "white"}
-    with matplotlib.rc_context(_RC | ink | background | {"grid.color": palette.quiet}):
+    background = {"figure.facecolor": palette.paper, "axes.facecolor": palette.paper}
+    with matplotlib.rc_context(_RC | ink | background | {"grid.color": palette.grid}):
         yield palette

@@ -1,101 +1,98 @@
-"""Walks side by side, in the manner of the paper's Fig. 7: CPG outputs, pressures, displacement."""
+"""Walks beside one another, in the manner of the paper's Fig. 7: CPG outputs, pressures, displacement."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
-from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, Palette, figure_style
+from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, edges, thinned
+from bifa.report.evidence import BASE, COMPLETED
+from bifa.report.picture import draw_chart
+from bifa.report.style import CHAMBERS
+
+MEASURED, SIMULATED = "measured", "simulated"
+_ROLES = {BASE: "before", COMPLETED: "after"}  # everything else is drawn in ink
+_ROW, _BAR = 1.2, 0.9
+_LINES = ("line", "dashed", "dotted")
+_MM = 60.0  # to which the path's axis is rounded up
 
 
 @dataclass(frozen=True)
 class Walk:
-    """One column of the figure.
-
-    measured, predicted: the columns of a locomotion trial (contracts: `time_s`, `command_*`,
-    `pressure_*_psi`, `displacement_head_mm`), each an array of shape (n,); `predicted` may be None.
-    """
+    """One gait. `records`: what is drawn, by what it is called (`MEASURED`, `SIMULATED`, a model's name), the first
+    drawn solid; each the columns of a locomotion trial, arrays of shape (n,)."""
 
     title: str
     period_s: float
-    measured: Mapping[str, np.ndarray]
-    predicted: Mapping[str, np.ndarray] | None = None
+    records: Mapping[str, Mapping[str, np.ndarray]]
+
+    @property
+    def first(self) -> Mapping[str, np.ndarray]:
+        """The record drawn solid."""
+        return next(iter(self.records.values()))
 
 
-def draw_walks(walks: Sequence[Walk], path: Path | BytesIO, cycles: int = 5, dark: bool = False) -> None:
-    """Write the figure of the first `cycles` cycles of each walk to `path` (PNG or SVG)."""
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
+def walks_chart(walks: Sequence[Walk]) -> Chart:
+    """All walks over the same time and way, so that the faster one looks faster: as long as the shortest record."""
+    horizon_s = min(float(walk.first["time_s"][-1]) for walk in walks)
+    furthest = max(float(_until(walk.first, "displacement_head_mm", horizon_s)[1].max()) for walk in walks)
+    reach = (-0.05 * furthest, float(np.ceil(1.02 * furthest / _MM) * _MM))
+    names = list(dict.fromkeys(name for walk in walks for name in walk.records))
+    keys = [Key(chamber, chamber, "area") for chamber in CHAMBERS]
+    lines = dict(zip(names, _LINES, strict=False))
+    keys += [Key(name, _ROLES.get(name, "ink"), lines[name]) for name in names]
+    pressures = [r[f"pressure_{chamber}_psi"] for walk in walks for r in walk.records.values() for chamber in CHAMBERS]
+    span = (min(float(np.min(p)) for p in pressures) - 1.0, max(float(np.max(p)) for p in pressures) + 1.0)
+    return Chart(
+        [_column(walk, horizon_s, reach, span, lines) for walk in walks],
+        keys,
+        "CPG outputs, pressures and displacement of the gaits side by side",
+        height=120,
+    )
 
-        figure, axes = plt.subplots(
-            3,
-            len(walks),
-            figsize=(5.2 * len(walks), 6.6),
-            sharex="col",
-            sharey="row",
-            squeeze=False,
-            height_ratios=(1.0, 1.3, 1.6),
+
+def draw_walks(walks: Sequence[Walk], path: Path, dark: bool = False) -> None:
+    """Write the figure to `path` (PNG or SVG)."""
+    draw_chart(walks_chart(walks), path, dark, width_in=max(6.4, 4.4 * min(len(walks), 3)))
+
+
+def _column(
+    walk: Walk, horizon_s: float, reach: tuple[float, float], span: tuple[float, float], lines: Mapping[str, str]
+) -> Column:
+    """`reach`: of the path's axis, mm; `span`: of the pressures', psi; `lines`: the style of each record."""
+    time = Axis("time, s", (0.0, horizon_s))
+    first = next(iter(walk.records))
+    outputs = [
+        Series((chamber, first), x, row * _ROW + _BAR * np.nan_to_num(y), chamber, "area", base=row * _ROW)
+        for row, chamber in enumerate(CHAMBERS)
+        for x, y in [edges(*_until(walk.first, f"command_{chamber}", horizon_s))]
+    ]
+    pressures = [
+        Series((chamber, name), *thinned(*_until(record, f"pressure_{chamber}_psi", horizon_s)), chamber, lines[name])
+        for name, record in walk.records.items()
+        for chamber in CHAMBERS
+    ]
+    paths = [
+        Series(
+            (name,),
+            *thinned(*_until(record, "displacement_head_mm", horizon_s)),
+            _ROLES.get(name, "ink"),
+            lines[name],
         )
-        for column, walk in zip(axes.T, walks, strict=True):
-            _draw_column(column, walk, cycles, palette)
-        axes[0, 0].set_yticks([0.4, 1.6, 2.8], CHAMBERS)
-        for label in axes[0, 0].get_yticklabels():  # the legend of the pressures, too
-            label.set_color(CHAMBER_COLOURS[label.get_text()])
-        axes[0, 0].set_ylabel("CPG output")
-        axes[1, 0].set_ylabel("pressure [psi]")
-        axes[2, 0].set_ylabel("head displacement [mm]")
-        axes[2, 0].legend(loc="upper left")
-        figure.align_ylabels()
-        figure.tight_layout()
-        figure.savefig(path, format=path.suffix[1:] if isinstance(path, Path) else "png")
-        plt.close(figure)
+        for name, record in walk.records.items()
+    ]
+    rows = {chamber: row * _ROW + 0.5 * _BAR for row, chamber in enumerate(CHAMBERS)}
+    panels = [
+        Panel(outputs, time, Axis("output", (-0.2, 3 * _ROW), ticks=rows), height=0.7),
+        Panel(pressures, time, Axis("pressure, psi", span)),
+        Panel(paths, time, Axis("head, mm", reach), height=1.4),
+    ]
+    return Column(panels, walk.title)
 
 
-def _draw_column(axes: Sequence, walk: Walk, cycles: int, palette: Palette) -> None:
-    outputs, pressures, displacement = axes
-    horizon_s = walk.period_s * cycles
-    shown = walk.measured["time_s"] <= horizon_s
-    time_s = walk.measured["time_s"][shown]
-    for row, chamber in enumerate(CHAMBERS):
-        command = np.nan_to_num(walk.measured[f"command_{chamber}"][shown])
-        outputs.fill_between(
-            time_s,
-            1.2 * row,
-            1.2 * row + 0.9 * command,
-            step="post",
-            color=CHAMBER_COLOURS[chamber],
-            alpha=0.75,
-            linewidth=0,
-        )
-        pressures.plot(
-            time_s,
-            walk.measured[f"pressure_{chamber}_psi"][shown],
-            color=CHAMBER_COLOURS[chamber],
-            label=chamber,
-        )
-    displacement.plot(time_s, walk.measured["displacement_head_mm"][shown], color=palette.measured, label="measured")
-    if walk.predicted is not None:
-        shown = walk.predicted["time_s"] <= horizon_s
-        displacement.plot(
-            walk.predicted["time_s"][shown],
-            walk.predicted["displacement_head_mm"][shown],
-            color=palette.predicted,
-            linestyle="--",
-            label="predicted by the model",
-        )
-        for chamber in CHAMBERS:
-            pressures.plot(
-                walk.predicted["time_s"][shown],
-                walk.predicted[f"pressure_{chamber}_psi"][shown],
-                color=CHAMBER_COLOURS[chamber],
-                linestyle="--",
-                linewidth=0.8,
-                alpha=0.8,
-            )
-    outputs.set_title(walk.title)
-    outputs.grid(False)
-    outputs.set_ylim(-0.15, 3.6)
-    displacement.set_xlabel("time [s]")
-    displacement.set_xlim(0, horizon_s)
+def _until(record: Mapping[str, np.ndarray], column: str, horizon_s: float) -> tuple[np.ndarray, np.ndarray]:
+    shown = record["time_s"] <= horizon_s
+    return record["time_s"][shown], np.asarray(record[column])[shown]

@@ -1,5 +1,6 @@
 """Identification from start to end, on data whose curve, integrator and noise are not the model's."""
 
+import re
 from dataclasses import replace
 from io import StringIO
 
@@ -12,8 +13,10 @@ from scipy.stats import binom
 from bifa.data import Dataset
 from bifa.identify.identification import identify
 from bifa.pipe_robot.unmeasured import PRIOR_SD
+from bifa.report.fit import fit_page
 from bifa.report.identification import draw
 from bifa.report.identification_tables import print_report, remarks
+from bifa.report.page import render
 from bifa.robot import load_model, save_model
 
 _DAYS = 8
@@ -119,6 +122,17 @@ def test_figures_and_report_name_everything(found, tmp_path):
     print_report(Console(file=text, width=100), found)
     for name in (*found.intervals, "static_loading", "locomotion"):
         assert name in text.getvalue()
+
+
+def test_the_page_has_every_parameter_and_condition_in_words(found):
+    page = fit_page(found)
+    (table,) = page.sections[0].tables
+    assert len(table.rows) == len(found.model.parameters)
+    drawn = [column.title for section in page.sections for chart in section.charts for column in chart.columns]
+    assert len(drawn) == len(list(found.system.dataset.repeats()))
+    assert "static loading, large, 0 psi, 4 mm/s" in drawn
+    said = re.sub(r"<(script|style)\b.*?</\1>", " ", render(page), flags=re.DOTALL)
+    assert not re.findall(r">[^<]*\b[a-z]+_[a-z]+\b", said)
 
 
 def test_a_model_that_does_not_fit_says_so(found):

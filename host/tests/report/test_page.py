@@ -1,73 +1,152 @@
-"""The report page: self-contained, escaped, readable in both colour schemes."""
+"""The report page: self-contained, escaped, in words."""
 
+import json
 import re
 
 import numpy as np
+import pytest
 
-from bifa.report.animation import animate_walk
-from bifa.report.evidence import draw_errors, draw_probabilities
-from bifa.report.page import Page, Section, Table, both_palettes, render
-
-ERROR = {
-    "before": {"fitted": 21.3, "held_out": 20.8, "by_experiment": {"static_loading": 27.3, "step_response": 11.5}},
-    "after": {"fitted": 1.02, "held_out": 1.05, "by_experiment": {"static_loading": 1.0, "step_response": 1.01}},
-    "noise_floor": {"fitted": 1.0, "held_out": 1.0},
-}
-EFFECTS = [{"name": "hysteresis", "parameters": {}, "probability": 0.97, "confusable_with": ["viscoelasticity"]}]
-
-
-def walk_columns():
-    time_s = np.arange(0, 12, 0.01)
-    return {
-        "time_s": time_s,
-        "displacement_head_mm": 10 * time_s,
-        "displacement_tail_mm": 10 * time_s - 2,
-    } | {f"pressure_{name}_psi": 10 * np.sin(time_s) for name in ("body", "head", "tail")}
+from bifa.effects import library
+from bifa.report.animation import FRAMES_PER_S, animate_walks
+from bifa.report.diagnosis import diagnosis_page, verdict_sentence
+from bifa.report.page import Page, Section, Table, render
+from bifa.report.residuals import residual_charts
+from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
+from bifa.report.words import effect_words, quantity, spoken
+from tests.report import sample
 
 
-def page():
-    return Page(
-        "Bench <today>",
-        "The spring has hysteresis.",
-        [("0.97", "probability")],
-        [
-            Section("Motion", svg=animate_walk(walk_columns(), 5.0, "the robot walks")),
-            Section(
-                "Error",
-                ["a & b"],
-                tables=[Table(["gait", "speed"], [["<b>baseline</b>", "10.8"]], "mm/s", strong_row=0)],
-                figures=[
-                    both_palettes(lambda stream, dark: draw_errors(ERROR, stream, dark), "errors", "before and after"),
-                    both_palettes(lambda stream, dark: draw_probabilities(EFFECTS, stream, dark), "probabilities"),
-                ],
-            ),
-        ],
-        "made by bifa",
-    )
+def text_of(html):
+    """What a reader sees."""
+    shown = re.sub(r"<(script|style|title)\b.*?</\1>", " ", html, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", shown)).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def test_the_page_needs_no_network_and_no_script():
-    html = render(page())
-    assert "<script" not in html
-    references = re.findall(r'(?:src|href|srcset)="([^"]*)"', html)
-    assert len(references) == 4
-    assert all(reference.startswith("data:image/png;base64,") for reference in references)
+@pytest.fixture(scope="module")
+def html():
+    return render(sample.page())
 
 
-def test_text_is_escaped_and_both_palettes_are_there():
-    html = render(page())
+def test_the_page_fetches_nothing(html):
+    own = html.replace(next(iter(re.findall(r"<script>.*?</script>", html, re.DOTALL))), "")
+    assert not re.findall(r"https?://(?!www\.w3\.org)", own)
+    assert not re.findall(r"\b(?:src|srcset)=", own)
+    links = re.findall(r'href="([^"]*)"', own)
+    assert links
+    assert not [link for link in links if "://" in link or link.startswith("/")]
+
+
+def test_text_is_escaped():
+    page = Page("Bench <today>", "a & b", [Section("S", tables=[Table(["gait"], [["<b>baseline</b>"]])])])
+    html = render(page)
     assert "Bench &lt;today&gt;" in html
     assert "&lt;b&gt;baseline" in html
     assert "a &amp; b" in html
-    light, dark = re.findall(r'(?:src|srcset)="([^"]*)"', html)[:2]
-    assert light != dark
+    assert "Plotly" not in html.replace("Plotly.react", ""), "a page without plots is small"
+
+
+def test_no_identifier_is_left_in_what_a_reader_sees(html):
+    assert re.findall(r"\b\w+_\w+\b", text_of(html)) == []
+    diagnosis = render(diagnosis_page("bench", sample.DIAGNOSIS, sample.LABELS))
+    assert re.findall(r"\b\w+_\w+\b", text_of(diagnosis)) == []
+
+
+def test_the_first_screen_answers_and_says_what_its_words_mean(html):
+    first = text_of(html[: html.index("<main>")])
+    for said in (
+        "hysteresis, 4.4 N over 2.7 mm",
+        "0.481 mm",
+        "0.155 psi",
+        "3.11 N",
+        "20.60 ± 0.01",
+        "2026-11-21",
+        "bifa campaign --port virtual --seed 0",
+        "noise floor is",
+        "base model is",
+        "completed model has",
+        "Held-out trials",
+    ):
+        assert said in first, said
+    anchors = re.findall(r'href="#([^"]+)"', html)
+    assert len(anchors) > 5
+    assert all(f'<section id="{anchor}"' in html for anchor in anchors)
+
+
+def test_the_page_says_how_many_robots_do_not_walk(html):
+    assert "59 % of 256 robots" in text_of(html)
+
+
+def test_the_seal_is_explained_where_there_is_one(html):
+    assert "keeps it sealed" in text_of(html)
+    assert "seal" not in text_of(render(sample.page(sealed=False)))
+
+
+@pytest.mark.parametrize("verdict", ["none", "unexplained"])
+def test_a_verdict_without_an_effect_and_without_held_out_trials_has_its_page(verdict):
+    nothing = {"fitted": 1.2, "held_out": None, "held_out_conditions": None}
+    error = {
+        "before": nothing | {"by_experiment": {"locomotion": 1.2}},
+        "after": nothing | {"by_experiment": {"locomotion": 1.1}},
+        "noise_floor": nothing,
+    }
+    record = sample.DIAGNOSIS | {"verdict": verdict, "effects": [], "learnt": [], "error": error, "nearest": []}
+    page = text_of(render(diagnosis_page("bench", record)))
+    assert verdict_sentence(verdict, [], record["remainder"]) in page
+    assert "None" not in page
+
+
+def test_the_page_is_the_same_bytes_every_time(html):
+    assert render(sample.page()) == html
+
+
+def test_every_plot_is_in_the_page_and_json_cannot_end_its_element(html):
+    data = json.loads(re.search(r'id="plots">(.*?)</script>', html, re.DOTALL)[1])
+    assert len(data["plots"]) == html.count('class="plot"')
+    assert "@" not in json.dumps(data["light"])
+    roles = set(re.findall(r'"@(\w+)"', json.dumps(data["plots"])))
+    assert roles <= set(data["light"]) & set(data["dark"])
+
+
+def test_a_chamber_s_colour_is_nobody_else_s():
+    for palette in (LIGHT, DARK):
+        others = {role: colour for role, colour in palette.colours().items() if role not in CHAMBER_COLOURS}
+        assert not set(others.values()) & set(CHAMBER_COLOURS.values())
+
+
+def test_residuals_come_by_quantity_the_largest_first():
+    charts = residual_charts(sample.traces())
+    assert list(charts) == ["force", "pressure"]
+    assert [column.title.split(",")[1] for column in charts["force"].columns] == [" large", " small"]
+    assert charts["pressure"].columns[0].title.startswith("walk, period 5.7 s: pressure of the body")
+
+
+def test_every_effect_has_its_sizes_in_words():
+    for name, effect in library().items():
+        typical = {p.name: p.typical for p in effect.parameters}
+        said = effect_words(name, typical)
+        assert "_" not in said
+        assert "{" not in said
+        size = next(p for p in effect.parameters if p.size)
+        assert quantity(size.typical, size.unit) in said
+
+
+def test_quantities_have_units_that_suit_them():
+    said = {quantity(*pair).replace("\N{NO-BREAK SPACE}", " ") for pair in ((0.00274, "m"), (0.06, "s"), (4.4, "N"))}
+    assert said == {"2.7 mm", "60 ms", "4.4 N"}
+
+
+def test_text_of_the_engine_is_spoken():
+    assert spoken("force_N in static_loading, mu_s") == "Force in static loading, static friction coefficient"
+    assert spoken("see a_1.csv", {"a_1.csv": "locomotion, period 3 s"}) == "See walk, period 3 s"
 
 
 def test_the_animation_moves_as_the_record_does():
-    svg = animate_walk(walk_columns(), 5.0, "walk")
-    tail = re.search(r'attributeName="x" values="([^"]*)"', svg).group(1).split(";")
-    assert float(tail[-1]) - float(tail[0]) == np.float64(2.0 * 10 * (len(tail) - 1) / 20).round(1)
-
-
-def test_the_page_is_the_same_bytes_every_time():
-    assert render(page()) == render(page())
+    columns = sample.columns(2.0, speed_mm_s=10.0)
+    svg = animate_walks({"measured": columns}, 6.0, "walk")
+    frames = re.search(r"@keyframes walk0-tail\{(.*?)\}\}", svg)[1]
+    tail = [float(x) for x in re.findall(r"translate\(([\d.]+)px", frames)]
+    assert len(tail) == 6 * FRAMES_PER_S
+    way = columns["displacement_tail_mm"][-1] - columns["displacement_tail_mm"][0]
+    assert tail[-1] - tail[0] == pytest.approx(way, abs=0.2)
+    assert "prefers-reduced-motion" in svg
+    assert np.all(np.diff([float(m) for m in re.findall(r">(\d+)(?: mm)?</text>", svg)][:3]) > 0)

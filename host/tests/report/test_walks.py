@@ -1,27 +1,36 @@
-"""The figure of walks side by side is drawn, for measured walks with and without a prediction."""
+"""The figure of walks side by side."""
 
 import numpy as np
 
-from bifa.report.walks import Walk, draw_walks
-
-
-def columns(period_s, cycles=6):
-    time_s = np.arange(0, cycles * period_s, 0.01)
-    phase = 2 * np.pi * time_s / period_s
-    record = {"time_s": time_s, "displacement_head_mm": 10 * time_s + 5 * np.sin(phase)}
-    for lag, chamber in enumerate(("body", "head", "tail")):
-        command = (np.sin(phase - lag) > 0).astype(float)
-        record |= {f"command_{chamber}": command, f"pressure_{chamber}_psi": 20 * command - 12}
-    return record
+from bifa.report.walks import MEASURED, SIMULATED, Walk, draw_walks, walks_chart
+from tests.report.sample import columns
 
 
 def test_the_figure_is_written_as_png_and_svg(tmp_path):
     walks = [
-        Walk("baseline", 5.7, columns(5.7), columns(5.7)),
-        Walk("optimised", 2.5, columns(2.5)),
+        Walk("baseline", 5.7, {MEASURED: columns(5.7), "model": columns(5.7)}),
+        Walk("optimised", 2.5, {MEASURED: columns(2.5)}),
     ]
     for suffix, magic in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
         path = tmp_path / f"walks{suffix}"
         draw_walks(walks, path)
         assert path.read_bytes().startswith(magic)
         assert path.stat().st_size > 10_000
+
+
+def test_both_gaits_have_the_same_axes_so_that_the_faster_one_looks_faster():
+    chart = walks_chart([Walk("a", 5.7, {MEASURED: columns(5.7)}), Walk("b", 2.5, {MEASURED: columns(2.5)})])
+    for a, b in zip(chart.columns[0].panels, chart.columns[1].panels, strict=True):
+        assert a.x.range == b.x.range
+        assert a.y.range == b.y.range
+    assert chart.columns[0].panels[0].x.range[1] <= 7 * 2.5
+    assert max(s.x.max() for s in chart.columns[0].panels[2].series) <= 7 * 2.5
+
+
+def test_predicted_pressures_are_drawn_too_and_nothing_simulated_is_called_measured():
+    chart = walks_chart([Walk("a", 2.0, {MEASURED: columns(2.0), "model": columns(2.0)})])
+    pressures = chart.columns[0].panels[1].series
+    assert {series.keys for series in pressures} >= {("body", "measured"), ("body", "model")}
+    alone = walks_chart([Walk("a", 2.0, {SIMULATED: columns(2.0)})])
+    assert "measured" not in {key.label for key in alone.keys}
+    assert np.all(np.isfinite(alone.columns[0].panels[2].y.range))

@@ -110,6 +110,11 @@ class Instruments:
             "sync_time_s": clock.own(strobes + jitter),
         }
 
+    def position_mm(self) -> dict[str, float]:
+        """Where the camera sees head and tail at this moment; takes no part in a record."""
+        row = self._plant.sample(self._now_s)
+        return {end: float(1e3 * row[f"{end}_m"]) for end in ("head", "tail")}
+
     def _channels(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         def camera(name: str) -> np.ndarray:
             correlation = self._noise.correlation(1.0 / CAMERA_HZ)

@@ -1,0 +1,211 @@
+"""Several campaigns beside one another: models, verdicts and gaits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bifa.campaign.page import GAIT_NAMES
+from bifa.errors import BifaError
+from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
+from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, verdict_sentence
+from bifa.report.evidence import before_and_after
+from bifa.report.page import Page, Section, Table
+from bifa.report.words import (
+    NBSP,
+    channel_words,
+    effect_parameter,
+    effect_words,
+    parameter_words,
+    plain,
+    quantity,
+    unit_of,
+)
+from bifa.robot import Model, load_model
+from bifa.robot.gait import Gait, load_gait
+
+_SHADES = {"baseline": "quiet", "base": "before", "completed": "after"}
+_APART = 2.0  # standard deviations of the difference: parameters that differ by more stand out
+
+
+class CompareError(BifaError):
+    """A folder is no finished campaign, or there is only one."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished campaign. models: "base" and "completed"; gaits: by name, the baseline not among them."""
+
+    name: str
+    folder: Path
+    summary: Mapping
+    models: Mapping[str, Model]
+    gaits: Mapping[str, Gait]
+
+
+def read_runs(folders: Sequence[Path]) -> list[Run]:
+    """The campaigns in these folders, each by its folder's name, or by its path where names are equal."""
+    if len(folders) < 2:
+        raise CompareError("compare takes two campaigns or more: bifa compare out/monday out/tuesday")
+    names = [folder.resolve().name for folder in folders]
+    if len(set(names)) < len(names):
+        names = [str(folder) for folder in folders]
+    return [_read(name, folder) for name, folder in zip(names, folders, strict=True)]
+
+
+def _read(name: str, folder: Path) -> Run:
+    try:
+        summary = json.loads((folder / "summary.json").read_text())
+    except FileNotFoundError:
+        raise CompareError(
+            f"{folder} holds no finished campaign (no summary.json); finish it with: bifa campaign --out {folder}"
+        ) from None
+    except ValueError as error:
+        raise CompareError(
+            f"{folder / 'summary.json'} is damaged ({error}); make it anew with --rerun compare"
+        ) from None
+    which = ("base", "completed")
+    models = {w: load_model(folder / f"model-{w}.toml") for w in which}
+    return Run(name, folder, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})
+
+
+def compare_page(runs: Sequence[Run]) -> Page:
+    """All of it as a page."""
+    return Page(
+        f"{len(runs)} campaigns side by side",
+        _lead(runs),
+        [
+            Section("Verdicts", [f"{run.name}: {_verdict(run)}" for run in runs], [error_table(runs)], [_errors(runs)]),
+            Section("Gaits", tables=[gait_table(runs, which) for which in runs[0].gaits], charts=[_speeds(runs)]),
+            Section(
+                "Models",
+                [
+                    "Parameters as fitted with what was found in the model; ≠ marks those that differ between two "
+                    "runs by more than their uncertainties allow."
+                ],
+                [parameter_table(runs)],
+            ),
+        ],
+        (f"{BASE_MODEL} {COMPLETED_MODEL} {NOISE_FLOOR} {HELD_OUT}",),
+        (verdict_table(runs), speed_table(runs)),
+    )
+
+
+def _lead(runs: Sequence[Run]) -> str:
+    found = {run.name: {effect["name"] for effect in run.summary["effects"]} for run in runs}
+    shared = set.intersection(*found.values())
+    fastest = max(runs, key=lambda run: _speed(run, "completed"))
+    walks = f"The fastest gait walks {_speed(fastest, 'completed'):.1f} mm/s, in {fastest.name}."
+    if not any(found.values()):
+        return f"No effect was named in any of them. {walks}"
+    if all(names == shared for names in found.values()):
+        return f"All found the same: {_names(shared)}. {walks}"
+    if shared:
+        return f"All found {_names(shared)}, and some more. {walks}"
+    return f"They found different effects. {walks}"
+
+
+def _names(effects) -> str:
+    return " and ".join(effect_words(name) for name in sorted(effects))
+
+
+def _verdict(run: Run) -> str:
+    return verdict_sentence(run.summary["verdict"], run.summary["effects"], run.summary["remainder"])
+
+
+def _speed(run: Run, gait: str) -> float:
+    return next(g["measured"] for g in run.summary["gaits"] if g["gait"] == gait)
+
+
+def verdict_table(runs: Sequence[Run]) -> Table:
+    """What each found."""
+    rows = []
+    for run in runs:
+        named = "; ".join(effect_words(e["name"], e["parameters"]) for e in run.summary["effects"])
+        rows.append([run.name, run.summary["verdict"], named or "none"])
+    return Table(["run", "verdict", "effects"], rows, words=True)
+
+
+def speed_table(runs: Sequence[Run]) -> Table:
+    """Measured speeds of the gaits."""
+    rows = [[run.name, *(f"{_speed(run, gait):.2f}" for gait in GAIT_NAMES)] for run in runs]
+    return Table(["measured speed, mm/s", *GAIT_NAMES.values()], rows)
+
+
+def error_table(runs: Sequence[Run]) -> Table:
+    """Errors on held-out trials, before and after, in the units of the instruments."""
+    rows = []
+    for run in runs:
+        for error in run.summary["prediction_error"]:
+            if error["trials"] == "held-out":
+                unit = unit_of(error["quantity"])
+                values = (f"{plain(error[side])}{NBSP}{unit}" for side in ("before", "after", "noise_floor"))
+                rows.append([f"{run.name}: {channel_words(error['quantity'])}", *values])
+    return Table(["RMS error, held-out trials", "base model", "completed model", "noise floor"], rows)
+
+
+def parameter_table(runs: Sequence[Run]) -> Table:
+    """The completed models' parameters; those that differ by more than their uncertainties are marked."""
+    models = [run.models["completed"] for run in runs]
+    rows = []
+    for name, parameter in models[0].parameters.items():
+        mine = [model.parameters[name] for model in models]
+        mark = " ≠" if _differ(mine) else ""
+        label = parameter_words(name) + (f", {parameter.unit}" if parameter.unit else "")
+        rows.append([label + mark, *(plain(p.value, 4) for p in mine)])
+    for effect in sorted({name for model in models for name in model.effects}):
+        keys = {key: None for model in models for key in model.effects.get(effect, {})}
+        for key in keys:
+            meaning, unit = effect_parameter(effect, key)
+            values = (model.effects.get(effect, {}).get(key) for model in models)
+            label = f"{effect_words(effect)}: {meaning}"
+            rows.append([label, *("" if v is None else quantity(v, unit, 3) for v in values)])
+    return Table(["parameter", *(run.name for run in runs)], rows)
+
+
+def _differ(parameters) -> bool:
+    sure = [p for p in parameters if p.sd]
+    return any(
+        abs(a.value - b.value) > _APART * np.hypot(a.sd, b.sd) for i, a in enumerate(sure) for b in sure[i + 1 :]
+    )
+
+
+def gait_table(runs: Sequence[Run], which: str) -> Table:
+    """The parameters of the gaits found with the "base" or the "completed" model."""
+    gaits = [run.gaits[which].as_dict() for run in runs]
+    rows = [[_gait_words(name), *(plain(gait[name], 3) for gait in gaits)] for name in gaits[0]]
+    return Table([f"gait {GAIT_NAMES[which]}", *(run.name for run in runs)], rows)
+
+
+def _gait_words(name: str) -> str:
+    words = {"period_s": "period, s", "psi12_deg": "head ahead, °", "psi13_deg": "tail ahead, °"}
+    return words.get(name, name.replace("duty_", "vacuum, "))
+
+
+def _errors(runs: Sequence[Run]) -> Chart:
+    pairs = {
+        run.name: (run.summary["error"]["before"]["held_out"], run.summary["error"]["after"]["held_out"])
+        for run in runs
+    }
+    return before_and_after(pairs, 1.0, "Error on held-out trials of each campaign, before and after")
+
+
+def _speeds(runs: Sequence[Run]) -> Chart:
+    rows = np.arange(len(runs), 0, -1, dtype=float)
+    series = [
+        Series((GAIT_NAMES[gait],), np.array([_speed(run, gait) for run in runs]), rows, shade, "dots")
+        for gait, shade in _SHADES.items()
+    ]
+    top = max(float(s.x.max()) for s in series)
+    panel = Panel(
+        series,
+        Axis("measured speed, mm/s", (0.0, 1.1 * top)),
+        Axis(range=(0.4, len(runs) + 0.6), ticks=dict(zip([r.name for r in runs], rows.tolist(), strict=True))),
+        height=0.3 * len(runs) + 0.2,
+    )
+    keys = [Key(GAIT_NAMES[gait], shade, "dots") for gait, shade in _SHADES.items()]
+    return Chart([Column([panel])], keys, "Measured speed of each gait in each campaign", across=1)

@@ -1,0 +1,43 @@
+"""`bifa compare`: several campaigns side by side."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = """Examples:  bifa compare out/monday out/tuesday   |   bifa compare out/* --report compare.html"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EPILOG)(compare)
+
+
+def compare(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of finished campaigns, two or more.", show_default=False)],
+    report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with all of it.")] = None,
+) -> None:
+    """Put models, verdicts and gaits of several campaigns side by side."""
+    from bifa.campaign.side_by_side import (
+        compare_page,
+        error_table,
+        gait_table,
+        parameter_table,
+        read_runs,
+        speed_table,
+        verdict_table,
+    )
+    from bifa.cli.campaign import print_table
+    from bifa.screen import Console
+
+    console = Console()
+    found = read_runs(runs)
+    for table in (verdict_table, speed_table, error_table, parameter_table):
+        print_table(console, table(found))
+    for which in found[0].gaits:
+        print_table(console, gait_table(found, which))
+    if report is not None:
+        from bifa.report.page import render
+
+        report.write_text(render(compare_page(found)))
+        console.print(f"report: {report}", highlight=False, soft_wrap=True)

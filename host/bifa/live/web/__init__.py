@@ -1,0 +1,1 @@
+"""The live page: `pilot` talks to the robot in the main thread, `server` to browsers in another."""

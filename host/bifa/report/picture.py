@@ -1,0 +1,101 @@
+"""A chart as a file: PNG, SVG or whatever else Matplotlib writes by the name's ending."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from bifa.report.chart import Axis, Chart, Key, Panel, Series
+from bifa.report.style import Palette, figure_style
+
+_PER_INCH = 75.0  # of a chart's pixels
+_DASHES = {"dashed": "--", "dotted": ":"}
+
+
+def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9.6) -> None:
+    """Write the chart to `path`, with its legend above."""
+    across = min(chart.across, len(chart.columns))
+    rows = math.ceil(len(chart.columns) / across)
+    heights = [panel.height for panel in chart.columns[0].panels]
+    tall = rows * sum(heights) * chart.height / _PER_INCH + 0.35 * rows + 0.6
+    with figure_style(dark) as palette:
+        import matplotlib.pyplot as plt
+
+        figure, axes = plt.subplots(
+            rows * len(heights),
+            across,
+            figsize=(width_in, tall),
+            height_ratios=heights * rows,
+            squeeze=False,
+            layout="constrained",
+        )
+        for axis in axes.flat:
+            axis.set_visible(False)
+        if chart.title:
+            figure.suptitle(chart.title)
+        for number, column in enumerate(chart.columns):
+            first = number // across * len(heights)
+            mine = axes[first : first + len(heights), number % across]
+            mine[0].set_title(column.title, loc="left")
+            for axis, panel in zip(mine, column.panels, strict=True):
+                axis.set_visible(True)
+                _draw(axis, panel, palette)
+            for axis in mine[:-1]:
+                axis.sharex(mine[-1])
+                axis.set_xlabel("")
+                axis.tick_params(labelbottom=False)
+        if chart.keys:
+            handles = [_handle(key, palette) for key in chart.keys]
+            figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 6))
+        figure.align_ylabels()
+        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+        plt.close(figure)
+
+
+def _draw(axis, panel: Panel, palette: Palette) -> None:
+    colours = palette.colours()
+    for series in panel.series:
+        _draw_series(axis, series, colours[series.colour])
+    for along, place, label in panel.rules:
+        (axis.axvline if along == "x" else axis.axhline)(place, color=palette.ink, linestyle=":", linewidth=1.0)
+        where = {"x": (place, 0.97, axis.get_xaxis_transform()), "y": (0.5, place, axis.get_yaxis_transform())}[along]
+        side = {"ha": "left", "va": "top"} if along == "x" else {"ha": "center", "va": "bottom"}
+        axis.text(*where[:2], label, transform=where[2], fontsize=8, **side)
+    for name, one in (("x", panel.x), ("y", panel.y)):
+        _scale(axis, name, one)
+
+
+def _draw_series(axis, series: Series, colour: str) -> None:
+    x, y = series.x, series.y
+    if series.style == "dots":
+        axis.plot(x, y, "o", color=colour, markersize=7)
+    elif series.style == "steps":
+        axis.step(x, y, where="post", color=colour)
+    elif series.style == "area":
+        axis.fill_between(x, series.base, y, step="post", color=colour, linewidth=0)
+    else:
+        axis.plot(x, y, _DASHES.get(series.style, "-"), color=colour)
+
+
+def _scale(axis, name: str, one: Axis) -> None:
+    if one.log:
+        axis.set(**{f"{name}scale": "log"})
+        getattr(axis, f"{name}axis").set_major_formatter("{x:g}")
+    if one.range is not None:
+        axis.set(**{f"{name}lim": one.range})
+    if one.ticks is not None:
+        axis.set(**{f"{name}ticks": list(one.ticks.values())})
+        axis.set(**{f"{name}ticklabels": list(one.ticks)})
+        axis.grid(False, axis=name)
+    axis.set(**{f"{name}label": one.label})
+
+
+def _handle(key: Key, palette: Palette):
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    colour = palette.colours()[key.colour]
+    if key.style == "area":
+        return Patch(color=colour, label=key.label)
+    form = {"linestyle": "", "marker": "o"} if key.style == "dots" else {"linestyle": _DASHES.get(key.style, "-")}
+    return Line2D([], [], color=colour, label=key.label, **form)

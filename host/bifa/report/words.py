@@ -1,0 +1,178 @@
+"""Names as people say them: quantities with units, effects with their sizes, and text without identifiers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from bifa.effects import library
+
+_EXPERIMENTS = {
+    "static_loading": "static loading",
+    "step_response": "step response",
+    "anchor_pull": "anchor pull",
+    "locomotion": "walk",
+}
+_PARAMETERS = {
+    "head_mass_kg": "mass of the head",
+    "tail_mass_kg": "mass of the tail",
+    "head_segment_mass_kg": "mass of the head's segment in a pull",
+    "body_damping_Ns_m": "damping of the body",
+    "body_area_N_psi": "area of the body",
+    "body_alpha_n_per_s": "filling rate αn of the body",
+    "body_alpha_s_per_s": "filling rate αs of the body",
+    "small_mass_kg": "moving mass of a small actuator",
+    "small_damping_Ns_m": "damping of a small actuator",
+    "small_area_N_psi": "area of a small actuator",
+    "small_alpha_n_per_s": "filling rate αn of a small actuator",
+    "small_alpha_s_per_s": "filling rate αs of a small actuator",
+    "wall_offset_m": "offset of the wall",
+    "wall_stiffness_N_m": "stiffness of the wall",
+    "wall_damping_Ns_m": "damping of the wall",
+    "mu_s": "static friction coefficient",
+    "mu_k": "kinetic friction coefficient",
+    "supply_positive_psi": "positive supply",
+    "supply_negative_psi": "vacuum supply",
+}
+# What an effect's numbers say in a phrase; one without a phrase has them listed with their meanings.
+_PHRASES = {
+    "area_variation": "{slope} over the stroke",
+    "backlash": "{gap_m}",
+    "choked_flow": "bending at {saturation_s_per_psi}",
+    "friction_direction": "{asymmetry} either way",
+    "hysteresis": "{force_N} over {displacement_m}",
+    "inclination": "{angle_deg}",
+    "instrument_shift": "{late_s}",
+    "leak": "{rate_per_s}",
+    "line_lag": "{time_s}",
+    "regulator_ripple": "{amplitude_psi} at {frequency_Hz}",
+    "sensor_calibration": "{gain} in gain, {offset_psi} in offset",
+    "sensor_lag": "{time_s}",
+    "sensor_position": "{share} of the line's drop",
+    "stribeck": "falling by {speed_m_s}",
+    "supply_sag": "{resistance_s} of drop per psi/s",
+    "tether_drag": "{drag_N_m}",
+    "valve_asymmetry": "{difference_s} between the edges",
+    "valve_latency": "{delay_s}",
+    "viscoelasticity": "{stiffness_N_m} relaxing in {time_s}",
+}
+NBSP = "\N{NO-BREAK SPACE}"  # between a number and its unit
+_UNIT_WORDS = (
+    "N_psi",
+    "Ns_m",
+    "N_m",
+    "s_per_psi",
+    "per_s",
+    "mm_s",
+    "m_s",
+    "mm",
+    "psi",
+    "N",
+    "m",
+    "kg",
+    "deg",
+    "Hz",
+    "s",
+    "rad",
+)
+_PARTS = ("body", "head", "tail")
+_IDENTIFIER = re.compile(r"\b[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+\b")
+_FILE = re.compile(r"[\w.\-]+\.csv\b")
+
+
+def quantity(value: float, unit: str, digits: int = 2) -> str:
+    """A value in a unit that suits its size: 0.00274 m is "2.7 mm"."""
+    for small, scale, least in (("m", ("mm", 1e3), 1.0), ("s", ("ms", 1e3), 1.0), ("m/s", ("mm/s", 1e3), 10.0)):
+        if unit == small and abs(value) < least:
+            unit, value = scale[0], value * scale[1]
+            break
+    return f"{plain(value, digits)}{NBSP}{unit}".rstrip()
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """At least so many significant digits, and never an exponent where people would not write one."""
+    if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    from math import floor, log10
+
+    decimals = max(0, digits - 1 - floor(log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def experiment_words(name: str) -> str:
+    """ "static_loading" is "static loading"; a walk is a walk."""
+    return _EXPERIMENTS.get(name, name.replace("_", " "))
+
+
+def channel_words(name: str) -> str:
+    """ "pressure_body_psi" is "pressure of the body"."""
+    words = _without_unit(name).split("_")
+    if words[-1] in _PARTS and len(words) > 1:
+        return f"{' '.join(words[:-1])} of the {words[-1]}"
+    return " ".join(words)
+
+
+def unit_of(name: str) -> str:
+    """The unit at a column's end: "psi" of "pressure_body_psi"."""
+    return name.rpartition("_")[2]
+
+
+def condition_words(label: str) -> str:
+    """A trial's label with a walk called so."""
+    return label.replace("locomotion", "walk", 1)
+
+
+def parameter_words(name: str) -> str:
+    """A parameter of the model, an effect's, or a nuisance."""
+    return _PARAMETERS.get(name) or _without_unit(name).replace("_", " ")
+
+
+def effect_words(name: str, parameters: Mapping[str, float] | None = None) -> str:
+    """ "hysteresis, 4.4 N over 2.7 mm"; without parameters only what it is called."""
+    called = name.replace("_", " ")
+    if not parameters:
+        return called
+    effects = library()
+    units = {p.name: p.unit for p in effects[name].parameters} if name in effects else {}
+    values = {key: quantity(value, units.get(key, "")) for key, value in parameters.items()}
+    phrase = _PHRASES.get(name)
+    if phrase is None or any(f"{{{key}}}" in phrase and key not in values for key in units):
+        return f"{called}, " + ", ".join(f"{parameter_words(key)} {value}" for key, value in values.items())
+    return f"{called}, {phrase.format(**values)}"
+
+
+def effect_parameter(effect: str, name: str) -> tuple[str, str]:
+    """What a number of an effect means, and its unit; of an effect that the library lacks, its name and none."""
+    effects = library()
+    for parameter in effects[effect].parameters if effect in effects else ():
+        if parameter.name == name:
+            return parameter.meaning, parameter.unit
+    return parameter_words(name), ""
+
+
+def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
+    """Text of the engine with its identifiers in words; `labels`: what trials are called, by file."""
+    if labels:
+        text = _FILE.sub(lambda found: condition_words(labels.get(found[0], found[0])), text)
+    text = (
+        _IDENTIFIER.sub(lambda found: _said(found[0]), text)
+        .replace("locomotion", "walking")
+        .replace(" x the ", " × the ")
+        .replace("+-", "±")
+    )
+    return text[:1].upper() + text[1:]
+
+
+def _said(name: str) -> str:
+    if name in _EXPERIMENTS:
+        return experiment_words(name)
+    if name in _PARAMETERS or name in library():
+        return parameter_words(name)
+    return channel_words(name)
+
+
+def _without_unit(name: str) -> str:
+    for unit in _UNIT_WORDS:
+        if name.endswith("_" + unit):
+            return name.removesuffix("_" + unit)
+    return name

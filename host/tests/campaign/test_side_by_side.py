@@ -1,0 +1,48 @@
+"""Campaigns side by side: what differs between them is seen, and a folder that is none is refused."""
+
+import re
+
+import pytest
+
+from bifa.campaign.side_by_side import CompareError, compare_page, parameter_table, read_runs, verdict_table
+from bifa.report.page import render
+from tests.report import sample
+
+
+def test_two_campaigns_are_told_apart(tmp_path):
+    runs = read_runs([sample.finished(tmp_path / "monday"), sample.finished(tmp_path / "tuesday", 9.2, effects=[])])
+    verdicts = verdict_table(runs).rows
+    assert [row[0] for row in verdicts] == ["monday", "tuesday"]
+    assert verdicts[0][2].startswith("hysteresis, 4.4")
+    assert verdicts[1][2] == "none"
+    marked = [row[0] for row in parameter_table(runs).rows if "≠" in row[0]]
+    assert marked == ["area of the body, N/psi ≠"]
+    page = render(compare_page(runs))
+    assert "different effects" in page
+    shown = re.sub(r"<(script|style)\b.*?</\1>", " ", page, flags=re.DOTALL)
+    assert not re.findall(r">[^<]*\b[a-z]+_[a-z]+\b", shown)
+
+
+def test_equal_campaigns_are_said_to_agree(tmp_path):
+    runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
+    assert "All found the same: hysteresis" in compare_page(runs).lead
+    assert not [row for row in parameter_table(runs).rows if "≠" in row[0]]
+
+
+def test_folders_of_one_name_go_by_their_paths(tmp_path):
+    for day in ("monday", "tuesday"):
+        (tmp_path / day).mkdir()
+        sample.finished(tmp_path / day / "run")
+    runs = read_runs([tmp_path / "monday" / "run", tmp_path / "tuesday" / "run"])
+    assert runs[0].name != runs[1].name
+
+
+def test_what_is_no_finished_campaign_is_refused_with_what_to_do(tmp_path):
+    (tmp_path / "b").mkdir()
+    with pytest.raises(CompareError, match=r"bifa campaign --out .*b"):
+        read_runs([sample.finished(tmp_path / "a"), tmp_path / "b"])
+    with pytest.raises(CompareError, match="two"):
+        read_runs([tmp_path / "a"])
+    (tmp_path / "a" / "summary.json").write_text("{")
+    with pytest.raises(CompareError, match="damaged"):
+        read_runs([tmp_path / "a", tmp_path / "a"])

@@ -1,0 +1,201 @@
+"""A campaign's results of a made-up robot, for pages: nothing is simulated."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+
+from bifa.campaign.page import campaign_page
+from bifa.report.evidence import BASE, COMPLETED
+from bifa.report.walks import MEASURED, Walk
+from bifa.robot import nominal, save_model
+from bifa.robot.gait import BASELINE, save_gait
+
+EFFECT = {
+    "name": "hysteresis",
+    "form": "as in the library",
+    "parameters": {"force_N": 4.399, "displacement_m": 0.002744, "small_share": 0.242},
+    "interval_90": {"force_N": [4.39, 4.408], "displacement_m": [0.002614, 0.002874], "small_share": [0.2397, 0.2442]},
+    "probability": 0.97,
+    "share_of_gap": 0.9989,
+    "confusable_with": ["viscoelasticity"],
+}
+ERROR = {
+    "unit": "RMS residual in units of the noise",
+    "before": {
+        "fitted": 21.3,
+        "held_out": 20.8,
+        "held_out_conditions": 21.0,
+        "by_experiment": {"static_loading": 27.3, "step_response": 11.5, "anchor_pull": 0.97, "locomotion": 5.5},
+    },
+    "after": {
+        "fitted": 1.02,
+        "held_out": 1.05,
+        "held_out_conditions": 1.08,
+        "by_experiment": {"static_loading": 1.0, "step_response": 1.01, "anchor_pull": 0.97, "locomotion": 1.1},
+    },
+    "noise_floor": {"fitted": 1.0, "held_out": 1.0, "held_out_conditions": 1.0},
+}
+CURVE = {
+    "site": "filling",
+    "term": "rate of a chamber's pressure, eq. (2)",
+    "unit": "psi/s",
+    "variable": "pressure (psi)",
+    "lower": -14.5,
+    "upper": 14.5,
+    "rows": {"filling": [0.0, 0.2, 0.5, 0.1, -0.3], "emptying": [0.1, 0.0, -0.2, -0.6, -0.8]},
+}
+DIAGNOSIS = {
+    "format": 2,
+    "verdict": "identified",
+    "effects": [EFFECT],
+    "remainder": {
+        "matters": False,
+        "share_of_gap": 0.001,
+        "times_floor": 0.6,
+        "experiments": ["locomotion"],
+        "depends_on": ["pressure of the body"],
+        "learnt": ["filling"],
+        "text": "Repeats share a residual that the model does not predict: pressure_body_psi in locomotion (0.6 x the "
+        "floor).",
+    },
+    "nearest": [
+        {"effects": ["sensor_position"], "share_of_gap": 0.018},
+        {"effects": ["valve_asymmetry", "line_lag"], "share_of_gap": 0.045},
+    ],
+    "warnings": ["head_segment_mass_kg = 0.1946 kg lies outside its plausible range."],
+    "held_out": {"repeats": ["static_large_0psi_2mm_s_1.csv"], "conditions": []},
+    "error": ERROR,
+    "signature": {
+        "experiments": ["static_loading"],
+        "depends_on": ["direction of motion"],
+        "text": "Repeats share a residual that the model does not predict: force_N in static_loading (15.1 x the floor)"
+        ", as in static_large_0psi_2mm_s_1.csv.",
+    },
+    "learnt": [CURVE],
+    "tried": [],
+    "not_detectable_here": ["inclination", "tether_drag"],
+    "next_experiment": {
+        "separates": ["hysteresis", "viscoelasticity"],
+        "experiment": "static_loading",
+        "settings": {"actuator": "large", "pressure_psi": 0.0, "rate_mm_s": 0.5},
+    },
+    "seconds": 31.0,
+}
+PREDICTION_ERRORS = [
+    {"quantity": quantity, "trials": trials, "before": before, "after": after, "noise_floor": floor}
+    for quantity, before, after, floor in (
+        ("displacement_mm", 0.4814, 0.09753, 0.09546),
+        ("pressure_psi", 0.1549, 0.02785, 0.02154),
+        ("force_N", 3.113, 0.1963, 0.159),
+    )
+    for trials in ("fitted", "held-out")
+]
+LABELS = {"static_large_0psi_2mm_s_1.csv": "static loading, large, 0 psi, 2 mm/s (run 1)"}
+_GAITS = (("baseline", 5.7, 8.0, 10.8), ("base", 2.9, 20.4, 23.3), ("completed", 2.8, 20.6, 23.3))
+
+
+def columns(period_s, cycles=7, speed_mm_s=10.0):
+    """Those of a walk."""
+    time_s = np.arange(0, cycles * period_s, 0.02)
+    phase = 2 * np.pi * time_s / period_s
+    record = {
+        "time_s": time_s,
+        "displacement_head_mm": speed_mm_s * time_s + 5 * np.sin(phase),
+        "displacement_tail_mm": speed_mm_s * time_s - 5 * np.sin(phase),
+    }
+    for lag, chamber in enumerate(("body", "head", "tail")):
+        command = (np.sin(phase - lag) > 0).astype(float)
+        record |= {f"command_{chamber}": command, f"pressure_{chamber}_psi": 20 * command - 12}
+    return record
+
+
+def walks():
+    """One of each gait, the base model 2 % slow."""
+    return {
+        name: Walk(
+            f"{name} gait",
+            period_s,
+            {
+                MEASURED: columns(period_s, speed_mm_s=speed),
+                COMPLETED: columns(period_s, speed_mm_s=speed),
+                BASE: columns(period_s, speed_mm_s=0.98 * speed),
+            },
+        )
+        for name, period_s, speed, _ in _GAITS
+    }
+
+
+def traces():
+    """Residuals of three conditions."""
+    time_s = np.linspace(0, 20, 300)
+    return [
+        {
+            "trial": f"{n}.csv",
+            "label": label,
+            "experiment": label.split(",")[0].replace(" ", "_"),
+            "channel": channel,
+            "time_s": time_s.tolist(),
+            "before": (size * np.sin(time_s)).tolist(),
+            "after": np.cos(9 * time_s).tolist(),
+        }
+        for n, (label, channel, size) in enumerate(
+            [
+                ("static loading, small, 0 psi, 2 mm/s", "force_N", 5.0),
+                ("static loading, large, 0 psi, 2 mm/s", "force_N", 20.0),
+                ("locomotion, period 5.7 s", "pressure_body_psi", 8.0),
+            ]
+        )
+    ]
+
+
+def summary(sealed=True):
+    """As summary.json; of 256 robots that differ a little, 59 % do not walk with the baseline."""
+    return {
+        "gaits": [
+            {
+                "gait": name,
+                "base_model": 0.98 * speed,
+                "completed_model": speed,
+                "measured": speed,
+                "spread": 0.01,
+                "paper": paper,
+            }
+            for name, _, speed, paper in _GAITS
+        ],
+        "verdict": DIAGNOSIS["verdict"],
+        "effects": DIAGNOSIS["effects"],
+        "remainder": DIAGNOSIS["remainder"],
+        "error": ERROR,
+        "prediction_error": PREDICTION_ERRORS,
+        "robustness": {
+            "baseline": [0.0] * 151 + np.linspace(3, 11, 105).tolist(),
+            "base": [0.0] * 10 + np.linspace(20.2, 20.6, 246).tolist(),
+            "completed": np.linspace(20.3, 20.7, 256).tolist(),
+        },
+        "truth": {"hysteresis": {"force_N": 4.419, "displacement_m": 0.00294, "small_share": 0.2415}}
+        if sealed
+        else None,
+    }
+
+
+def page(sealed=True):
+    """The campaign's page."""
+    made = [("measured", "2026-11-21"), ("command", "bifa campaign --port virtual --seed 0"), ("seed", "0")]
+    return campaign_page(summary(sealed), DIAGNOSIS, traces(), walks(), LABELS, "virtual robot 0", made)
+
+
+def finished(folder, area_N_psi=9.0, effects=None):
+    """A campaign as `bifa campaign` leaves it."""
+    folder.mkdir()
+    told = summary()
+    if effects is not None:
+        told |= {"effects": effects, "verdict": "unexplained"}
+    (folder / "summary.json").write_text(json.dumps(told))
+    model = nominal()
+    area = model.parameters["body_area_N_psi"].with_value(area_N_psi, sd=0.01)
+    model = replace(model, parameters={**model.parameters, "body_area_N_psi": area})
+    for which in ("base", "completed"):
+        save_model(folder / f"model-{which}.toml", model)
+        save_gait(folder / f"gait-{which}.toml", BASELINE, {})
+    return folder

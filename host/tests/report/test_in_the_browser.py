@@ -1,0 +1,174 @@
+"""The pages in a real browser: wide and narrow, light and dark, on paper."""
+
+from pathlib import Path
+from unicodedata import normalize
+
+import pytest
+from pypdf import PdfReader
+
+from bifa.campaign.side_by_side import compare_page, read_runs
+from bifa.report.diagnosis import diagnosis_page
+from bifa.report.page import render
+from tests.report import sample
+
+LOOKS = Path(__file__).with_name("looks.js").read_text()
+WIDE, NARROW = 1280, 390
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """Where each page is."""
+    folder = tmp_path_factory.mktemp("pages")
+    runs = read_runs([sample.finished(tmp_path_factory.mktemp("runs") / day) for day in ("monday", "tuesday")])
+    for name, page in {
+        "campaign": sample.page(),
+        "compare": compare_page(runs),
+        "diagnosis": diagnosis_page("the bench", sample.DIAGNOSIS, sample.LABELS),
+    }.items():
+        (folder / f"{name}.html").write_text(render(page))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tabs(browser, pages):
+    """A tab for each page, drawn, and what they have complained of."""
+    complaints, found = [], {}
+    own = [path.as_uri() for path in pages.iterdir()]
+    for path in sorted(pages.iterdir()):
+        tab = browser.new_context(viewport={"width": WIDE, "height": 900}, accept_downloads=False).new_page()
+        tab.on("console", lambda message: complaints.append(message.text))
+        tab.on("pageerror", lambda error: complaints.append(str(error)))
+        tab.on("request", lambda request: request.url in own or complaints.append(request.url))
+        tab.goto(path.as_uri())
+        tab.wait_for_selector("html[data-drawn]", state="attached")
+        found[path.stem] = tab
+    yield found, complaints
+    for tab in found.values():
+        tab.context.close()
+
+
+@pytest.fixture
+def opened(tabs):
+    """opened(name, width, scheme): the page's tab; whatever it complains of fails the test."""
+    found, complaints = tabs
+
+    def look(name, width=WIDE, scheme="light", motion="no-preference"):
+        tab = found[name]
+        tab.set_viewport_size({"width": width, "height": 900})
+        tab.emulate_media(color_scheme=scheme, reduced_motion=motion, media="screen")
+        tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        return tab
+
+    yield look
+    assert complaints == []
+
+
+@pytest.mark.parametrize("name", ["campaign", "compare", "diagnosis"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [WIDE, NARROW])
+def test_nothing_overlaps_is_cut_off_or_too_pale(opened, name, width, scheme):
+    page = opened(name, width, scheme)
+    assert page.evaluate(LOOKS) == []
+
+
+def test_the_answer_is_on_the_first_screen(opened):
+    page = opened("campaign")
+    bottom = page.evaluate("document.querySelector('nav').getBoundingClientRect().bottom")
+    assert bottom <= 900
+
+
+def test_a_name_above_a_plot_hides_and_shows_its_curves(opened):
+    page = opened("campaign")
+    figure = page.locator("figure.chart", has_text="measured").first
+    curves = figure.locator("path.js-line")
+    before = curves.count()
+    button = figure.get_by_role("button", name="base model")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    assert 0 < curves.count() < before
+    button.click()
+    assert curves.count() == before
+
+
+def test_a_plot_zooms_and_comes_back(opened):
+    page = opened("campaign")
+    plot = page.locator(".plot").last
+    plot.scroll_into_view_if_needed()
+    reach = "box => box._fullLayout.xaxis.range.slice()"
+    whole = plot.evaluate(reach)
+    area = plot.locator(".nsewdrag").first
+    spot = area.bounding_box()
+    y = spot["y"] + spot["height"] / 2
+    page.mouse.move(spot["x"] + 0.3 * spot["width"], y)
+    page.mouse.down()
+    page.mouse.move(spot["x"] + 0.6 * spot["width"], y, steps=5)
+    page.mouse.up()
+    zoomed = plot.evaluate(reach)
+    assert zoomed[0] > whole[0]
+    assert zoomed[1] < whole[1]
+    area.dblclick()
+    assert plot.evaluate(reach) == pytest.approx(whole)
+
+
+def test_the_plots_follow_the_reader_s_scheme(opened):
+    page = opened("campaign")
+    colour = "document.querySelector('.plot .xtick text').style.fill"
+    light = page.evaluate(colour)
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_function(f"{colour} !== {light!r}")
+    assert page.evaluate(LOOKS) == []
+
+
+def test_the_animation_runs_pauses_and_is_set_by_its_slider(opened):
+    page = opened("campaign")
+    figure = page.locator(".motion")
+    place = "document.querySelector('.walk0-head').getBoundingClientRect().x"
+    before = page.evaluate(place)
+    page.wait_for_function(f"Math.abs({place} - {before}) > 2")
+    figure.get_by_role("button", name="Pause").click()
+    page.wait_for_timeout(100)
+    still = page.evaluate(place)
+    page.wait_for_timeout(300)
+    assert page.evaluate(place) == still
+    figure.locator("input").fill("10")
+    assert page.evaluate(place) != still
+    assert figure.locator("output").inner_text() == "10.0 s"
+
+
+def test_the_animation_stands_still_for_who_prefers_that(opened):
+    page = opened("campaign", motion="reduce")
+    page.reload()
+    page.wait_for_selector("html[data-drawn]", state="attached")
+    place = "document.querySelector('.walk0-head').getBoundingClientRect().x"
+    before = page.evaluate(place)
+    page.wait_for_timeout(400)
+    assert page.evaluate(place) == before
+    page.locator(".motion").get_by_role("button", name="Play").click()
+    page.wait_for_function(f"Math.abs({place} - {before}) > 2")
+
+
+def test_on_paper_nothing_is_cut_off_and_no_table_is_split(opened, tmp_path):
+    page = opened("campaign", scheme="dark")
+    page.evaluate("""addEventListener("beforeprint", () => {
+        const wide = [...document.querySelectorAll(".plot svg, table, .motion svg")];
+        window.onPaper = {
+            widest: Math.max(...wide.map((node) => node.getBoundingClientRect().width)),
+            ink: document.querySelector(".plot .xtick text").style.fill,
+        };
+    })""")
+    page.pdf(path=tmp_path / "page.pdf", format="A4")
+    printed = page.evaluate("window.onPaper")
+    assert printed["widest"] <= 700, "wider than what A4 leaves"
+    assert printed["ink"] == "rgb(29, 31, 35)", "dark on white, whatever the screen's scheme"
+    text = pages_of(tmp_path / "page.pdf")
+    assert len(text) > 3
+    for table in page.locator("table").all():
+        rows = [row.inner_text().split("\t")[0].strip() for row in table.locator("tbody tr").all()]
+        values = [" ".join(row.inner_text().split()) for row in table.locator("tbody tr").all()]
+        on = [{number for number, sheet in enumerate(text) if value in sheet} for value in values]
+        assert set.intersection(*on), f"a table is split between sheets: {rows}"
+
+
+def pages_of(pdf):
+    """The text of each sheet, spaces evened out and ligatures spelt."""
+    return [" ".join(normalize("NFKC", sheet.extract_text()).split()) for sheet in PdfReader(pdf).pages]
