@@ -15,12 +15,12 @@ from bifa.gait.measured import measured_speed
 from bifa.gait.metric import Metric
 from bifa.gait.objectives import distribution
 from bifa.gait.uncertainty import SPREAD, spread_of
-from bifa.report.evidence import draw_errors
-from bifa.report.page import render
 from bifa.report.walks import Walk, draw_walks
 from bifa.robot import Model, load_model
 from bifa.robot.gait import Gait
 from bifa.simulate import gait_rows
+from lacuna.report.evidence import draw_errors
+from lacuna.report.page import render
 
 TITLES = {
     "baseline": "baseline gait",

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 from bifa.report.animation import animate_walk
-from bifa.report.diagnosis import verdict_sentence
-from bifa.report.evidence import draw_errors, draw_probabilities
-from bifa.report.page import Page, Section, Table, both_palettes
 from bifa.report.residuals import draw_residuals
 from bifa.report.robustness import draw_robustness
 from bifa.report.walks import Walk, draw_walks
+from lacuna.report.diagnosis import verdict_sentence
+from lacuna.report.evidence import draw_errors, draw_probabilities
+from lacuna.report.page import Page, Section, Table, both_palettes
 
 GAIT_NAMES = {
     "baseline": "baseline",

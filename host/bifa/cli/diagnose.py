@@ -96,10 +96,10 @@ def _report(console, name: str, found, json: Path | None, model: Path | None, pa
     from json import dumps
 
     from bifa.identify.completed import completed_model
-    from bifa.report.diagnosis import diagnosis_page
-    from bifa.report.page import render
     from bifa.robot import save_model
     from lacuna.diagnosis.record import as_record
+    from lacuna.report.diagnosis import diagnosis_page
+    from lacuna.report.page import render
 
     record = as_record(found)
     _print(console, record)

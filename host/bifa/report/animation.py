@@ -48,7 +48,7 @@ def animate_walk(columns: Mapping[str, np.ndarray], duration_s: float, title: st
     wall = PX_PER_MM * PIPE_MM / 2
     body_height = PX_PER_MM * 52
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}" class="robot">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}" class="drawing">'
         f"<title>{title}</title>"
         f'<line x1="0" x2="{width:.0f}" y1="{middle - wall - 3:.1f}" y2="{middle - wall - 3:.1f}" '
         'stroke="currentColor" stroke-width="5"/>'

@@ -8,7 +8,8 @@ import numpy as np
 from bifa.gait.explain import CYCLES, Anatomy, reasons
 from bifa.gait.search import Optimum
 from bifa.gait.sensitivity import Front, Scan
-from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, figure_style
+from bifa.report.style import CHAMBER_COLOURS, CHAMBERS
+from lacuna.report.style import figure_style
 
 _SHOWN_CYCLES = 3
 

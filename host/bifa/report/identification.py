@@ -10,7 +10,8 @@ import numpy as np
 
 from bifa.identify.identification import Identification
 from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
-from bifa.report.style import CHAMBER_COLOURS, Palette, figure_style
+from bifa.report.style import CHAMBER_COLOURS
+from lacuna.report.style import Palette, figure_style
 from lacuna.system import Channels, Record
 
 

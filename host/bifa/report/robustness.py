@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifa.report.style import figure_style
+from lacuna.report.style import figure_style
 
 
 def draw_robustness(

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, Palette, figure_style
+from bifa.report.style import CHAMBER_COLOURS, CHAMBERS
+from lacuna.report.style import Palette, figure_style
 
 
 @dataclass(frozen=True)

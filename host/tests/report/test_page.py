@@ -5,8 +5,8 @@ import re
 import numpy as np
 
 from bifa.report.animation import animate_walk
-from bifa.report.evidence import draw_errors, draw_probabilities
-from bifa.report.page import Page, Section, Table, both_palettes, render
+from lacuna.report.evidence import draw_errors, draw_probabilities
+from lacuna.report.page import Page, Section, Table, both_palettes, render
 
 ERROR = {
     "before": {"fitted": 21.3, "held_out": 20.8, "by_experiment": {"static_loading": 27.3, "step_response": 11.5}},

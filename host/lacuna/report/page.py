@@ -69,7 +69,7 @@ def both_palettes(draw: Callable[[BytesIO, bool], None], alt: str, caption: str 
 def render(page: Page) -> str:
     """The page as one HTML document; all text is escaped."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("bifa.report", "templates"),
+        loader=jinja2.PackageLoader("lacuna.report", ""),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,

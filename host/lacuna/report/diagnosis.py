@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bifa.report.evidence import draw_errors, draw_learnt, draw_probabilities
-from bifa.report.page import Page, Section, Table, both_palettes
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.report.evidence import draw_errors, draw_learnt, draw_probabilities
+from lacuna.report.measured import floor_sentence, measured_rows
+from lacuna.report.overview import draw_held_out, draw_tried
+from lacuna.report.page import Page, Section, Table, both_palettes
 
 
 def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
-    """The verdict of `bifa diagnose --json` in one sentence."""
+    """A verdict (of `as_record`) in one sentence."""
     if verdict == "none":
         return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
     if verdict == "unexplained":
@@ -21,8 +24,8 @@ def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remaind
     return f"What the base model lacks is {names}, which closes {closed}{rest}."
 
 
-def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
-    """The page for a record of `bifa diagnose --json`."""
+def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
+    """The page for a `record` (of `as_record`); with the diagnosis itself also what was measured, and traces."""
     error, effects = record["error"], record["effects"]
     lead = verdict_sentence(record["verdict"], effects, record["remainder"])
     facts = [
@@ -37,6 +40,14 @@ def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
         Section("Where the residual lives", (record["signature"]["text"],)),
         Section("Error before and after", figures=(errors,)),
     ]
+    if found is not None:
+        sections[:0] = [_measured(found)]
+        figure = both_palettes(
+            lambda stream, dark: draw_held_out(found, stream, dark),
+            "measured and predicted, before and after, on records that were not fitted",
+            "The records predicted worst by the model as it is. Left: measured and predicted; right: the residual.",
+        )
+        sections.append(Section("On records that were not fitted", figures=(figure,)))
     if effects:
         evidence = both_palettes(
             lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
@@ -52,7 +63,13 @@ def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
         rows = [
             (" + ".join(r["effects"]).replace("_", " "), f"{100 * r['share_of_gap']:.0f} %") for r in record["nearest"]
         ]
-        sections.append(Section("Also tried", tables=(Table(("explanation", "of the gap that it would close"), rows),)))
+        table = Table(("explanation", "of the gap that it would close"), rows)
+        tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
+        why = (
+            "An explanation is rejected where it predicts conditions that were never fitted no better than a smaller"
+            " one, where it closes too little of the gap, or where a rival explains the same and more."
+        )
+        sections.append(Section("Also tried, and rejected", (why,), (table,), (tried,)))
     if record["warnings"]:
         sections.append(Section("Before you believe it", tuple(record["warnings"])))
     for curve in record["learnt"]:
@@ -64,12 +81,20 @@ def diagnosis_page(name: str, record: Mapping[str, Any]) -> Page:
     hidden = record["not_detectable_here"]
     if hidden:
         sections.append(Section("Not detectable in this data", (", ".join(hidden),)))
+    indistinct = [(e["name"], ", ".join(e["confusable_with"])) for e in effects if e["confusable_with"]]
+    if indistinct:
+        sections.append(Section("What this data cannot tell", tables=(Table(("named", "could be"), indistinct),)))
     coming = record["next_experiment"]
     if coming["experiment"]:
         settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
         text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
         sections.append(Section("Next experiment", (text,)))
     return Page(f"Diagnosis of {name}", lead, facts, sections)
+
+
+def _measured(found: Diagnosis) -> Section:
+    columns = ("channel", "records in conditions", "floor (standard deviation)", "samples to a piece", "from")
+    return Section("What was measured", (floor_sentence(found),), (Table(columns, measured_rows(found)),))
 
 
 def _sized(effect: Mapping[str, Any]) -> str:

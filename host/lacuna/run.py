@@ -1,0 +1,99 @@
+"""From a system and records to a verdict: `lacuna.diagnose`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from lacuna.check import MisuseError
+from lacuna.diagnosis import diagnose as engine
+from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.estimation.problem import use_threads
+from lacuna.function_system import FunctionSystem
+from lacuna.progress import Progress
+from lacuna.records import Table, read, stretched
+from lacuna.system import Record, System
+from lacuna.verdict import Verdict
+
+
+def diagnose(
+    system: System,
+    records: Any = None,
+    *,
+    seed: int = 0,
+    starts: int = 1,
+    n_jobs: int | None = None,
+    executor: Executor | None = None,
+    policy: Policy = POLICY,
+    progress: Callable[[str], None] | bool = True,
+) -> Verdict:
+    """What the model of `system` lacks, judged by `records`.
+
+    `records`: arrays, pandas, xarray, a folder of CSV (see `lacuna.records.read`), or None for a system that has its
+    trials. `seed`: the same one gives the same verdict. `starts` of the base model's fit. `n_jobs`: so many processes
+    try explanations, -1 one for each core; by default one process with a thread for each core, which suits a `simulate`
+    that releases the GIL (NumPy, numba). `executor` in their place: any of `concurrent.futures`, or dask's. `progress`:
+    a function that is told what begins, or False for silence.
+
+    Ctrl-C during the search ends it with the best so far. Raises MisuseError, RecordError and DeclarationError before
+    the search, naming trial and channel.
+    """
+    if records is not None:
+        system = with_records(system, records)
+    told = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
+    try:
+        with _workers(n_jobs, executor) as workers:
+            found = engine.diagnose(system, seed=seed, starts=starts, policy=policy, progress=told, executor=workers)
+    finally:
+        if isinstance(told, Progress):
+            told.end()
+    return Verdict(system, found)
+
+
+def with_records(system: System, records: Any) -> FunctionSystem:
+    """`system` with these records as its trials. Raises MisuseError, RecordError."""
+    if not isinstance(system, FunctionSystem):
+        raise MisuseError(f"{type(system).__name__} has trials of its own: call diagnose(system) without records.")
+    given = read(records)
+    tables = [one for one in given if isinstance(one, Table)]
+    outputs = system.outputs or (_outputs(system, tables[0]) if tables else ())
+    trials = [one if isinstance(one, Record) else stretched(one, one.record(outputs), outputs) for one in given]
+    return system.with_trials(trials)
+
+
+def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
+    """The names that `simulate` gives its outputs, tried on one record. Raises MisuseError."""
+    record = stretched(table, table.record(()), ())
+    run = record.payload.run if record.payload else record
+    theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(run))}
+    try:
+        found = system.simulate(run, system.values(theta))
+    except Exception as error:
+        raise MisuseError(f"trial {record.name}: the model raises {type(error).__name__}: {error}") from error
+    if isinstance(found, Mapping):
+        return tuple(found)
+    columns = [name for name, c in table.columns.items() if np.shape(c) == table.time_s.shape]
+    if len(columns) == 1:
+        return columns
+    raise MisuseError(
+        f"trial {record.name}: which of its columns ({', '.join(columns)}) does the model predict? Say System(...,"
+        " outputs=...), or return them by name, as a dict of arrays."
+    )
+
+
+@contextmanager
+def _workers(n_jobs: int | None, executor: Executor | None) -> Iterator[Executor | None]:
+    """Processes that take functions from a notebook as well, each on one thread."""
+    if executor is not None or n_jobs in (None, 0, 1):
+        yield executor
+        return
+    from loky import ProcessPoolExecutor
+
+    cores = max(1, len(os.sched_getaffinity(0)))
+    with ProcessPoolExecutor(n_jobs if n_jobs > 0 else cores, initializer=use_threads, initargs=(1,)) as pool:
+        yield pool
