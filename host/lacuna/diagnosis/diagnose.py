@@ -18,6 +18,7 @@ from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, rms, share_of_gap
 from lacuna.diagnosis.search import Search, screen, search
+from lacuna.diagnosis.sign import impossible_signs
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Finished
@@ -116,6 +117,7 @@ def diagnose(
     if verdict != "none" and left.matters:
         final = _corrected(case, found, choice, verdict, explained, None if stopped else crew)
     sites = tuple(final.structure.sites)
+    signs = impossible_signs(explained, policy) if left.matters else ()
     return Diagnosis(
         verdict,
         describe_effects(case, found, choice) if verdict == "identified" else (),
@@ -129,7 +131,7 @@ def diagnose(
         describe(base_known, remainder, drifts),
         Left(left, describe(explained, left, drifts), 1.0 - closed, sites),
         nearest(case, found, choice if verdict == "identified" else None),
-        (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split)),
+        (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split), *signs),
         tuple((system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
         _next(choice, found) if verdict == "identified" else NextExperiment(),
         found,
