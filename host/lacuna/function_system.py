@@ -24,6 +24,8 @@ from lacuna.system import (
 )
 from lacuna.values import Values
 
+ESTIMATED = "estimated"
+
 Simulate = Callable[[Record, Values], Any]
 
 
@@ -61,8 +63,8 @@ class FunctionSystem(System):
       By default the outputs, their rates and directions, and the inputs.
     - `sensor_noise`, `accuracy`: by output, in its unit: the instrument's standard deviation; the RMS error up to which
       a prediction is good enough whatever the noise.
-    - `noise_time_s`: by output (or for all), the correlation time of the noise; for records without repeats, where it
-      is estimated otherwise.
+    - `noise_time_s`: for records without repeats, how long the noise remembers itself, by output or for all; or
+      "estimated", from what a first diagnosis leaves. By default only the fast noise of a record counts as noise.
     - `curves`: `CorrectionSite`s at which a curve may be learnt if no effect explains the records; `theta.NAME(x)`.
     - `experiments`: `CandidateExperiment`s that could be run next. `spare`: conditions that are never fitted.
 
@@ -81,7 +83,7 @@ class FunctionSystem(System):
         regressors: Callable[[Record, Channels], Mapping[str, np.ndarray]] | None = None,
         sensor_noise: Mapping[str, float] | None = None,
         accuracy: Mapping[str, float] | None = None,
-        noise_time_s: Mapping[str, float] | float | None = None,
+        noise_time_s: Mapping[str, float] | float | str = 0.0,
         curves: Iterable[CorrectionSite] = (),
         experiments: Iterable[CandidateExperiment] = (),
         spare: Iterable[Hashable] = (),
@@ -104,7 +106,12 @@ class FunctionSystem(System):
         self._nuisances = nuisances if callable(nuisances) else tuple(nuisances)
         self._regressors = regressors or _regressors
         self._sensor_noise, self._accuracy = dict(sensor_noise or {}), dict(accuracy or {})
-        self.noise_time_s = noise_time_s
+        if isinstance(noise_time_s, str) and noise_time_s != ESTIMATED:
+            raise DeclarationError(
+                f'noise_time_s is seconds, seconds by output, or "{ESTIMATED}", not {noise_time_s!r}.'
+            )
+        self.estimates_noise_time = noise_time_s == ESTIMATED
+        self._noise_time_s = 0.0 if self.estimates_noise_time else noise_time_s
         self._sites = {site.name: site for site in curves}
         self._experiments, self._spare = tuple(experiments), frozenset(spare)
 
@@ -115,6 +122,12 @@ class FunctionSystem(System):
         """The same system with these measured records."""
         other = copy(self)
         other.trials = tuple(trials)
+        return other
+
+    def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
+        """The same system, told how long the noise of each output remembers itself."""
+        other = copy(self)
+        other._noise_time_s, other.estimates_noise_time = dict(seconds), False
         return other
 
     # -- in the person's parameters ---------------------------------------------------------------------------
@@ -177,6 +190,10 @@ class FunctionSystem(System):
 
     def accuracy(self, experiment: str, channel: str) -> float:
         return self._accuracy.get(channel, 0.0)
+
+    def noise_time_s(self, experiment: str, channel: str) -> float:
+        told = self._noise_time_s
+        return told.get(channel, 0.0) if isinstance(told, Mapping) else float(told)
 
     def spare(self) -> tuple[tuple[str, Hashable], ...]:
         return tuple({(t.experiment, t.condition) for t in self.trials if t.condition in self._spare})

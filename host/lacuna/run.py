@@ -6,15 +6,18 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from lacuna.check import MisuseError
 from lacuna.diagnosis import diagnose as engine
+from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.problem import use_threads
 from lacuna.function_system import FunctionSystem
+from lacuna.noise_time import left_over_s
 from lacuna.progress import Progress
 from lacuna.records import Table, read, stretched
 from lacuna.system import Record, System
@@ -46,13 +49,34 @@ def diagnose(
     if records is not None:
         system = with_records(system, records)
     told = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
+    how = {"seed": seed, "starts": starts, "policy": policy, "progress": told}
     try:
         with _workers(n_jobs, executor) as workers:
-            found = engine.diagnose(system, seed=seed, starts=starts, policy=policy, progress=told, executor=workers)
+            found = engine.diagnose(system, **how, executor=workers)
+            left_s = left_over_s(found)
+            if getattr(system, "estimates_noise_time", False) and any(left_s.values()):
+                system = system.with_noise_time(left_s)
+                found = engine.diagnose(system, **how, executor=workers)
+                left_s = {}
     finally:
         if isinstance(told, Progress):
             told.end()
-    return Verdict(system, found)
+    return Verdict(system, _cautioned(found, system, left_s))
+
+
+def _cautioned(found: Diagnosis, system: System, left_s: Mapping[str, float]) -> Diagnosis:
+    """With a word on what is left where only a repeat, or the person, can say whether it is noise."""
+    said = [
+        f"What is left of {channel} remembers itself for about {seconds:.2g} s. If that is noise, say so:"
+        f' noise_time_s={{"{channel}": {seconds:.2g}}}, or "estimated".'
+        for channel, seconds in left_s.items()
+        if seconds > 0.0 and found.left.matters and not any(system.noise_time_s(*k) for k in _keys(found, channel))
+    ]
+    return replace(found, warnings=(*found.warnings, *said)) if said else found
+
+
+def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:
+    return [key for key in found.search.floor.channels if key[1] == channel]
 
 
 def with_records(system: System, records: Any) -> FunctionSystem:

@@ -264,6 +264,11 @@ class System(Protocol):
         """A parameter's fitted value as a person knows it, where the two are not the same (a logarithm)."""
         return value
 
+    def noise_time_s(self, experiment: str, channel: str) -> float:
+        """Correlation time of the noise, where no repeats show it. 0: only the fast noise of a record counts as
+        noise, whatever is slower as structure."""
+        return 0.0
+
     @property
     def correction_sites(self) -> Mapping[str, CorrectionSite]:
         return {}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.system import Record
@@ -34,18 +33,22 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
     alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
     if not alone:
         return f"The floor comes from what {repeats} pairs of repeats differ by."
+    told = {c: noise_time for c in alone if (noise_time := _noise_time(diagnosis, c))}
+    if len(told) == len(alone):
+        listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())
+        return (
+            f"Without repeats the floor is what residuals change by within the noise's correlation time ({listed});"
+            " whatever varies as fast counts as noise here, whatever is slower as structure."
+        )
     return (
         f"Without repeats the floor of {', '.join(alone)} is the record's own fast noise: whatever varies slowly from"
         " run to run counts as structure here, and only a repeat could show that it is none."
     )
 
 
-def conditions(diagnosis: Diagnosis) -> dict[Hashable, list[Record]]:
-    """The trials by condition."""
-    found: dict[Hashable, list[Record]] = defaultdict(list)
-    for trial in _trials(diagnosis):
-        found[trial.experiment, trial.condition].append(trial)
-    return found
+def _noise_time(diagnosis: Diagnosis, channel: str) -> float:
+    system = diagnosis.base.structure.system
+    return max(system.noise_time_s(*key) for key in diagnosis.search.floor.channels if key[1] == channel)
 
 
 def _trials(diagnosis: Diagnosis) -> tuple[Record, ...]:

@@ -138,7 +138,7 @@ def test_refuses_names_that_are_used_twice():
 def test_refuses_repeats_of_different_inputs():
     records = heater.records(repeats=2)
     records["steps_4W_2"]["power_W"] = -records["steps_4W_2"]["power_W"]
-    with pytest.raises(MisuseError, match="steps_4W_1 and steps_4W_2 are called repeats.*power_W differs"):
+    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are called repeats.*power_W differs"):
         lacuna.diagnose(heater.system(), records, progress=pytest.fail)
 
 
