@@ -108,18 +108,26 @@ def _check_repeats(trials: Sequence[Record]) -> None:
     groups: dict[Hashable, list[Record]] = defaultdict(list)
     for trial in trials:
         groups[trial.experiment, trial.condition].append(trial)
+    names = {name for trial in trials for name in trial.inputs}
+    spreads = {name: _input_spread(trials, name) for name in names}
     for first, *others in groups.values():
         for other in others:
-            for name in first.inputs.keys() & other.inputs.keys():
-                _check_same_input(first, other, name)
+            for name in sorted(first.inputs.keys() & other.inputs.keys()):
+                _check_same_input(first, other, name, spreads[name])
 
 
-def _check_same_input(first: Record, other: Record, name: str) -> None:
+def _input_spread(trials: Sequence[Record], name: str) -> float:
+    """Over all trials: a measured input may be all noise in one of them."""
+    columns = [np.asarray(t.inputs[name]) for t in trials if np.shape(t.inputs.get(name)) == t.time_s.shape]
+    columns = [column for column in columns if column.dtype.kind in "fiu"]
+    return _spread(np.concatenate(columns)) if columns else 0.0
+
+
+def _check_same_input(first: Record, other: Record, name: str, spread: float) -> None:
     a, b = first.inputs[name], other.inputs[name]
     if np.shape(a) != first.time_s.shape or np.shape(b) != other.time_s.shape or np.asarray(a).dtype.kind not in "fiu":
         return
     a, b = np.asarray(a, float), np.interp(first.time_s - first.time_s[0], other.time_s - other.time_s[0], b)
-    spread = max(_spread(a), _spread(b))
     if spread > 0 and np.sqrt(np.nanmean((a - b) ** 2)) > _OTHER * spread:
         raise MisuseError(
             f"trials {first.name} and {other.name} are called repeats (condition {first.condition}), but their input"

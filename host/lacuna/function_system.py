@@ -112,6 +112,7 @@ class FunctionSystem(System):
             )
         self.estimates_noise_time = noise_time_s == ESTIMATED
         self._noise_time_s = 0.0 if self.estimates_noise_time else noise_time_s
+        self._raised: dict[tuple[str, str], float] = {}
         self._sites = {site.name: site for site in curves}
         self._experiments, self._spare = tuple(experiments), frozenset(spare)
 
@@ -122,6 +123,12 @@ class FunctionSystem(System):
         """The same system with these measured records."""
         other = copy(self)
         other.trials = tuple(trials)
+        return other
+
+    def with_floor(self, least: Mapping[tuple[str, str], float]) -> FunctionSystem:
+        """The same system, with noise floors of at least so much, by experiment and output."""
+        other = copy(self)
+        other._raised = dict(least)
         return other
 
     def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
@@ -186,7 +193,7 @@ class FunctionSystem(System):
         return dict(self._regressors(trial, prediction))
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
-        return self._sensor_noise.get(channel, 0.0)
+        return max(self._sensor_noise.get(channel, 0.0), self._raised.get((experiment, channel), 0.0))
 
     def accuracy(self, experiment: str, channel: str) -> float:
         return self._accuracy.get(channel, 0.0)

@@ -17,6 +17,7 @@ from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.problem import use_threads
 from lacuna.function_system import FunctionSystem
+from lacuna.misfit import compared_at_misfit
 from lacuna.noise_time import left_over_s
 from lacuna.progress import Progress
 from lacuna.records import Table, read, stretched
@@ -52,21 +53,33 @@ def diagnose(
     how = {"seed": seed, "starts": starts, "policy": policy, "progress": told}
     try:
         with _workers(n_jobs, executor) as workers:
-            found = engine.diagnose(system, **how, executor=workers)
-            left_s = left_over_s(found)
-            if getattr(system, "estimates_noise_time", False) and any(left_s.values()):
-                system = system.with_noise_time(left_s)
-                found = engine.diagnose(system, **how, executor=workers)
-                left_s = {}
+
+            def answer(one: System) -> Diagnosis:
+                return engine.diagnose(one, **how, executor=workers)
+
+            found, raised = answer(system), {}
+            if isinstance(system, FunctionSystem):
+                if system.estimates_noise_time and any((left_s := left_over_s(found)).values()):
+                    system = system.with_noise_time(left_s)
+                    found = answer(system)
+                found, raised = compared_at_misfit(system, found, answer)
     finally:
         if isinstance(told, Progress):
             told.end()
-    return Verdict(system, _cautioned(found, system, left_s))
+    return Verdict(system, _cautioned(found, system, raised))
 
 
-def _cautioned(found: Diagnosis, system: System, left_s: Mapping[str, float]) -> Diagnosis:
-    """With a word on what is left where only a repeat, or the person, can say whether it is noise."""
+def _cautioned(found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float]) -> Diagnosis:
+    """With a word on what is left: where it is far above the floor, and where only a repeat, or the person, can say
+    whether it is noise."""
+    levels = found.search.floor.channels
     said = [
+        f"No explanation comes near the floor of {channel} in {experiment} ({floor:.3g}): they were compared at a floor"
+        f" of {levels[experiment, channel].sd:.3g}, a fraction of what the best of them leaves."
+        for (experiment, channel), floor in raised.items()
+    ]
+    left_s = {} if raised else left_over_s(found)
+    said += [
         f"What is left of {channel} remembers itself for about {seconds:.2g} s. If that is noise, say so:"
         f' noise_time_s={{"{channel}": {seconds:.2g}}}, or "estimated".'
         for channel, seconds in left_s.items()

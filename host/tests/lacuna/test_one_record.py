@@ -147,6 +147,19 @@ def test_too_short_a_record_is_refused():
 
 def test_only_estimated_is_a_word_for_a_time():
     with pytest.raises(lacuna.LacunaError, match="noise_time_s is seconds"):
-        lacuna.System(
-            heater.simulate, heater.PARAMETERS, [Effect("e", Parameter("a", "", 1, 0, 2))], noise_time_s="slow"
-        )
+        heater.system(noise_time_s="slow")
+
+
+def test_where_no_explanation_comes_near_the_floor_they_are_compared_above_it():
+    """A slow drift that nothing on offer explains, in a record that is all but free of noise."""
+    one = record(9, samples=1200, **LIMIT)
+    draw = np.random.default_rng(9)
+    drift = lfilter([0.002], [1.0, -0.998], draw.standard_normal(1200))
+    one["temperature_K"] = lfilter([0.2], [1.0, -0.8], lfilter([0.2], [1.0, -0.8], one["temperature_K"])) + 10.0 * drift
+    found = lacuna.diagnose(heater.system(), lacuna.segments(one), progress=False)
+    (said,) = [w for w in found.warnings if w.startswith("No explanation comes near the floor of temperature_K")]
+    floor, raised = (float(words.split(")")[0].split(",")[0]) for words in (said.split("(")[1], said.split("of ")[-2]))
+    (noise,) = found.diagnosis.search.floor.channels.values()
+    assert noise.sd == pytest.approx(raised, rel=0.01)
+    assert raised > 2 * floor
+    assert 5.0 < found.error["after"] < 40.0
