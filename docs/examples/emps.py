@@ -43,17 +43,16 @@ effects = [  # of each parameter its name, unit, a typical value, and bounds
     Effect("asymmetric_friction", friction, sizes=2),
     Effect("stribeck", dip),
     Effect("delay", Parameter("delay_s", "s", 2e-3, 0.0, 0.05)),
-    Effect("pulses", Parameter("gain", "1", 1.0, -3.0, 3.0)),  # logged, but the motor's signal has them already: a decoy
+    Effect("pulses", Parameter("gain", "1", 1.0, -3.0, 3.0)),  # logged, but the motor's signal has them already
 ]
 system = lacuna.System(simulate, [Parameter("mass_kg", "kg", 95.0, 50.0, 150.0)], effects, nuisances=start, name="EMPS")
 
 
 def read(mat_file):
     mat = {name: column.ravel() for name, column in loadmat(mat_file).items() if name[0] != "_"}
-    motor_N, speed_m_s = mat["gtau"][0] * mat["vir"], savgol_filter(mat["qm"], 31, 3, deriv=1, delta=1e-3)
-    pulses_N = mat.get("pulses_N", np.zeros_like(motor_N))
-    columns = {"position_mm": 1e3 * mat["qm"], "speed_m_s": speed_m_s, "motor_N": motor_N, "pulses_N": pulses_N}
-    return {"time_s": 1e-3 * np.arange(len(motor_N))} | columns
+    motor_N, v_m_s = mat["gtau"][0] * mat["vir"], savgol_filter(mat["qm"], 31, 3, deriv=1, delta=1e-3)
+    inputs = {"motor_N": motor_N, "speed_m_s": v_m_s, "pulses_N": mat.get("pulses_N", 0.0 * motor_N)}
+    return {"time_s": 1e-3 * np.arange(len(motor_N)), "position_mm": 1e3 * mat["qm"]} | inputs
 
 
 def windows(record):

@@ -1,5 +1,7 @@
 """One long record without repeats: the right mechanisms from the default settings, however effects are written down."""
 
+from types import SimpleNamespace
+
 import heater
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scipy.signal import lfilter
 
 import lacuna
 from lacuna import Parameter
+from lacuna.misfit import compared_at_misfit
 from lacuna.records import RecordError
 from lacuna.run import with_records
 from lacuna.values import Values
@@ -150,16 +153,35 @@ def test_only_estimated_is_a_word_for_a_time():
         heater.system(noise_time_s="slow")
 
 
-def test_where_no_explanation_comes_near_the_floor_they_are_compared_above_it():
-    """A slow drift that nothing on offer explains, in a record that is all but free of noise."""
-    one = record(9, samples=1200, **LIMIT)
-    draw = np.random.default_rng(9)
-    drift = lfilter([0.002], [1.0, -0.998], draw.standard_normal(1200))
-    one["temperature_K"] = lfilter([0.2], [1.0, -0.8], lfilter([0.2], [1.0, -0.8], one["temperature_K"])) + 10.0 * drift
-    found = lacuna.diagnose(heater.system(), lacuna.segments(one), progress=False)
-    (said,) = [w for w in found.warnings if w.startswith("No explanation comes near the floor of temperature_K")]
-    floor, raised = (float(words.split(")")[0].split(",")[0]) for words in (said.split("(")[1], said.split("of ")[-2]))
-    (noise,) = found.diagnosis.search.floor.channels.values()
-    assert noise.sd == pytest.approx(raised, rel=0.01)
-    assert raised > 2 * floor
-    assert 5.0 < found.error["after"] < 40.0
+def _found(verdict, left, floor):
+    """A diagnosis as far as its misfit: what the best explanation leaves of one channel, and its floor."""
+    trial = SimpleNamespace(name="a", experiment="run")
+    final = SimpleNamespace(residuals=lambda: {"a": {"y": np.full(9, left)}}, problem=SimpleNamespace(trials=(trial,)))
+    floors = SimpleNamespace(channels={("run", "y"): SimpleNamespace(sd=floor)})
+    return SimpleNamespace(verdict=verdict, final=final, search=SimpleNamespace(floor=floors))
+
+
+def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_they_leave():
+    """From a raised floor of 0.05 a better one is found, which lies below it; from 0.002 no better one is."""
+    leaves, raised = {0.05: 0.04, 0.002: 0.04}, []
+
+    def again(system):
+        raised.append(round(system.sensor_noise("run", "y"), 9))
+        return _found("identified", leaves[raised[-1]], raised[-1])
+
+    first = _found("unexplained", 1.0, 0.001)
+    found, was = compared_at_misfit(heater.system(), first, again)
+    assert raised == [0.05, 0.002]
+    assert found.search.floor.channels["run", "y"].sd == 0.05
+    assert was == {("run", "y"): 0.001}
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(0.009, "identified"), (1.0, "none")])
+def test_near_the_floor_or_without_a_gap_nothing_is_compared_again(left, verdict):
+    first = _found(verdict, left, 0.001)
+    assert compared_at_misfit(heater.system(), first, pytest.fail) == (first, {})
+
+
+def test_where_a_raised_floor_hides_everything_the_first_answer_stands():
+    first = _found("unexplained", 1.0, 0.001)
+    assert compared_at_misfit(heater.system(), first, lambda system: _found("none", 1.0, 0.05)) == (first, {})
