@@ -1,8 +1,8 @@
 """What a system has to say about itself so that it can be fitted and diagnosed.
 
 A `System` is a model with named parameters, a library of effects that the model may lack, and trials:
-measured records with the experiment that made them. The engine knows nothing else; the robot is one system,
-`docs/adding-your-own-system.md` shows another.
+measured records with the experiment that made them. The engine knows nothing else; the robot is one system. Who has
+a plain function need not derive from it: `lacuna.System` (`function_system.py`) makes one of that.
 
 Every parameter of the base model has a plain name (`body_damping_Ns_m`), every parameter of an effect the
 name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping of both.
@@ -11,7 +11,7 @@ name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -75,8 +75,8 @@ class Effect:
     """
 
     name: str
-    parameters: tuple[Parameter, ...]
-    enters: str
+    parameters: tuple[Parameter, ...]  # one alone needs no brackets
+    enters: str = ""
     experiments: tuple[str, ...] = ()
     confusable_with: tuple[str, ...] = ()
     equation: str = ""
@@ -86,6 +86,13 @@ class Effect:
     start_factors: tuple[float, ...] = (0.1, 0.4, 1.2)
     own: tuple[Parameter, ...] = ()
     frequency: str | None = None
+
+    def __post_init__(self) -> None:
+        for each in ("parameters", "own"):
+            given = getattr(self, each)
+            object.__setattr__(self, each, (given,) if isinstance(given, Parameter) else tuple(given))
+        if not 1 <= self.sizes <= len(self.parameters):
+            raise ValueError(f"effect {self.name}: `sizes` is {self.sizes}, of {len(self.parameters)} parameters")
 
     def full_name(self, parameter: Parameter) -> str:
         return f"{self.name}.{parameter.name}"
@@ -102,8 +109,8 @@ class Record:
 
     `channels` maps a channel's name to its samples, shape (n,), unit in the name; NaN where a sample is
     missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise
-    floor comes from them. `session_order` is the trial's place in the day, None if not known. `payload` is
-    the system's own.
+    floor comes from them. `session_order` is the trial's place in the day, None if not known. `inputs`: what was given
+    and not measured, by name: arrays of shape (n,) and single values. `payload` is the system's own.
     """
 
     name: str
@@ -113,6 +120,17 @@ class Record:
     channels: Channels
     session_order: int | None = None
     payload: Any = None
+    inputs: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Any:
+        """An input or else a measured channel; KeyError says what there is."""
+        for columns in (self.inputs, self.channels):
+            if name in columns:
+                return columns[name]
+        raise KeyError(f"{name}: record {self.name} has {', '.join([*self.inputs, *self.channels])}")
+
+    def __repr__(self) -> str:
+        return f"Record({self.name!r}, {len(self.time_s)} samples of {', '.join(self.channels)})"
 
 
 @dataclass(frozen=True)
@@ -240,6 +258,15 @@ class System(Protocol):
     def sensor_noise(self, experiment: str, channel: str) -> float:
         """Standard deviation of the instrument alone, in the channel's unit: the floor's lower bound.
         0: not known."""
+        return 0.0
+
+    def told(self, parameter: str, value: float) -> float:
+        """A parameter's fitted value as a person knows it, where the two are not the same (a logarithm)."""
+        return value
+
+    def noise_time_s(self, experiment: str, channel: str) -> float:
+        """Correlation time of the noise, where no repeats show it. 0: only the fast noise of a record counts as
+        noise, whatever is slower as structure."""
         return 0.0
 
     @property

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from . import tables
 from .layout import EXPERIMENTS, SETTINGS
 
 
@@ -67,6 +68,14 @@ class Trial:
         parts += [f"{key} {self.extra[key]}" for key in SETTINGS if key in self.extra]
         return ", ".join(parts)
 
+    def to_pandas(self):
+        """The columns as a DataFrame over time; the condition and the repeat in its `attrs`. Needs pandas."""
+        return tables.to_pandas(self)
+
+    def plot(self, axes=None):
+        """Draw every column over time, one quantity below the other; returns the figure."""
+        return tables.plot(self, axes)
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
@@ -83,6 +92,10 @@ class Dataset:
         return tuple(
             trial for trial in self.trials if trial.experiment == experiment and actuator in (None, trial.actuator)
         )
+
+    def to_pandas(self):
+        """All trials below one another, by file and time. Needs pandas."""
+        return tables.stacked(self.trials)
 
     def repeats(self) -> Iterator[tuple[Trial, ...]]:
         """Groups of trials that repeat one condition, in the order in which they first appear."""

@@ -6,6 +6,7 @@ import time
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
+from lacuna.check import TooLittleDataError, check
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
@@ -17,16 +18,13 @@ from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, rms, share_of_gap
 from lacuna.diagnosis.search import Search, screen, search
+from lacuna.diagnosis.sign import impossible_signs
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
+from lacuna.diagnosis.stopped import STOPPED, Finished
 from lacuna.diagnosis.warn import warnings_of
-from lacuna.errors import LacunaError
 from lacuna.estimation.fit import Fit, converged
 from lacuna.system import Correction, CorrectionSite, System
-
-
-class TooLittleDataError(LacunaError):
-    """There is nothing to fit, or nothing to judge a fit by."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Left:
         return self.remainder.matters
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """The engine's answer to three questions.
 
@@ -75,6 +73,10 @@ class Diagnosis:
     drifts: tuple[Drift, ...]
     seconds: float
 
+    def __repr__(self) -> str:
+        named = "".join(f", {e.name}" for e in self.effects)
+        return f"<{self.verdict}{named}: error {self.before.held_out:.3g} to {self.after.held_out:.3g} floors>"
+
 
 def diagnose(
     system: System,
@@ -86,8 +88,10 @@ def diagnose(
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Explanations are tried
-    on `executor`, if there is one that can ship the system."""
+    on `executor`, if there is one that can ship the system. Ctrl-C during the search ends it with the best so far.
+    Raises MisuseError before the search where the system or its trials would mislead it."""
     began = time.monotonic()
+    cautions = check(system)
     split = split_trials(system.trials, system.spare())
     if not split.fit or not split.judging:
         raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
@@ -95,7 +99,7 @@ def diagnose(
     case = Case(system, split, policy, seed)
     crew.say("fitting the base model")
     base = case.fit_base(starts)
-    found = _explanations(case, base, crew)
+    found, stopped = _explanations(case, base, crew)
     choice = choose(found, split, policy, case.suffices)
     choice = drop_absent(case, found, choice)
     base_known = converged(case.on_known(found.base))
@@ -111,8 +115,9 @@ def diagnose(
     left = case.remainder(explained) if verdict == "identified" else remainder
     final = explained
     if verdict != "none" and left.matters:
-        final = _corrected(case, found, choice, verdict, explained, crew)
+        final = _corrected(case, found, choice, verdict, explained, None if stopped else crew)
     sites = tuple(final.structure.sites)
+    signs = impossible_signs(explained, policy) if left.matters else ()
     return Diagnosis(
         verdict,
         describe_effects(case, found, choice) if verdict == "identified" else (),
@@ -126,7 +131,7 @@ def diagnose(
         describe(base_known, remainder, drifts),
         Left(left, describe(explained, left, drifts), 1.0 - closed, sites),
         nearest(case, found, choice if verdict == "identified" else None),
-        warnings_of(final, split),
+        (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split), *signs),
         tuple((system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
         _next(choice, found) if verdict == "identified" else NextExperiment(),
         found,
@@ -137,12 +142,18 @@ def diagnose(
     )
 
 
-def _explanations(case: Case, base: Fit, crew: Crew) -> Search:
-    """Everything tried. Nothing is where the base model leaves nothing that matters."""
+def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
+    """Everything tried, and whether the search was stopped by hand. Nothing is tried where the base model leaves
+    nothing that matters."""
     first = case.judge(base)
     if case.suffices(first):
-        return Search(first, base.problem.floor, (first,), tuple(screen(base, case.split, base.problem.floor)))
-    return search(base, case.split, base.problem.floor, enough=case.suffices, policy=case.policy, crew=crew)
+        return Search(first, base.problem.floor, (first,), tuple(screen(base, case.split, base.problem.floor))), False
+    finished = Finished(case.suffices)
+    try:
+        return search(base, case.split, base.problem.floor, enough=finished, policy=case.policy, crew=crew), False
+    except KeyboardInterrupt:
+        crew.say("stopped: weighing what was found until now (Ctrl-C again gives up)")
+        return finished.search(first, case.split), True
 
 
 def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, drifts: tuple[Drift, ...]) -> str:
@@ -153,12 +164,13 @@ def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, dr
     return "identified" if case.closed(choice.candidate, found.base) >= case.policy.half else "unexplained"
 
 
-def _corrected(case: Case, found: Search, choice: Choice, verdict: str, explained: Fit, crew: Crew) -> Fit:
-    """`explained` with curves learnt on top where they hold on trials that informed nothing. Where nothing is
-    supported, the best of everything tried stands beside them, so that what is reported is never worse than that."""
+def _corrected(case: Case, found: Search, choice: Choice, verdict: str, explained: Fit, crew: Crew | None) -> Fit:
+    """`explained` with curves learnt on top where they hold on trials that informed nothing; without a crew none are.
+    Where nothing is supported, the best of everything tried stands beside them, so that what is reported is never worse
+    than that."""
     split = case.split
     parents = [choice.candidate] if verdict == "identified" else list(dict.fromkeys((found.base, choice.candidate)))
-    learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew)
+    learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew) if crew else None
     offered = [learnt] if learnt and holds(case.on_known(learnt), explained, split) else []
     if verdict == "unexplained":
         offered += found.tried

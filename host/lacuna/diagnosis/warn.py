@@ -31,13 +31,14 @@ def _failed(fits: list[Fit]) -> list[str]:
 
 def _parameters(fitted: Fit) -> list[str]:
     known = uncertainty(fitted)
+    told = fitted.structure.system.told
     found = [
-        f"{e.name} is at its bound ({e.value:.4g} {e.unit}): the data ask for more than it allows.".replace(" )", ")")
+        f"{e.name} is at its bound ({_quantity(told(e.name, e.value), e.unit)}): the data ask for more than it allows."
         for e in known.estimates
         if e.at_bound
     ]
     found += [
-        f"{e.name} = {e.value:.4g} {e.unit} lies outside its plausible range.".replace("  ", " ")
+        f"{e.name} = {_quantity(told(e.name, e.value), e.unit)} lies outside its plausible range."
         for e in known.estimates
         if e.implausible and not e.at_bound
     ]
@@ -56,6 +57,10 @@ def _strayed(fits: list[Fit]) -> list[str]:
                 if "." not in parameter.name and abs(value - parameter.value) > _NEAR_LIMIT * parameter.step_scale:
                     far.setdefault(parameter.name, []).append(trial.name)
     return [f"{name} is at its limit in {_listed(trials)}: it stands in for something." for name, trials in far.items()]
+
+
+def _quantity(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".rstrip()
 
 
 def _listed(names: list[str], most: int = 4) -> str:

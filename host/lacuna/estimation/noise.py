@@ -36,7 +36,7 @@ class ChannelNoise:
 
     `sd` in the channel's unit, `jitter_s` of events in time, `samples_per_piece`: how many neighbouring
     samples count as one independent observation. `repeats` is the number of pairs of repeats it came from;
-    0: the sensor's word only.
+    0: there are none.
     """
 
     sd: float
@@ -98,6 +98,8 @@ def estimate_noise(
         sensor = system.sensor_noise(*key)
         if pairs := by_key.get(key):
             channels[key] = _from_pairs(pairs, key[1], sensor, residuals)
+        elif correlated_s := system.noise_time_s(*key):
+            channels[key] = _of_correlated(members, key[1], correlated_s, sensor, residuals)
         else:
             sd = max(sensor, float(np.median([_fast_noise(trial.channels[key[1]]) for trial in members])))
             channels[key] = ChannelNoise(max(sd, _smallest(members, key[1])), 0.0, 1.0, 0)
@@ -136,6 +138,27 @@ def _from_pairs(
         variance = sd**2 + (_shift_variance(first, channel, jitter_s, sd) if jitter_s else 0.0)
         scaled.append(difference / np.sqrt(variance))
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
+
+
+def _of_correlated(
+    members: Sequence[Record],
+    channel: str,
+    correlated_s: float,
+    sensor: float,
+    residuals: Mapping[str, Channels] | None,
+) -> ChannelNoise:
+    """Without repeats, told how long the noise remembers itself: from what residuals (without them the records, as an
+    upper bound) change by within that time, since what changes more slowly is no noise."""
+    changes, pieces = [], []
+    for trial in members:
+        samples = trial.channels[channel] if residuals is None else residuals[trial.name][channel]
+        period = _sample_period(trial)
+        lag = min(max(1, round(correlated_s / period)), len(samples) // 2)
+        kept = np.exp(-period / correlated_s)
+        changes.append((samples[lag:] - samples[:-lag]) / np.sqrt(2.0 * (1.0 - kept**lag)))
+        pieces.append((1.0 + kept) / (1.0 - kept))
+    sd = float(1.4826 * np.nanmedian(np.abs(np.concatenate(changes))))
+    return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, float(np.median(pieces)), 0)
 
 
 def _difference(first: Record, second: Record, channel: str, residuals: Mapping[str, Channels] | None) -> np.ndarray:

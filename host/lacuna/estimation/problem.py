@@ -24,7 +24,19 @@ _FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max(1, len(os.sched_getaffinity(0))))
+    return ThreadPoolExecutor(_threads or max(1, len(os.sched_getaffinity(0))))
+
+
+_threads: int | None = None
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # a child has the pool but none of its threads: it would wait
+
+
+def use_threads(count: int | None) -> None:
+    """From now on this process simulates on so many threads; None: on all cores."""
+    global _threads
+    _threads = count
+    _pool.cache_clear()
 
 
 def in_parallel(function: Callable, items: Iterable) -> list:

@@ -5,10 +5,10 @@ import sys
 
 from toy import hide
 
-from bifa.report.diagnosis import diagnosis_page
-from bifa.report.page import render
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.record import as_record
+from lacuna.report.diagnosis import diagnosis_page
+from lacuna.report.page import render
 
 
 def test_page_says_the_effect_and_loads_nothing():

@@ -1,0 +1,88 @@
+"""What a notebook needs: `import bifa`, a data set, a robot that is simulated, diagnosed, optimised, and talked to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from bifa.data import Dataset, Trial, read_dataset
+from bifa.robot import BASELINE, Gait, Model, load_model, nominal, read_gait_file, save_model
+
+
+def load_dataset(folder: str | Path) -> Dataset:
+    """The data set in `folder`. Raises DatasetError, with file, line and column."""
+    return read_dataset(Path(folder))
+
+
+class Robot:
+    """A robot as a model has it: the paper's nominal one, one from a model file, or one completed by a diagnosis."""
+
+    def __init__(self, model: Model | str | Path | None = None):
+        self.model = nominal() if model is None else model if isinstance(model, Model) else load_model(Path(model))
+
+    def __repr__(self) -> str:
+        effects = "".join(f", {name}" for name in self.model.effects)
+        return f"Robot({self.model.name!r}{effects})"
+
+    def simulate(self, gait: Gait | str | Path = BASELINE, cycles: int = 5) -> Trial:
+        """A walk from rest, sampled at 100 Hz, as a trial of a data set would have it."""
+        from bifa.simulate import walk
+
+        gait = _gait(gait)
+        walked = walk(self.model, gait, cycles)
+        columns = {name: np.asarray(column) for name, column in walked.columns.items()}
+        return Trial(f"{self.model.name} simulated", "locomotion", columns, gait=gait.as_dict())
+
+    def speed_mm_s(self, gait: Gait | str | Path = BASELINE, cycles: int = 10) -> float:
+        """Of the last cycle."""
+        from bifa.simulate import gait_rows, speeds
+
+        return float(speeds(self.model, gait_rows([_gait(gait)]), cycles, 1e-6).speed_mm_s[0])
+
+    def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None):
+        """What this robot's model lacks, by a data set: a `lacuna.Verdict`. `matters`: RMS error by column up to which
+        a prediction is good enough. Minutes of processor for a whole campaign."""
+        import lacuna
+        from bifa.identify.start import prepare
+        from bifa.pipe_robot.accuracy import accuracies
+
+        system = prepare(dataset, self.model)
+        system.accuracies = accuracies([f"{name}={value}" for name, value in (matters or {}).items()])
+        return lacuna.diagnose(system, seed=seed)
+
+    def completed(self, verdict) -> Robot:
+        """The robot with what a verdict found: fitted values, effects, learnt curves."""
+        from bifa.identify.completed import completed_model
+
+        return Robot(completed_model(verdict.diagnosis.final))
+
+    def optimise(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None):
+        """The fastest gait on this robot, or (robust) on nine in ten like it: a `bifa.gait.Optimum`, with `gait`."""
+        from bifa.gait import Settings, optimise, simulations
+
+        settings = Settings(robust=robust, seed=seed, evaluations=evaluations)
+        with simulations() as runs:
+            return optimise(self.model, runs, settings)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file."""
+        save_model(Path(path), self.model)
+
+
+@contextmanager
+def connect(port: str | None = None) -> Iterator:
+    """The Uno at `port` (a serial port, `virtual`, or found by itself), connected: a `bifa.link.Uno`. Valves are off
+    at the end."""
+    from bifa.link import Uno
+    from bifa.rig import open_rig
+
+    with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        yield uno
+
+
+def _gait(gait: Gait | str | Path) -> Gait:
+    return gait if isinstance(gait, Gait) else read_gait_file(Path(gait)).gait

@@ -1,0 +1,103 @@
+"""In which coordinate a parameter is fitted, so that answers do not depend on how a person wrote an effect down.
+
+A limit (absent at infinity) and its inverse (absent at 0) are the same effect, a time constant and a rate the same
+shape. Each is fitted in one coordinate: sizes in the one in which they are absent at or near 0, what can only be
+positive by its logarithm, which is the same but for its sign whichever way round it is written. What is told to a
+person is in the person's own parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from lacuna.system import Effect, Parameter
+
+_FAR = 3.0  # times the typical size: where an effect is absent so far out, it is a limit
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """`fitted(told(u))` is u. `slope(x)` is |du/dx|, for what is known as a width. Units stay as told."""
+
+    fitted: Callable[[float], float]
+    told: Callable[[float], float]
+    slope: Callable[[float], float]
+
+    def interval(self, lower: float, upper: float) -> tuple[float, float]:
+        """In the person's parameter, the smaller end first."""
+        ends = sorted((self.told(lower), self.told(upper)))
+        return ends[0], ends[1]
+
+    def of(self, p: Parameter) -> Parameter:
+        """`p` as it is fitted."""
+        lower, upper = sorted((self.fitted(p.lower), self.fitted(p.upper)))
+        slope = self.slope(p.value)
+        return replace(
+            p,
+            value=self.fitted(p.value),
+            lower=lower,
+            upper=upper,
+            plausible=None if p.plausible is None else tuple(sorted(map(self.fitted, p.plausible))),
+            scale=p.step_scale * slope,
+            prior_sd=None if p.prior_sd is None else p.prior_sd * slope,
+            elsewhere=tuple(map(self.fitted, p.elsewhere)),
+        )
+
+
+def _same(value: float) -> float:
+    return value
+
+
+def _inverse(value: float) -> float:
+    return math.copysign(math.inf, value) if value == 0 else 1.0 / value
+
+
+def _log(value: float) -> float:
+    return math.log(value) if value > 0 else -math.inf
+
+
+def _exp(value: float) -> float:
+    return math.exp(min(value, 700.0))
+
+
+def _one(value: float) -> float:
+    return 1.0
+
+
+def _inverse_square(value: float) -> float:
+    return value**-2.0
+
+
+PLAIN = Coordinate(_same, _same, _one)
+INVERSE = Coordinate(_inverse, _inverse, _inverse_square)
+LOG = Coordinate(_log, _exp, _inverse)
+
+
+def of_parameter(p: Parameter, ordered: bool = False) -> Coordinate:
+    """Of the base model's parameters and those that shape an effect. `ordered`: it is bound to another one."""
+    return LOG if p.lower > 0.0 and not ordered else PLAIN
+
+
+def of_size(p: Parameter, absent: float) -> Coordinate:
+    """Of a parameter that sizes an effect."""
+    far = abs(absent) >= _FAR * abs(p.value) and absent * p.value > 0.0
+    return INVERSE if far and min(p.lower, p.upper) * max(p.lower, p.upper) >= 0.0 else PLAIN
+
+
+def of_effect(effect: Effect) -> tuple[Effect, dict[str, Coordinate]]:
+    """`effect` as it is fitted, and the coordinate of each of its parameters by its full name."""
+    chosen = {}
+    for place, p in enumerate(effect.parameters):
+        if p.name == effect.frequency:
+            chosen[p.name] = PLAIN  # fits begin at the peaks of a spectrum
+        else:
+            chosen[p.name] = of_size(p, effect.absent) if place < effect.sizes else of_parameter(p)
+    sizes = {chosen[p.name] for p in effect.parameters[: effect.sizes]}
+    if len(sizes) > 1:  # they are absent together
+        chosen |= {p.name: PLAIN for p in effect.parameters[: effect.sizes]}
+    absent = chosen[effect.parameters[0].name].fitted(effect.absent)
+    parameters = tuple(chosen[p.name].of(p) for p in effect.parameters)
+    coordinates = {effect.full_name(p): chosen[p.name] for p in effect.parameters}
+    return replace(effect, parameters=parameters, absent=absent), coordinates

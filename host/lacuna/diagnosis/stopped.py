@@ -1,0 +1,34 @@
+"""A search that is stopped by hand (Ctrl-C) still answers, from what it had finished by then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.search import Search, reweighed, screen
+from lacuna.diagnosis.split import Split
+
+STOPPED = "The search was stopped by hand: the verdict is the best that had been found until then."
+
+
+class Finished:
+    """Keeps every explanation that the search has fitted to the end, as it asks whether that is enough."""
+
+    def __init__(self, enough: Callable[[Candidate], bool]):
+        self._enough, self.candidates, self.stopped = enough, [], False
+
+    def __call__(self, candidate: Candidate) -> bool:
+        self.candidates.append(candidate)
+        return self._enough(candidate)
+
+    def search(self, base: Candidate, split: Split) -> Search:
+        """What a search would have returned: the best of each set, all against the latest floor."""
+        self.stopped = True
+        floor = (self.candidates[-1] if self.candidates else base).fitted.problem.floor
+        found: dict[frozenset[str], Candidate] = {}
+        for one in (base, *self.candidates):
+            same = one if one.fitted.problem.floor is floor else reweighed(one, split, floor)
+            known = found.setdefault(frozenset(one.effects), same)
+            found[frozenset(one.effects)] = min(known, same, key=lambda c: c.cost)
+        first = found[frozenset()]
+        return Search(first, floor, tuple(found.values()), tuple(screen(first.fitted, split, floor)))

@@ -1,0 +1,241 @@
+"""A system from a plain function: `lacuna.System(simulate, parameters=[...], effects=[...])`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from lacuna.coordinates import PLAIN, Coordinate, of_effect, of_parameter
+from lacuna.errors import LacunaError
+from lacuna.records import Stretch
+from lacuna.system import (
+    CandidateExperiment,
+    Channels,
+    Correction,
+    CorrectionSite,
+    Effect,
+    Parameter,
+    Record,
+    System,
+    Theta,
+)
+from lacuna.values import Values
+
+ESTIMATED = "estimated"
+
+Simulate = Callable[[Record, Values], Any]
+
+
+class DeclarationError(LacunaError):
+    """What was said of a system contradicts itself; the text says where."""
+
+
+class Curve:
+    """What is learnt at a site, as a function of its variable: 0 everywhere until something is."""
+
+    def __init__(self, site: CorrectionSite, table: np.ndarray | None = None):
+        self._at = np.linspace(site.lower, site.upper, 2 if table is None else table.shape[1])
+        self.rows = np.zeros((len(site.rows), 2)) if table is None else table
+
+    def __call__(self, variable: Any, row: int = 0) -> Any:
+        return np.interp(variable, self._at, self.rows[row])
+
+
+class FunctionSystem(System):
+    """A model as a function, with what it may lack.
+
+    `simulate(record, theta)` simulates one record freely: from its initial state and its inputs, never from measured
+    outputs. `record["force_N"]` is a column, shape (n,), or a single value of the record, `record.time_s` its times.
+    `theta.mass_kg` is a parameter, `theta.coulomb.force_N` one of an effect, which stands at its absent value while
+    the effect is off; `theta` holds them in the order in which they are declared here. It returns the predicted
+    outputs by name, shape (n,) each; if there is one, the array alone will do. It is called from several threads.
+
+    `parameters`: `Parameter`s of the model as it is. `effects`: `Effect`s that it may lack. All else is optional:
+
+    - `outputs`: names of the columns that `simulate` predicts; all others are its inputs. Needed where it returns bare
+      arrays and records have more than one column besides time.
+    - `nuisances`: what differs from run to run, as `Parameter`s or as a function of the record that returns them; in
+      `theta` under their own names. An initial state that is not exactly known is one.
+    - `regressors`: on what a residual may depend: a function of (record, prediction) that returns arrays by name.
+      By default the outputs, their rates and directions, and the inputs.
+    - `sensor_noise`, `accuracy`: by output, in its unit: the instrument's standard deviation; the RMS error up to which
+      a prediction is good enough whatever the noise.
+    - `noise_time_s`: for records without repeats, how long the noise remembers itself, by output or for all; or
+      "estimated", from what a first diagnosis leaves. By default only the fast noise of a record counts as noise.
+    - `curves`: `CorrectionSite`s at which a curve may be learnt if no effect explains the records; `theta.NAME(x)`.
+    - `experiments`: `CandidateExperiment`s that could be run next. `spare`: conditions that are never fitted.
+
+    Raises DeclarationError where names contradict one another.
+    """
+
+    def __init__(
+        self,
+        simulate: Simulate,
+        parameters: Iterable[Parameter],
+        effects: Iterable[Effect] = (),
+        *,
+        outputs: Sequence[str] | str = (),
+        name: str = "",
+        nuisances: Iterable[Parameter] | Callable[[Record], Iterable[Parameter]] = (),
+        regressors: Callable[[Record, Channels], Mapping[str, np.ndarray]] | None = None,
+        sensor_noise: Mapping[str, float] | None = None,
+        accuracy: Mapping[str, float] | None = None,
+        noise_time_s: Mapping[str, float] | float | str = 0.0,
+        curves: Iterable[CorrectionSite] = (),
+        experiments: Iterable[CandidateExperiment] = (),
+        spare: Iterable[Hashable] = (),
+    ):
+        self.simulate, self.name = simulate, name or getattr(simulate, "__name__", "system")
+        self.outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+        self.trials: tuple[Record, ...] = ()
+        given, library = tuple(parameters), _library(effects)
+        _all_different([p.name for p in given], "parameter")
+        ordered = {p.name for p in given if p.at_least} | {p.at_least for p in given}
+        self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in given}
+        self.parameters = tuple(self._coordinates[p.name].of(p) for p in given)
+        self.effects: dict[str, Effect] = {}
+        self._off: dict[str, float] = {}  # every effect's parameters as they are when it is off, as told
+        for effect in library:
+            self.effects[effect.name], coordinates = of_effect(effect)
+            self._coordinates |= coordinates
+            typical = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
+            self._off |= typical | dict.fromkeys(effect.size_names, effect.absent)
+        self._nuisances = nuisances if callable(nuisances) else tuple(nuisances)
+        self._regressors = regressors or _regressors
+        self._sensor_noise, self._accuracy = dict(sensor_noise or {}), dict(accuracy or {})
+        if isinstance(noise_time_s, str) and noise_time_s != ESTIMATED:
+            raise DeclarationError(
+                f'noise_time_s is seconds, seconds by output, or "{ESTIMATED}", not {noise_time_s!r}.'
+            )
+        self.estimates_noise_time = noise_time_s == ESTIMATED
+        self._noise_time_s = 0.0 if self.estimates_noise_time else noise_time_s
+        self._raised: dict[tuple[str, str], float] = {}
+        self._sites = {site.name: site for site in curves}
+        self._experiments, self._spare = tuple(experiments), frozenset(spare)
+
+    def __repr__(self) -> str:
+        return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"
+
+    def with_trials(self, trials: Iterable[Record]) -> FunctionSystem:
+        """The same system with these measured records."""
+        other = copy(self)
+        other.trials = tuple(trials)
+        return other
+
+    def with_floor(self, least: Mapping[tuple[str, str], float]) -> FunctionSystem:
+        """The same system, with noise floors of at least so much, by experiment and output."""
+        other = copy(self)
+        other._raised = dict(least)
+        return other
+
+    def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
+        """The same system, told how long the noise of each output remembers itself."""
+        other = copy(self)
+        other._noise_time_s, other.estimates_noise_time = dict(seconds), False
+        return other
+
+    # -- in the person's parameters ---------------------------------------------------------------------------
+
+    def coordinate(self, name: str) -> Coordinate:
+        """What parameter `name` is fitted in."""
+        return self._coordinates.get(name, PLAIN)
+
+    def told(self, parameter: str, value: float) -> float:
+        return self.coordinate(parameter).told(value)
+
+    def values(self, theta: Theta, corrections: Sequence[Correction] = ()) -> Values:
+        """What `simulate` gets for a fitted `theta`: told parameters, effects that it lacks off, curves."""
+        found = Values({p.name: 0.0 for p in self.parameters} | self._off)
+        for name, value in theta.items():
+            found[name] = self.told(name, value)
+        if self._sites:
+            learnt = {c.site: c.table for c in corrections}
+            found |= {name: Curve(site, learnt.get(name)) for name, site in self._sites.items()}
+        return found
+
+    def run(self, record: Record, values: Values) -> Channels:
+        """`simulate`, whatever it returns, as channels by name."""
+        whole = record.payload if isinstance(record.payload, Stretch) else None
+        found = self.simulate(whole.run if whole else record, values)
+        if not isinstance(found, Mapping):
+            if len(record.channels) != 1:
+                raise DeclarationError(
+                    f"{self.name}: simulate returned {type(found).__name__}, but the records have the outputs"
+                    f" {', '.join(record.channels)}: return them by name, as a dict of arrays."
+                )
+            found = {next(iter(record.channels)): found}
+        channels = {name: np.asarray(column) for name, column in found.items()}
+        return {n: c[whole.first :] if c.ndim else c for n, c in channels.items()} if whole else channels
+
+    # -- what the engine asks ----------------------------------------------------------------------------------
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Record,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        try:
+            return self.run(trial, self.values(theta, corrections))
+        except (ArithmeticError, np.linalg.LinAlgError):  # there is no simulation so far out
+            return {name: np.full(column.shape, np.nan) for name, column in trial.channels.items()}
+
+    def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
+        return tuple(self._nuisances(trial)) if callable(self._nuisances) else self._nuisances
+
+    def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
+        return dict(self._regressors(trial, prediction))
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        return max(self._sensor_noise.get(channel, 0.0), self._raised.get((experiment, channel), 0.0))
+
+    def accuracy(self, experiment: str, channel: str) -> float:
+        return self._accuracy.get(channel, 0.0)
+
+    def noise_time_s(self, experiment: str, channel: str) -> float:
+        told = self._noise_time_s
+        return told.get(channel, 0.0) if isinstance(told, Mapping) else float(told)
+
+    def spare(self) -> tuple[tuple[str, Hashable], ...]:
+        return tuple({(t.experiment, t.condition) for t in self.trials if t.condition in self._spare})
+
+    @property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        return self._sites
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return self._experiments
+
+
+def _library(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """`effects` as a sequence, or as the mapping that the engine has them in."""
+    if isinstance(effects, Mapping):
+        for key, effect in effects.items():
+            if key != effect.name:
+                raise DeclarationError(f"effect {effect.name} stands under the key {key}: give it its own name as key.")
+        effects = effects.values()
+    found = tuple(effects)
+    _all_different([e.name for e in found], "effect")
+    return found
+
+
+def _all_different(names: Sequence[str], what: str) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise DeclarationError(f"{what} {name} is declared {names.count(name)} times: give each its own name.")
+
+
+def _regressors(record: Record, prediction: Channels) -> dict[str, np.ndarray]:
+    """The outputs, their rates and directions of change, the inputs, and time."""
+    found = {}
+    for name, column in prediction.items():
+        rate = np.gradient(column, record.time_s)
+        found |= {name: column, f"rate of {name}": rate, f"direction of {name}": np.sign(rate)}
+    inputs = {name: np.asarray(column) for name, column in record.inputs.items()}
+    return found | {n: c for n, c in inputs.items() if c.shape == record.time_s.shape} | {"time": record.time_s}

@@ -1,0 +1,55 @@
+"""What was measured, and where the noise floor comes from, in words."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.system import Record
+
+Row = tuple[str, str, str, str, str]
+
+
+def measured_rows(diagnosis: Diagnosis) -> list[Row]:
+    """By experiment and channel: records, conditions, floor, and samples that count as one."""
+    groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
+    for trial in _trials(diagnosis):
+        for channel in trial.channels:
+            groups[trial.experiment, channel].append(trial)
+    rows = []
+    for (experiment, channel), trials in groups.items():
+        noise = diagnosis.search.floor.channels[experiment, channel]
+        conditions = len({t.condition for t in trials})
+        basis = f"{noise.repeats} pairs of repeats" if noise.repeats else "the record's own fast noise"
+        piece = f"{noise.samples_per_piece:.3g}"
+        rows.append((f"{experiment}: {channel}", f"{len(trials)} in {conditions}", f"{noise.sd:.3g}", piece, basis))
+    return rows
+
+
+def floor_sentence(diagnosis: Diagnosis) -> str:
+    """Where the floor comes from, and what that means where it is not from repeats."""
+    channels = diagnosis.search.floor.channels
+    repeats = sum(noise.repeats for noise in channels.values())
+    alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
+    if not alone:
+        return f"The floor comes from what {repeats} pairs of repeats differ by."
+    told = {c: noise_time for c in alone if (noise_time := _noise_time(diagnosis, c))}
+    if len(told) == len(alone):
+        listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())
+        return (
+            f"Without repeats the floor is what residuals change by within the noise's correlation time ({listed});"
+            " whatever varies as fast counts as noise here, whatever is slower as structure."
+        )
+    return (
+        f"Without repeats the floor of {', '.join(alone)} is the record's own fast noise: whatever varies slowly from"
+        " run to run counts as structure here, and only a repeat could show that it is none."
+    )
+
+
+def _noise_time(diagnosis: Diagnosis, channel: str) -> float:
+    system = diagnosis.base.structure.system
+    return max(system.noise_time_s(*key) for key in diagnosis.search.floor.channels if key[1] == channel)
+
+
+def _trials(diagnosis: Diagnosis) -> tuple[Record, ...]:
+    return diagnosis.base.structure.system.trials

@@ -1,0 +1,109 @@
+"""A verdict in one figure: errors, what was tried, and measured against predicted where nothing was fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.estimation.fit import evaluate_on
+from lacuna.report.style import Palette, figure_style, look
+from lacuna.system import Channels, Record
+
+_SHOWN = 2  # records
+_TRIED = 6
+
+
+def overview(record: Mapping[str, Any], diagnosis: Diagnosis) -> Any:
+    """The figure, on whatever display Matplotlib has."""
+    with look() as palette:
+        import matplotlib.pyplot as plt
+
+        shown = held_out(diagnosis)[:_SHOWN]
+        figure = plt.figure(figsize=(9.6, 3.0 + 2.1 * len(shown)), layout="constrained")
+        rows = figure.add_gridspec(1 + len(shown), 2, height_ratios=[1.3, *([1.0] * len(shown))])
+        tried_on(figure.add_subplot(rows[0, :]), palette, record)
+        for row, one in enumerate(shown, start=1):
+            _traces_on([figure.add_subplot(rows[row, 0]), figure.add_subplot(rows[row, 1])], palette, one, row == 1)
+        return figure
+
+
+def draw_held_out(diagnosis: Diagnosis, stream: BytesIO, dark: bool = False) -> None:
+    """Measured and predicted, and the residual, of the records that were predicted worst before."""
+    shown = held_out(diagnosis)[: _SHOWN + 1]
+    with figure_style(dark) as palette:
+        import matplotlib.pyplot as plt
+
+        figure, axes = plt.subplots(len(shown), 2, figsize=(9.0, 1.9 * len(shown)), squeeze=False, layout="constrained")
+        for k, (pair, one) in enumerate(zip(axes, shown, strict=True)):
+            _traces_on(list(pair), palette, one, k == 0)
+        figure.savefig(stream, format="png")
+        plt.close(figure)
+
+
+def draw_tried(record: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
+    """What each explanation tried leaves, on a logarithmic axis."""
+    with figure_style(dark) as palette:
+        import matplotlib.pyplot as plt
+
+        figure, axis = plt.subplots(figsize=(7.2, 0.4 * min(len(record["tried"]), _TRIED) + 1.2))
+        tried_on(axis, palette, record)
+        figure.savefig(stream, format="png")
+        plt.close(figure)
+
+
+def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
+    """Bars: the error of the base model and of the best explanations tried; a line: the floor."""
+    tried = [one for one in record["tried"] if one["effects"]][:_TRIED]
+    base = [one for one in record["tried"] if not one["effects"]]
+    rows = [*base, *tried] or [{"effects": [], "error": record["error"]["before"]["fitted"]}]
+    named = {e["name"] for e in record["effects"]}
+    places = np.arange(len(rows))[::-1]
+    colours = [palette.after if named and set(one["effects"]) == named else palette.before for one in rows]
+    axis.barh(places, [one["error"] for one in rows], height=0.6, color=colours)
+    axis.axvline(1.0, color=palette.ink, linestyle=":")
+    axis.set_yticks(places, [" + ".join(one["effects"]).replace("_", " ") or "the model as it is" for one in rows])
+    axis.set_xscale("log")
+    for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
+        which("{x:g}")
+    axis.set_xlabel("RMS residual in units of the noise (dotted: the floor)")
+
+
+def held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
+    """Held-out records, the worst predicted first: each with its worst channel, predictions before and after, and the
+    floor's standard deviation of that channel."""
+    trials = diagnosis.split.held_out or diagnosis.split.known
+    before, after = (evaluate_on(fit, trials).predictions() for fit in (diagnosis.base, diagnosis.final))
+    found = []
+    for trial, first, last in zip(trials, before, after, strict=True):
+        floor = {c: diagnosis.search.floor.channels[trial.experiment, c].sd for c in trial.channels}
+        error = {c: _rms(trial.channels[c] - first[c]) / floor[c] for c in trial.channels}
+        worst = max(error, key=error.get)
+        found.append((error[worst], (trial, worst, first, last, floor[worst])))
+    return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
+
+
+def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple, legend: bool) -> None:
+    trial, channel, before, after, floor = one
+    left, right = axes
+    left.plot(trial.time_s, trial.channels[channel], color=palette.measured, linewidth=2.0, alpha=0.5, label="measured")
+    left.plot(trial.time_s, before[channel], color=palette.before, label="model as it is")
+    left.plot(trial.time_s, after[channel], color=palette.after, linestyle="--", label="completed")
+    left.set_title(f"{trial.name} (not fitted)", loc="left", fontsize=8)
+    left.set_ylabel(channel)
+    for prediction, colour in ((before, palette.before), (after, palette.after)):
+        right.plot(trial.time_s, (trial.channels[channel] - prediction[channel]) / floor, color=colour, linewidth=0.9)
+    right.axhspan(-1, 1, color=palette.quiet, alpha=0.25, linewidth=0)
+    right.set_ylabel("residual, floors")
+    right.set_xlabel("time, s")
+    left.set_xlabel("time, s")
+    if legend:
+        left.legend(loc="best", fontsize=7)
+
+
+def _rms(samples: np.ndarray) -> float:
+    known = samples[np.isfinite(samples)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")

@@ -1,0 +1,85 @@
+"""A verdict as a screen of text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.report.diagnosis import verdict_sentence
+from lacuna.report.measured import floor_sentence
+
+_WIDTH, _LINES = 100, 40
+_WARNINGS, _TRIED = 6, 4
+
+
+def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str:
+    """At most `_LINES` lines of at most `_WIDTH` characters."""
+    lines = [f"{name}: {record['verdict']}", *_wrapped(_sentence(record)), ""]
+    lines += _effects(record)
+    lines += _errors(record["error"])
+    lines += _wrapped(floor_sentence(diagnosis))
+    where = record["remainder"]["text"] if record["verdict"] == "identified" else record["signature"]["text"]
+    lines += ["", *_wrapped(("What is left: " if record["verdict"] == "identified" else "") + where)]
+    lines += _nearest(record)
+    lines += _next(record["next_experiment"])
+    warnings = record["warnings"]
+    lines += [line for one in warnings[:_WARNINGS] for line in _wrapped(one, "! ")]
+    if len(warnings) > _WARNINGS:
+        lines.append(f"! and {len(warnings) - _WARNINGS} more: verdict.warnings")
+    return "\n".join(lines if len(lines) <= _LINES else [*lines[: _LINES - 1], "... all of it: verdict.report(...)"])
+
+
+def _sentence(record: Mapping[str, Any]) -> str:
+    return verdict_sentence(record["verdict"], record["effects"], record["remainder"])
+
+
+def _wrapped(text: str, mark: str = "") -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark))
+
+
+def _effects(record: Mapping[str, Any]) -> Iterator[str]:
+    for effect in record["effects"]:
+        yield f"{effect['name']}: closes {_percent(effect['share_of_gap'])}, probability {effect['probability']:.2f}"
+        for name, value in effect["parameters"].items():
+            lower, upper = (_number(end) for end in effect["interval_90"][name])
+            yield f"    {name} = {_number(value)}   ({lower} to {upper})"
+        if effect["confusable_with"]:
+            yield f"    this data cannot tell it from {', '.join(effect['confusable_with'])}"
+    if record["effects"]:
+        yield ""
+
+
+def _errors(error: Mapping[str, Any]) -> Iterator[str]:
+    yield f"{'RMS error in units of the noise':42}{'before':>10}{'after':>10}{'floor':>10}"
+    for side, label in (
+        ("fitted", "records fitted"),
+        ("held_out", "not fitted"),
+        ("held_out_conditions", "conditions not fitted"),
+    ):
+        if error["before"][side] is not None:
+            values = (error[column][side] for column in ("before", "after", "noise_floor"))
+            yield f"  {label:40}" + "".join(f"{_number(v):>10}" for v in values)
+
+
+def _nearest(record: Mapping[str, Any]) -> list[str]:
+    if record["verdict"] == "none" or not record["nearest"]:
+        return []
+    near = [f"{' + '.join(r['effects'])} ({_percent(r['share_of_gap'])})" for r in record["nearest"][:_TRIED]]
+    return _wrapped(f"Also tried, with what each would close: {', '.join(near)}.")
+
+
+def _next(coming: Mapping[str, Any]) -> list[str]:
+    if not coming["experiment"]:
+        return []
+    settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
+    return _wrapped(f"Next: {coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}.")
+
+
+def _percent(share: float | None) -> str:
+    return "an unknown share of the gap" if share is None else f"{100 * share:.0f} % of the gap"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"

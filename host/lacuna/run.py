@@ -1,0 +1,136 @@
+"""From a system and records to a verdict: `lacuna.diagnose`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lacuna.check import MisuseError
+from lacuna.diagnosis import diagnose as engine
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.estimation.problem import use_threads
+from lacuna.function_system import FunctionSystem
+from lacuna.misfit import compared_at_misfit
+from lacuna.noise_time import left_over_s
+from lacuna.progress import Progress
+from lacuna.records import Table, read, stretched
+from lacuna.system import Record, System
+from lacuna.verdict import Verdict
+
+
+def diagnose(
+    system: System,
+    records: Any = None,
+    *,
+    seed: int = 0,
+    starts: int = 1,
+    n_jobs: int | None = None,
+    executor: Executor | None = None,
+    policy: Policy = POLICY,
+    progress: Callable[[str], None] | bool = True,
+) -> Verdict:
+    """What the model of `system` lacks, judged by `records`.
+
+    `records`: arrays, pandas, xarray, a folder of CSV (see `lacuna.records.read`), or None for a system that has its
+    trials. `seed`: the same one gives the same verdict. `starts` of the base model's fit. `n_jobs`: so many processes
+    try explanations, -1 one for each core; by default one process with a thread for each core, which suits a `simulate`
+    that releases the GIL (NumPy, numba). `executor` in their place: any of `concurrent.futures`, or dask's. `progress`:
+    a function that is told what begins, or False for silence.
+
+    Ctrl-C during the search ends it with the best so far. Raises MisuseError, RecordError and DeclarationError before
+    the search, naming trial and channel.
+    """
+    if records is not None:
+        system = with_records(system, records)
+    told = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
+    how = {"seed": seed, "starts": starts, "policy": policy, "progress": told}
+    try:
+        with _workers(n_jobs, executor) as workers:
+
+            def answer(one: System) -> Diagnosis:
+                return engine.diagnose(one, **how, executor=workers)
+
+            found, raised = answer(system), {}
+            if isinstance(system, FunctionSystem):
+                if system.estimates_noise_time and any((left_s := left_over_s(found)).values()):
+                    system = system.with_noise_time(left_s)
+                    found = answer(system)
+                found, raised = compared_at_misfit(system, found, answer)
+    finally:
+        if isinstance(told, Progress):
+            told.end()
+    return Verdict(system, _cautioned(found, system, raised))
+
+
+def _cautioned(found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float]) -> Diagnosis:
+    """With a word on what is left: where it is far above the floor, and where only a repeat, or the person, can say
+    whether it is noise."""
+    levels = found.search.floor.channels
+    said = [
+        f"No explanation comes near the floor of {channel} in {experiment} ({floor:.3g}): they were compared at a floor"
+        f" of {levels[experiment, channel].sd:.3g}, a fraction of what the best of them leaves."
+        for (experiment, channel), floor in raised.items()
+    ]
+    left_s = {} if raised else left_over_s(found)
+    said += [
+        f"What is left of {channel} remembers itself for about {seconds:.2g} s. If that is noise, say so:"
+        f' noise_time_s={{"{channel}": {seconds:.2g}}}, or "estimated".'
+        for channel, seconds in left_s.items()
+        if seconds > 0.0 and found.left.matters and not any(system.noise_time_s(*k) for k in _keys(found, channel))
+    ]
+    return replace(found, warnings=(*found.warnings, *said)) if said else found
+
+
+def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:
+    return [key for key in found.search.floor.channels if key[1] == channel]
+
+
+def with_records(system: System, records: Any) -> FunctionSystem:
+    """`system` with these records as its trials. Raises MisuseError, RecordError."""
+    if not isinstance(system, FunctionSystem):
+        raise MisuseError(f"{type(system).__name__} has trials of its own: call diagnose(system) without records.")
+    given = read(records)
+    tables = [one for one in given if isinstance(one, Table)]
+    outputs = system.outputs or (_outputs(system, tables[0]) if tables else ())
+    trials = [one if isinstance(one, Record) else stretched(one, one.record(outputs), outputs) for one in given]
+    return system.with_trials(trials)
+
+
+def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
+    """The names that `simulate` gives its outputs, tried on one record. Raises MisuseError."""
+    record = stretched(table, table.record(()), ())
+    run = record.payload.run if record.payload else record
+    theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(run))}
+    try:
+        found = system.simulate(run, system.values(theta))
+    except Exception as error:
+        raise MisuseError(f"trial {record.name}: the model raises {type(error).__name__}: {error}") from error
+    if isinstance(found, Mapping):
+        return tuple(found)
+    columns = [name for name, c in table.columns.items() if np.shape(c) == table.time_s.shape]
+    if len(columns) == 1:
+        return columns
+    raise MisuseError(
+        f"trial {record.name}: which of its columns ({', '.join(columns)}) does the model predict? Say System(...,"
+        " outputs=...), or return them by name, as a dict of arrays."
+    )
+
+
+@contextmanager
+def _workers(n_jobs: int | None, executor: Executor | None) -> Iterator[Executor | None]:
+    """Processes that take functions from a notebook as well, each on one thread."""
+    if executor is not None or n_jobs in (None, 0, 1):
+        yield executor
+        return
+    from loky import ProcessPoolExecutor
+
+    cores = max(1, len(os.sched_getaffinity(0)))
+    with ProcessPoolExecutor(n_jobs if n_jobs > 0 else cores, initializer=use_threads, initargs=(1,)) as pool:
+        yield pool

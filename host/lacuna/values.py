@@ -1,0 +1,20 @@
+"""Named values as a model function reads them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class Values(dict):
+    """A dict whose entries are attributes as well: `theta["mass_kg"]` is `theta.mass_kg`, `theta["coulomb.force_N"]` is
+    `theta.coulomb.force_N`. Entries are in the order in which they were declared."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self:
+            return self[name]
+        if name.startswith("__"):  # what copying and pickling ask for
+            raise AttributeError(name)
+        members = {key[len(name) + 1 :]: value for key, value in self.items() if key.startswith(f"{name}.")}
+        if not members:
+            raise AttributeError(f"{name}: there are {', '.join(self)}")
+        return Values(members)

@@ -1,0 +1,113 @@
+"""A verdict as a person reads it: a line, a screen of text, a page, a figure, and the completed model to call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.diagnosis.record import as_record
+from lacuna.function_system import FunctionSystem
+from lacuna.records import read, stretched
+from lacuna.system import Record, System
+from lacuna.values import Values
+
+
+class Model:
+    """The completed model: called like `simulate`, as `model(record)` or `model(record, theta)`.
+
+    `record` is anything that `diagnose` takes as one record, `theta` a mapping of values that differ from the fitted
+    ones, `model.theta`. Returns what `simulate` returns.
+    """
+
+    def __init__(self, system: System, diagnosis: Diagnosis):
+        final = diagnosis.final
+        self._system, self._theta, self._effects = system, final.theta, final.structure.effects
+        self._corrections = final.structure.corrections(final.theta)
+        names = [p.name for p in final.structure.parameters if not p.name.startswith("correction.")]
+        self.theta = Values({name: system.told(name, final.theta[name]) for name in names})
+
+    def __call__(self, record: Any, theta: Mapping[str, float] | None = None) -> Any:
+        if not isinstance(self._system, FunctionSystem):
+            own = {p.name: p.value for p in self._system.nuisances(record)}
+            return self._system.predict(
+                self._theta | own | dict(theta or {}), self._effects, record, corrections=self._corrections
+            )
+        record = _one(record, self._system.outputs)
+        own = {p.name: p.value for p in self._system.nuisances(record)}
+        values = self._system.values(self._theta | own, self._corrections)
+        return self._system.simulate(record, Values(values | dict(theta or {})))
+
+    def __repr__(self) -> str:
+        return f"Model({', '.join(f'{name}={value:.4g}' for name, value in self.theta.items())})"
+
+
+def _one(record: Any, outputs: tuple[str, ...]) -> Record:
+    """A record, whichever form it has; outputs that it lacks have yet to be predicted."""
+    (found,) = read(record)
+    if isinstance(found, Record):
+        return found
+    return stretched(found, found.record([name for name in outputs if name in found.columns]), outputs)
+
+
+class Verdict:
+    """The engine's answer. `verdict`: "none", "identified" or "unexplained"; `effects`: what was named, with sizes,
+    intervals and probabilities; `error`: of the model before and after and of the floor, RMS in units of the noise, on
+    records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call.
+
+    `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws. `record` is all of it in plain types
+    for JSON, `diagnosis` everything that the engine has kept.
+    """
+
+    def __init__(self, system: System, diagnosis: Diagnosis):
+        self.system, self.diagnosis = system, told(system, diagnosis)
+        self.verdict, self.effects, self.warnings = diagnosis.verdict, self.diagnosis.effects, diagnosis.warnings
+        self.model = Model(system, diagnosis)
+        self.theta = self.model.theta
+        self.record = as_record(self.diagnosis)
+        self.error = {
+            "before": diagnosis.before.held_out,
+            "after": diagnosis.after.held_out,
+            "floor": diagnosis.floor.held_out,
+        }
+
+    def __repr__(self) -> str:
+        named = "".join(f", {e.name}" for e in self.effects)
+        return f"<{self.verdict}{named}: error {self.error['before']:.3g} to {self.error['after']:.3g} floors>"
+
+    def __str__(self) -> str:
+        from lacuna.report.text import screen_of
+
+        return screen_of(self.system.name, self.record, self.diagnosis)
+
+    def report(self, path: str | Path) -> Path:
+        """Write a page (HTML, self-contained, no script) with the evidence; return its path."""
+        from lacuna.report.diagnosis import diagnosis_page
+        from lacuna.report.page import render
+
+        path = Path(path)
+        unfinished = path.with_name(path.name + ".unfinished")
+        unfinished.write_text(render(diagnosis_page(self.system.name, self.record, self.diagnosis)), encoding="utf-8")
+        unfinished.replace(path)
+        return path
+
+    def plot(self) -> Any:
+        """A Matplotlib figure: error before and after, what was tried, and the worst predicted held-out records."""
+        from lacuna.report.overview import overview
+
+        return overview(self.record, self.diagnosis)
+
+
+def told(system: System, diagnosis: Diagnosis) -> Diagnosis:
+    """`diagnosis` with its effects' sizes and intervals in the person's own parameters."""
+    if not isinstance(system, FunctionSystem):
+        return diagnosis
+    effects = []
+    for one in diagnosis.effects:
+        coordinates = {name: system.coordinate(f"{one.name}.{name}") for name in one.parameters}
+        values = {name: coordinates[name].told(value) for name, value in one.parameters.items()}
+        intervals = {name: coordinates[name].interval(*ends) for name, ends in one.interval.items()}
+        effects.append(replace(one, parameters=values, interval=intervals))
+    return replace(diagnosis, effects=tuple(effects))

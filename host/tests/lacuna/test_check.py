@@ -1,0 +1,238 @@
+"""Every misuse is refused before the search, by the name of its trial and channel; what may mislead is a warning."""
+
+from dataclasses import replace
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna.check import MisuseError, TooLittleDataError, check
+from lacuna.diagnosis.diagnose import diagnose
+from lacuna.function_system import DeclarationError
+from lacuna.records import RecordError
+from lacuna.run import with_records
+from lacuna.system import Effect, Parameter, Record, System
+
+T = np.linspace(0.0, 1.0, 101)
+DRAW = np.random.default_rng(0)
+
+
+class Line(System):
+    """y = slope t, with a bend on offer; written as the documentation says, and no more than that."""
+
+    name = "line"
+
+    def __init__(self, **changes):
+        self.parameters = (Parameter("slope", "1/s", 1.0, -10.0, 10.0),)
+        self.effects = {"bend": Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0))}
+        self.trials = tuple(
+            Record(f"run {k}", "pull", k // 3, T, {"y": (1 + k // 3) * T + 0.01 * DRAW.standard_normal(len(T))})
+            for k in range(6)
+        )
+        self.__dict__.update(changes)
+
+    def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
+        return {"y": (1 + trial.condition) * theta["slope"] * T + theta.get("bend.by", 0.0) * T**2}
+
+
+def predicting(found):
+    system = Line()
+    system.predict = lambda theta, effects, trial, **how: found(trial, theta)
+    return system
+
+
+def changed(system, **changes):
+    first, *others = system.trials
+    return Line(trials=(replace(first, **changes), *others))
+
+
+def raising(trial, theta):
+    raise ValueError("no such valve")
+
+
+REFUSED_PREDICTIONS = {
+    "a scalar": (lambda t, p: {"y": np.float64(p["slope"])}, "run 0, channel y: predicted as float64"),
+    "no dimension": (lambda t, p: {"y": np.array(1.0)}, r"run 0, channel y: predicted with shape \(\)"),
+    "one sample less": (lambda t, p: {"y": T[1:]}, r"run 0, channel y: predicted with shape \(100,\)"),
+    "a column vector": (lambda t, p: {"y": T[:, None]}, r"run 0, channel y: predicted with shape \(101, 1\)"),
+    "a list": (lambda t, p: {"y": list(T)}, "run 0, channel y: predicted as list"),
+    "complex numbers": (lambda t, p: {"y": T + 0j}, "run 0, channel y: predicted as array of complex"),
+    "another channel": (lambda t, p: {"x": T}, "run 0, channel y: not predicted; the model returns x"),
+    "no mapping": (lambda t, p: T, "run 0: the model returns ndarray"),
+    "an exception": (raising, "run 0, channel y: the model raises ValueError: no such valve"),
+    "NaN always": (lambda t, p: {"y": np.full(101, np.nan)}, "run 0, channel y: the prediction is NaN, as in every"),
+    "NaN in a sample": (lambda t, p: {"y": np.where(T == 0.5, np.nan, T)}, "run 0, channel y: the prediction is NaN"),
+    "a constant": (lambda t, p: {"y": np.ones(101)}, "run 0, channel y: no parameter changes the prediction"),
+    "chance": (lambda t, p: {"y": p["slope"] * T + DRAW.standard_normal(101)}, "run 0, channel y: predicted twice"),
+    "an effect when off": (
+        lambda t, p: {"y": p["slope"] * T + T**2 * ("bend.by" in p)},
+        "run 0, channel y: effect bend changes the prediction although its size is 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED_PREDICTIONS)
+def test_refuses_a_prediction_of(name):
+    found, said = REFUSED_PREDICTIONS[name]
+    with pytest.raises(MisuseError, match=said):
+        diagnose(predicting(found), progress=pytest.fail)  # before the search begins
+
+
+Y = Line().trials[0].channels["y"]
+REFUSED_RECORDS = {
+    "times that fall": ({"time_s": np.where(T == 0.5, 0.2, T)}, "run 0: time does not rise from sample 49"),
+    "times that stand": ({"time_s": np.minimum(T, 0.9)}, "run 0: time does not rise from sample 90"),
+    "a time that is missing": ({"time_s": np.where(T == 0.5, np.nan, T)}, "run 0: time at sample 50 is not a number"),
+    "another length": ({"channels": {"y": Y[1:]}}, r"run 0, channel y: shape \(100,\) measured, \(101,\) times"),
+    "text": ({"channels": {"y": np.full(101, "1.0")}}, "run 0, channel y: measured values are <U3"),
+    "an infinity": ({"channels": {"y": np.where(T == 0.5, np.inf, Y)}}, "run 0, channel y: infinite at sample 50"),
+    "nothing": ({"channels": {"y": np.full(101, np.nan)}}, "run 0, channel y: fewer than 8 samples"),
+    "no channel": ({"channels": {}}, "run 0 has no channel"),
+    "another's name": ({"name": "run 1"}, "trial run 1: more than one trial has this name"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED_RECORDS)
+def test_refuses_a_record_with(name):
+    changes, said = REFUSED_RECORDS[name]
+    with pytest.raises(MisuseError, match=said):
+        diagnose(changed(Line(), **changes), progress=pytest.fail)
+
+
+def test_refuses_a_channel_that_is_constant_in_every_trial():
+    trials = tuple(replace(t, channels={"y": np.full(101, 2.0)}) for t in Line().trials)
+    with pytest.raises(MisuseError, match="run 0, channel y: constant, as in every trial of pull"):
+        diagnose(Line(trials=trials), progress=pytest.fail)
+
+
+def test_takes_a_channel_that_rests_in_one_trial_only():
+    assert check(changed(Line(), channels={"y": np.full(101, 2.0)})) == ()
+
+
+def test_refuses_an_effect_under_another_key():
+    effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0))
+    with pytest.raises(MisuseError, match="effect bend stands under the key curve"):
+        diagnose(Line(effects={"curve": effect}), progress=pytest.fail)
+    with pytest.raises(DeclarationError, match="effect bend stands under the key curve"):
+        lacuna.System(heater.simulate, heater.PARAMETERS, {"curve": effect})
+
+
+@pytest.mark.parametrize("count", [0, 2])
+def test_refuses_fewer_trials_than_needed(count):
+    with pytest.raises(TooLittleDataError, match=f"{count} trials given: a diagnosis needs at least 3"):
+        diagnose(Line(trials=Line().trials[:count]), progress=pytest.fail)
+
+
+def test_refuses_names_that_are_used_twice():
+    with pytest.raises(MisuseError, match="parameter slope: more than one"):
+        diagnose(Line(parameters=(*Line().parameters, *Line().parameters)), progress=pytest.fail)
+    system = Line()
+    system.nuisances = lambda trial: (Parameter("slope", "", 1.0, 0.0, 2.0),)
+    with pytest.raises(MisuseError, match="run 0: its nuisance slope"):
+        diagnose(system, progress=pytest.fail)
+    with pytest.raises(DeclarationError, match="parameter gain_K_W is declared 2 times"):
+        lacuna.System(heater.simulate, (*heater.PARAMETERS, heater.PARAMETERS[0]))
+
+
+def test_refuses_repeats_of_different_inputs():
+    records = heater.records(repeats=2)
+    records["steps_4W_2"]["power_W"] = -records["steps_4W_2"]["power_W"]
+    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are called repeats.*power_W differs"):
+        lacuna.diagnose(heater.system(), records, progress=pytest.fail)
+
+
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [("time_s", "has no times"), ("temperature_K", "has no column temperature_K")],
+)
+def test_refuses_a_record_without_a_column(column, said):
+    records = heater.records(repeats=2)
+    del records["sweep_4W_1"][column]
+    with pytest.raises(RecordError, match=f"record sweep_4W_1 {said}"):
+        lacuna.diagnose(heater.system(), records, progress=pytest.fail)
+
+
+def test_refuses_to_guess_which_column_is_predicted():
+    bare = lacuna.System(lambda record, theta: heater.simulate(record, theta)["temperature_K"], heater.PARAMETERS)
+    with pytest.raises(MisuseError, match="which of its columns"):
+        with_records(lacuna.System(_bare, heater.PARAMETERS, (heater.SENSOR,)), heater.records(1))
+    named = lacuna.System(_bare, heater.PARAMETERS, (heater.SENSOR,), outputs="temperature_K")
+    assert with_records(named, heater.records(1)).trials
+    assert bare.name == "<lambda>"
+
+
+def _bare(record, theta):
+    return heater._lag(theta.gain_K_W * record["power_W"], theta.tau_s)
+
+
+def test_refuses_a_csv_that_is_no_table(tmp_path):
+    (tmp_path / "a_1.csv").write_text("time_s,y\n0,1\n1\n")
+    with pytest.raises(RecordError, match=r"a_1\.csv"):
+        lacuna.diagnose(heater.system(), tmp_path, progress=pytest.fail)
+    with pytest.raises(RecordError, match="no CSV files"):
+        lacuna.diagnose(heater.system(), tmp_path / "elsewhere")
+
+
+# -- warnings in the verdict ----------------------------------------------------------------------------------
+
+
+def warned(system, records):
+    return " ".join(lacuna.diagnose(system, records, progress=False).warnings)
+
+
+def test_warns_of_trials_that_the_model_cannot_predict():
+    system = Line()
+    whole = system.predict
+    system.predict = lambda theta, effects, trial, **how: (
+        whole(theta, effects, trial) if trial.name in ("run 0", "run 1", "run 2") else {"y": np.full(101, np.nan)}
+    )
+    said = " ".join(diagnose(system).warnings)
+    assert "cannot predict run 3, run 4, run 5" in said
+
+
+def test_warns_of_a_parameter_at_its_bound():
+    tight = (Parameter("gain_K_W", "K/W", 0.5, 0.1, 0.7), heater.PARAMETERS[1])
+    said = warned(lacuna.System(heater.simulate, tight, _all()), heater.records(repeats=2, seed=3))
+    assert "gain_K_W is at its bound (0.7 K/W)" in said
+
+
+def test_warns_of_a_direction_that_the_data_leave_open():
+    """A gain and the scale of what it multiplies cancel."""
+
+    def simulate(record, theta):
+        return {"temperature_K": heater._lag(theta.gain_K_W * theta.volts * record["power_W"], theta.tau_s)}
+
+    parameters = (*heater.PARAMETERS, Parameter("volts", "", 1.0, 0.01, 100.0))
+    said = warned(lacuna.System(simulate, parameters), heater.records(repeats=2, seed=3))
+    assert "do not determine gain_K_W, volts" in said
+
+
+def test_warns_of_a_nuisance_at_its_limit():
+    def simulate(record, theta):
+        return {"temperature_K": heater._lag(theta.gain_K_W * record["power_W"], theta.tau_s) + theta.drift_K}
+
+    records = heater.records(repeats=2, seed=3)
+    records["steps_4W_1"]["temperature_K"] = records["steps_4W_1"]["temperature_K"] + 5.0
+    drift = Parameter("drift_K", "K", 0.0, -50.0, 50.0, scale=0.05)
+    said = warned(lacuna.System(simulate, heater.PARAMETERS, nuisances=[drift]), records)
+    assert "drift_K is at its limit in steps_4W_1" in said
+
+
+def test_warns_of_an_effect_that_would_need_the_opposite_sign():
+    """What is hidden is a loss of power, where only a gain of it is on offer."""
+    only_positive = Effect("offset", Parameter("power_W", "W", 0.5, 0.0, 5.0))
+    effects = (heater.SENSOR, only_positive, heater.LIMITED, heater.DEAD)
+    said = warned(heater.system(*effects), heater.records(repeats=2, seed=3, offset__power_W=-0.6))
+    assert "offset would fit with a power_W below 0 W, which its bounds forbid" in said
+
+
+def test_warns_of_a_parameter_that_changes_nothing():
+    idle = (*heater.PARAMETERS, Parameter("unused", "", 1.0, 0.1, 10.0))
+    assert "unused changes no prediction" in warned(
+        lacuna.System(heater.simulate, idle, _all()), heater.records(repeats=2, seed=3)
+    )
+
+
+def _all():
+    return (heater.SENSOR, heater.OFFSET, heater.LIMITED, heater.DEAD)

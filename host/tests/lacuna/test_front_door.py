@@ -1,0 +1,186 @@
+"""The engine as a newcomer uses it: a plain function, records of any kind, a verdict."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna.progress import Progress, most_steps
+from lacuna.records import read
+from lacuna.run import with_records
+
+LAG = {"sensor_lag__lag_s": 3.0}
+LIMIT = {"saturation__limit_W": 6.0}
+
+
+@pytest.fixture(scope="module")
+def verdict():
+    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), progress=False)
+
+
+def test_names_what_a_plain_function_lacks(verdict):
+    assert verdict.verdict == "identified"
+    assert [e.name for e in verdict.effects] == ["sensor_lag"]
+    assert verdict.effects[0].parameters["lag_s"] == pytest.approx(3.0, rel=0.1)
+    assert verdict.error["after"] < 1.15 * verdict.error["floor"]
+
+
+def test_says_none_where_nothing_is_missing():
+    assert lacuna.diagnose(heater.system(), heater.records(seed=2), progress=False).verdict == "none"
+
+
+@pytest.mark.parametrize("written", [heater.LIMITED, heater.INVERSE], ids=["limit", "inverse"])
+def test_a_limit_and_its_inverse_are_the_same_effect(written):
+    system = heater.system(heater.SENSOR, heater.OFFSET, written, heater.DEAD)
+    found = lacuna.diagnose(system, heater.records(seed=3, **LIMIT), progress=False)
+    assert [e.name for e in found.effects] == ["saturation"]
+    ((name, value),) = found.effects[0].parameters.items()
+    limit = value if name == "limit_W" else 1.0 / value
+    assert limit == pytest.approx(6.0, rel=0.05)
+    lower, upper = found.effects[0].interval[name]
+    assert lower < value < upper
+
+
+def test_the_completed_model_is_called_like_the_first(verdict):
+    given = {"time_s": heater.TIME_S, "power_W": heater.power("steps", 7.0)}
+    truth = heater.measured(given["power_W"], 0, **LAG)
+    predicted = verdict.model(given)["temperature_K"]
+    assert np.std(predicted - truth) < 1.5 * heater.NOISE_K
+    without = verdict.model(given, {"sensor_lag.lag_s": 0.0})["temperature_K"]
+    assert np.std(without - truth) > 3 * heater.NOISE_K
+    assert verdict.theta.sensor_lag.lag_s == verdict.effects[0].parameters["lag_s"]
+
+
+def test_a_verdict_is_short_in_a_line_and_one_screen_in_print(verdict):
+    assert len(repr(verdict)) < 100
+    assert len(repr(verdict.diagnosis)) < 100
+    lines = str(verdict).splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 100
+    assert "sensor_lag" in str(verdict)
+    assert "pairs of repeats" in str(verdict)
+
+
+def test_report_and_plot_show_what_was_not_fitted(verdict, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    page = verdict.report(tmp_path / "report.html").read_text()
+    for heading in ("What was measured", "Where the residual lives", "Error before and after", "not fitted"):
+        assert heading in page
+    assert 'src="http' not in page
+    assert "<script" not in page
+    assert len(verdict.plot().axes) == 5
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_effects_stand_at_their_absent_value_while_they_are_off():
+    theta = heater.system().values({})
+    assert theta.saturation.limit_W == np.inf
+    assert theta["sensor_lag.lag_s"] == 0.0
+    with pytest.raises(AttributeError, match="tau_s"):
+        theta.tau  # noqa: B018
+    assert pickle.loads(pickle.dumps(theta)) == theta
+
+
+def test_records_come_as_arrays_tables_and_files(tmp_path):
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    arrays = heater.records(repeats=2, seed=4)
+    frames = {name: pandas.DataFrame(columns) for name, columns in arrays.items()}
+    joined = pandas.concat([frame.assign(name=name) for name, frame in frames.items()])
+    datasets = [
+        xarray.Dataset(
+            {c: ("time_s", v) for c, v in columns.items() if c not in ("time_s", "condition")},
+            {"time_s": columns["time_s"]},
+            {"name": name, "condition": columns["condition"]},
+        )
+        for name, columns in arrays.items()
+    ]
+    for name, frame in frames.items():
+        frame.drop(columns="condition").to_csv(tmp_path / f"{name}.csv", index=False)
+    stacked = xarray.concat([d.drop_attrs() for d in datasets], "run").assign_coords(run=list(arrays))
+    expected = with_records(heater.system(), arrays).trials
+    for given in (frames, joined, datasets, tmp_path, stacked):
+        trials = sorted(with_records(heater.system(), given).trials, key=lambda t: list(arrays).index(t.name))
+        for mine, trial in zip(expected, trials, strict=True):
+            assert trial.name == mine.name
+            np.testing.assert_allclose(trial.channels["temperature_K"], mine.channels["temperature_K"])
+            np.testing.assert_allclose(trial["power_W"], mine["power_W"])
+    by_file = {t.condition for t in with_records(heater.system(), tmp_path).trials}
+    assert by_file == {"steps_4W", "steps_10W", "sweep_4W", "sweep_10W"}
+
+
+def test_dates_count_in_seconds_from_the_first():
+    pandas = pytest.importorskip("pandas")
+    index = pandas.date_range("2026-11-22", periods=4, freq="500ms")
+    (table,) = read(pandas.DataFrame({"y": range(4)}, index=index))
+    np.testing.assert_allclose(table.time_s, [0.0, 0.5, 1.0, 1.5])
+
+
+def test_what_is_predicted_need_not_be_named_where_the_function_names_it():
+    assert list(with_records(heater.system(), heater.records(1)).trials[0].channels) == ["temperature_K"]
+
+
+def test_processes_and_threads_come_to_the_same_verdict(verdict):
+    there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), n_jobs=2, progress=False)
+    assert {**there.record, "seconds": 0} == {**verdict.record, "seconds": 0}
+
+
+def test_a_pool_of_forked_processes_does_not_hang(verdict):
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(1, mp_context=get_context("fork")) as pool:
+        there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), executor=pool, progress=False)
+    assert there.record["effects"] == verdict.record["effects"]
+
+
+def test_progress_says_of_how_much_and_how_long_it_may_take(monkeypatch):
+    import io
+
+    stream, clock = io.StringIO(), iter(range(0, 100, 3))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(clock)))
+    told = Progress(4, stream)
+    told("fitting the base model")
+    told("trying sensor_lag")
+    assert f"2 of at most {most_steps(4)}, 0:06 gone, at most" in stream.getvalue()
+
+
+def test_the_announced_total_is_an_upper_bound():
+    said = []
+    hidden = {"sensor_lag__lag_s": 3.0, "offset__power_W": 0.4}
+    lacuna.diagnose(heater.system(), heater.records(seed=5, **hidden), progress=said.append)
+    assert 5 < len(said) <= most_steps(4)
+
+
+def test_ctrl_c_gives_the_best_so_far():
+    hidden = LAG | {"offset__power_W": 0.4}
+    finishing = []
+
+    def interrupt(what):
+        if what.startswith("finishing"):
+            finishing.append(what)
+            if len(finishing) == 2:
+                os.kill(os.getpid(), signal.SIGINT)
+
+    assert threading.current_thread() is threading.main_thread()
+    found = lacuna.diagnose(heater.system(), heater.records(seed=6, **hidden), progress=interrupt)
+    assert "stopped by hand" in found.warnings[0]
+    assert found.error["after"] < 0.9 * found.error["before"]
+
+
+def test_the_engine_imports_neither_bifa_nor_what_is_optional():
+    code = (
+        "import sys, lacuna; lacuna.diagnose; lacuna.System; lacuna.Verdict;"
+        "print([m for m in ('bifa', 'numba', 'pandas', 'xarray', 'matplotlib', 'virtual_robot') if m in sys.modules])"
+    )
+    host = Path(__file__).resolve().parents[2]
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=host, check=True)
+    assert ran.stdout.strip() == "[]"

@@ -1,0 +1,187 @@
+"""One long record without repeats: the right mechanisms from the default settings, however effects are written down."""
+
+from types import SimpleNamespace
+
+import heater
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+
+import lacuna
+from lacuna import Parameter
+from lacuna.misfit import compared_at_misfit
+from lacuna.records import RecordError
+from lacuna.run import with_records
+from lacuna.values import Values
+
+LIMIT = {"saturation__limit_W": 8.0}
+BOTH = LIMIT | {"sensor_lag__lag_s": 3.0}
+WRITTEN = {
+    "limit": (heater.SENSOR, heater.OFFSET, heater.LIMITED, heater.DEAD),
+    "inverse": (heater.SENSOR, heater.OFFSET, heater.INVERSE, heater.DEAD),
+}
+
+
+def record(seed, samples=4000, slow_K=0.0, **hidden):
+    """Temperature under a random staircase of power; `slow_K`: of noise with a correlation time of 10 s."""
+    draw = np.random.default_rng(seed)
+    power_W = np.repeat(draw.uniform(-12.0, 12.0, samples // 60 + 1), 60)[:samples]
+    kept = np.exp(-heater.SAMPLE_S / 10.0)
+    slow = slow_K * lfilter([np.sqrt(1 - kept**2)], [1.0, -kept], draw.standard_normal(samples))
+    temperature_K = heater.measured(power_W, seed, **hidden) + slow
+    return {"time_s": heater.SAMPLE_S * np.arange(samples), "power_W": power_W, "temperature_K": temperature_K}
+
+
+def named(verdict):
+    return {e.name for e in verdict.effects}
+
+
+@pytest.mark.parametrize("written", WRITTEN)
+@pytest.mark.parametrize("slow_K", [0.0, 0.3])
+def test_names_both_effects_by_segments_of_one_run(written, slow_K):
+    found = lacuna.diagnose(
+        heater.system(*WRITTEN[written]), lacuna.segments(record(3, slow_K=slow_K, **BOTH)), progress=False
+    )
+    assert named(found) == {"sensor_lag", "saturation"}
+    assert "Without repeats" in str(found)
+    assert "record's own fast noise" in str(found).replace("\n", " ")
+
+
+def test_the_answer_is_the_same_in_either_parametrisation():
+    """Fitted in one coordinate, so not just alike: the same."""
+    limit, inverse = (
+        lacuna.diagnose(heater.system(*effects), lacuna.segments(record(4, slow_K=0.3, **LIMIT)), progress=False)
+        for effects in WRITTEN.values()
+    )
+    assert named(limit) == named(inverse) == {"saturation"}
+    assert limit.error == pytest.approx(inverse.error, rel=1e-6)
+    assert limit.effects[0].parameters["limit_W"] == pytest.approx(
+        1.0 / inverse.effects[0].parameters["per_limit_1_W"], rel=1e-6
+    )
+
+
+def test_error_is_no_worse_than_scipys_with_twenty_starts_on_the_same_structure():
+    system = heater.system()
+    records = lacuna.segments(record(5, slow_K=0.1, **BOTH))
+    found = lacuna.diagnose(system, records, progress=False)
+    assert named(found) == {"sensor_lag", "saturation"}
+    fitted = found.diagnosis.split.known
+    bound = with_records(system, records)
+    names = ["gain_K_W", "tau_s", "sensor_lag.lag_s", "saturation.limit_W"]
+
+    def residual(values):
+        theta = Values(system.values({}) | dict(zip(names, values, strict=True)))
+        return np.concatenate([bound.run(t, theta)["temperature_K"] - t["temperature_K"] for t in fitted])
+
+    lower, upper = [0.1, 1.0, 0.0, 1.0], [5.0, 100.0, 20.0, 100.0]
+    draw = np.random.default_rng(0)
+    starts = [draw.uniform(lower, upper) for _ in range(20)]
+    best = min(least_squares(residual, start, bounds=(lower, upper)).cost for start in starts)
+    mine = 0.5 * np.sum(residual([found.theta[name] for name in names]) ** 2)
+    assert mine <= 1.001 * best
+
+
+def test_windows_begin_in_states_of_their_own():
+    def simulate(record, theta):
+        start = theta.start_K * np.exp(-record.time_s / theta.tau_s)
+        return {"temperature_K": heater.simulate(record, theta)["temperature_K"] + start}
+
+    def start(record):
+        first = float(np.mean(record["temperature_K"][:3]))
+        return [Parameter("start_K", "K", first, first - 5.0, first + 5.0, scale=0.3)]
+
+    effects = (heater.OFFSET, heater.LIMITED, heater.DEAD, heater.SENSOR)
+    system = lacuna.System(simulate, heater.PARAMETERS, effects, nuisances=start)
+    found = lacuna.diagnose(system, lacuna.windows(record(6, **LIMIT), 150.0), progress=False)
+    assert named(found) == {"saturation"}
+    assert found.effects[0].parameters["limit_W"] == pytest.approx(8.0, rel=0.05)
+
+
+def test_slow_noise_without_an_effect_is_said_to_be_either():
+    left = lacuna.diagnose(heater.system(), lacuna.segments(record(3, slow_K=0.3)), progress=False)
+    assert left.verdict == "unexplained"
+    (said,) = [w for w in left.warnings if "remembers itself" in w]
+    seconds = float(said.split("about ")[1].split(" s")[0])
+    assert 5.0 < seconds < 15.0  # 10 s in truth
+
+
+@pytest.mark.parametrize("told", [10.0, {"temperature_K": 10.0}, "estimated"])
+def test_noise_that_is_told_or_estimated_to_be_slow_is_noise(told):
+    one = lacuna.segments(record(3, slow_K=0.3))
+    found = lacuna.diagnose(heater.system(noise_time_s=told), one, progress=False)
+    assert found.verdict == "none"
+    assert "correlation time" in str(found).replace("\n", " ")
+    (noise,) = found.diagnosis.search.floor.channels.values()
+    assert noise.sd == pytest.approx(0.3, rel=0.3)
+
+
+def test_slow_noise_hides_no_effect_that_is_larger():
+    one = lacuna.segments(record(4, slow_K=0.3, **LIMIT))
+    found = lacuna.diagnose(heater.system(noise_time_s="estimated"), one, progress=False)
+    assert named(found) == {"saturation"}
+
+
+def test_a_period_makes_windows_repeats():
+    tables = lacuna.windows(record(7, samples=2400), 100.0, period=300.0)
+    assert [t.labels["condition"] for t in tables[:4]] == ["from 0 s", "from 100 s", "from 200 s", "from 0 s"]
+    assert all(t.time_s[0] == 0.0 and len(t.time_s) == 200 for t in tables)
+    assert len({t.labels["condition"] for t in lacuna.windows(record(7, samples=2400), 100.0)}) == len(tables)
+
+
+def test_a_segment_is_the_end_of_a_run_from_the_beginning():
+    one = record(8, samples=600)
+    system = heater.system()
+    whole, *_, last = [with_records(system, [t]).trials[0] for t in lacuna.segments(one, 5)]
+    values = system.values({"gain_K_W": np.log(0.9), "tau_s": np.log(15.0)})
+    free = heater.simulate(one, values)["temperature_K"]
+    np.testing.assert_allclose(system.run(last, values)["temperature_K"], free[480:])
+    np.testing.assert_allclose(system.run(whole, values)["temperature_K"], free[:120])
+
+
+def test_too_short_a_record_is_refused():
+    with pytest.raises(RecordError, match="not enough for three windows"):
+        lacuna.windows(record(8, samples=600), 150.0)
+    with pytest.raises(RecordError, match="too few for 100 segments"):
+        lacuna.segments(record(8, samples=600), 100)
+    with pytest.raises(RecordError, match="one long record"):
+        lacuna.segments([record(8), record(9)])
+
+
+def test_only_estimated_is_a_word_for_a_time():
+    with pytest.raises(lacuna.LacunaError, match="noise_time_s is seconds"):
+        heater.system(noise_time_s="slow")
+
+
+def _found(verdict, left, floor):
+    """A diagnosis as far as its misfit: what the best explanation leaves of one channel, and its floor."""
+    trial = SimpleNamespace(name="a", experiment="run")
+    final = SimpleNamespace(residuals=lambda: {"a": {"y": np.full(9, left)}}, problem=SimpleNamespace(trials=(trial,)))
+    floors = SimpleNamespace(channels={("run", "y"): SimpleNamespace(sd=floor)})
+    return SimpleNamespace(verdict=verdict, final=final, search=SimpleNamespace(floor=floors))
+
+
+def test_explanations_far_above_the_floor_are_compared_at_a_fraction_of_what_they_leave():
+    """From a raised floor of 0.05 a better one is found, which lies below it; from 0.002 no better one is."""
+    leaves, raised = {0.05: 0.04, 0.002: 0.04}, []
+
+    def again(system):
+        raised.append(round(system.sensor_noise("run", "y"), 9))
+        return _found("identified", leaves[raised[-1]], raised[-1])
+
+    first = _found("unexplained", 1.0, 0.001)
+    found, was = compared_at_misfit(heater.system(), first, again)
+    assert raised == [0.05, 0.002]
+    assert found.search.floor.channels["run", "y"].sd == 0.05
+    assert was == {("run", "y"): 0.001}
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(0.009, "identified"), (1.0, "none")])
+def test_near_the_floor_or_without_a_gap_nothing_is_compared_again(left, verdict):
+    first = _found(verdict, left, 0.001)
+    assert compared_at_misfit(heater.system(), first, pytest.fail) == (first, {})
+
+
+def test_where_a_raised_floor_hides_everything_the_first_answer_stands():
+    first = _found("unexplained", 1.0, 0.001)
+    assert compared_at_misfit(heater.system(), first, lambda system: _found("none", 1.0, 0.05)) == (first, {})
