@@ -88,6 +88,13 @@ class Policy:
     reach: float = _rule(
         3.0, "times the cost of a set that suffices", "rivals beyond are not pursued: they cannot win", "derivation"
     )
+    lost: float = _rule(
+        2.0,
+        "floors, RMS",
+        "where the best explanation so far leaves more, the base fit may be so wrong that what is missing does not help"
+        " it: every effect is begun anew",
+        "simulation",
+    )
 
     # What is learnt?
     curve: float = _rule(

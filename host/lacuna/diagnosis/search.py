@@ -167,9 +167,8 @@ def _grow(
     sketched = _sketched(ranked[: _SKETCHED[size]], _SKETCHED_TWICE[size], split, enough, policy, crew)
     before = min(beam, key=lambda c: c.cost)
     grown = _finish(before, sketched, _FINISHED[size], split, tried, enough, policy, crew)
-    if size == 1 and not any(enough(c) for c in grown):
-        # a base model that lacks much may be fitted so wrongly that what it lacks does not help it
-        best = min([before, *grown], key=lambda c: c.cost)
+    best = min([before, *grown], key=lambda c: c.cost)
+    if size == 1 and best.rms > policy.lost and not enough(best):
         grown += _finish(best, anew(ranked, crew), _FINISHED[size], split, tried, enough, policy, crew)
     return grown
 

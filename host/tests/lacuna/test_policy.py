@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from toy import hide
 
+from lacuna.diagnosis import search
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import choose, worth_adding
@@ -233,6 +234,21 @@ def test_implausible_costs_as_stated_half_a_range_outside():
     for value, cost in ((3.0, 0.0), (4.0, POLICY.implausible), (0.0, POLICY.implausible)):
         fitted = SimpleNamespace(structure=SimpleNamespace(parameters=[parameter]), theta={"mass_kg": value})
         assert implausibility(fitted) == pytest.approx(cost)
+
+
+# --- How far is the search worth its time? ---
+
+
+def test_lost_effects_are_begun_anew_where_much_is_left(monkeypatch):
+    begun = []
+    monkeypatch.setattr(search, "anew", lambda profiled, crew: begun.append(len(profiled)) or [])
+    system = hide({"coulomb.force_N": 0.6}, seed=5, withhold=["coulomb"])
+    left = diagnose(system, policy=replace(POLICY, lost=1e6)).search
+    assert begun == []
+    most = min(candidate.rms for candidate in left.tried if len(candidate.effects) <= 1)
+    for lost, anew in ((1.01 * most, False), (0.99 * most, True)):
+        diagnose(system, policy=replace(POLICY, lost=lost))
+        assert bool(begun) is anew
 
 
 # --- The split ---
