@@ -66,7 +66,9 @@ def file_option(text: str):
 DATASET = typer.Argument(help="The data set's folder.", show_default=False, exists=True, file_okay=False)
 PORT = port_option()
 KNOWN = typer.Option(
-    help="What you measured: NAME=VALUE, as head_mass_kg=0.182.", metavar="NAME=VALUE", autocompletion=known_names
+    help="A value that you measured, such as head_mass_kg=0.182; repeatable.",
+    metavar="NAME=VALUE",
+    autocompletion=known_names,
 )
 RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
 WATCH = typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")

@@ -26,7 +26,8 @@ def campaign(
     quick: Annotated[bool, typer.Option("--quick", help="Each condition twice, not three times; faster.")] = False,
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
-        Path, typer.Option(help="What is known of the bench, asked for once (serial port).", show_default=True)
+        Path,
+        typer.Option(help="File of what is known of the bench; you are asked once (serial port).", show_default=True),
     ] = Path("bench.toml"),
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     profile: Annotated[Profile, PROFILE] = "realistic",
@@ -98,7 +99,7 @@ def run_campaign(
     for number, one in enumerate(summary["rounds"], 1):
         console.print(
             f"round {number}, a gait that was not fitted: {one['predicted_mm_s']:.2f} mm/s predicted,"
-            f" {one['measured_mm_s']:.2f} measured; places wrong by {one['error_mm']:.3f} mm,"
+            f" {one['measured_mm_s']:.2f} measured; position error {one['error_mm']:.3f} mm,"
             f" repeats differ by {one['floor_mm']:.3f} mm",
             highlight=False,
         )

@@ -17,9 +17,9 @@ def register(app: typer.Typer) -> None:
     def check(
         dataset: Annotated[Path, DATASET],
         pictures: Annotated[Path | None, PICTURES] = None,
-        strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 where anything is found.")] = False,
+        strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 if anything is found.")] = False,
     ) -> None:
-        """Say what is in a data set, point out what looks wrong, and draw it where --pictures names a folder.
+        """List what is in a data set, warn of what looks wrong, and plot it with --pictures.
 
         A malformed data set ends with status 2 and names file, line and column. What is well-formed but
         doubtful (a clipped sensor, a clock that jumps, missing repeats) is listed as a warning, status 0.

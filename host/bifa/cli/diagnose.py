@@ -38,8 +38,8 @@ def diagnose(
     matters: Annotated[
         list[str] | None,
         typer.Option(
-            help="RMS error up to which a prediction is good enough, as in displacement_mm=0.5; may be given several"
-            " times. Otherwise a tenth of the noise floor is.",
+            help="RMS error that is good enough, such as displacement_mm=0.5; repeatable. By default a tenth of the"
+            " noise floor.",
             show_default=False,
         ),
     ] = None,

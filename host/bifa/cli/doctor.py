@@ -19,7 +19,7 @@ def doctor(
 ) -> None:
     """Say what is installed, which port and firmware there are, what is missing and how to get it.
 
-    Ends with status 1 where something necessary is missing.
+    Exits with status 1 if something required is missing.
     """
     from bifa.screen import Console
     from bifa.toolchain.checks import MISSING, run_checks

@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
 
 
 def gaits(
-    make: Annotated[bool, typer.Option("--make", help="Search for them again (minutes) and write them.")] = False,
+    make: Annotated[bool, typer.Option("--make", help="Rerun the searches (minutes) and write the gaits.")] = False,
     model: Annotated[Path | None, file_option("Model to search on; the nominal one if left out.")] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder where --make writes; the package itself if left out.")

@@ -26,7 +26,8 @@ def optimize(
     model: Annotated[Path | None, file_option("Model file; the paper's nominal robot if left out.")] = None,
     method: Annotated[Method, typer.Option(help="Of the search; bo is the paper's, and slow.")] = "de",
     robust: Annotated[
-        bool, typer.Option("--robust/--nominal", help="Speed that 9 robots in 10 reach, or on the model itself.")
+        bool,
+        typer.Option("--robust/--nominal", help="Maximise the speed that 9 robots in 10 reach, or the model's own."),
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="Of the search and of the draws.")] = 0,
     evaluations: Annotated[

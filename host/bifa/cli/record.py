@@ -53,7 +53,7 @@ def record(
                 record_walks(rig, out, gait, cycles, repeats, console)
     if not has_instruments:
         console.print(
-            f"gait: {gait}, {_words(steps)}" if gait else "no --gait: the Uno is only listened to", highlight=False
+            f"gait: {gait}, {_words(steps)}" if gait else "no --gait: recording without walking", highlight=False
         )
         record_telemetry(lambda: open_rig(port), out, gait, seconds, console)
 

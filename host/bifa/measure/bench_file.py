@@ -52,13 +52,13 @@ def known_on(path: Path, desk: Desk) -> dict[str, float]:
     """The known values of the bench; where its file does not exist they are asked for at the desk, and written."""
     if path.exists():
         return read_bench(path)
-    desk.say(f"What has been measured directly at this bench? It is asked once, and kept in {path}.")
+    desk.say(f"Which of these have you measured directly? You are asked once; the answers are kept in {path}.")
     known: dict[str, float] = {}
     for name, meaning in ASKED.items():
         known |= _asked(desk, name, meaning)
     desk.clear()
     write_text(path, tomli_w.dumps({"known": known}))
-    desk.say(f"Kept in {path}; edit it there.")
+    desk.say(f"Saved in {path}; edit that file to correct a value.")
     return known
 
 

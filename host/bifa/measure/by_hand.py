@@ -57,7 +57,7 @@ class ByHand:
                 raise
             except BifaError as error:
                 uno.halt()
-                self._review(rig, uno, turn, f"Not usable: {error}.", "Enter repeats it", keep=False)
+                self._review(rig, uno, turn, f"Not usable: {error}.", "Enter tries again", keep=False)
                 continue
             if self._accepted(rig, uno, turn, trial, writer):
                 self._instruments.keep(writer.partial / RAW)
@@ -75,7 +75,7 @@ class ByHand:
 
     def _review(self, rig, uno: Uno, turn: Turn, seen: str, choice: str, *, keep: bool, findings=()) -> bool:
         self._desk.ask(
-            "review", f"{seen} {choice}, q stops here without it.", turn.told() | {"findings": list(findings)}
+            "review", f"{seen} {choice}, q discards it and stops.", turn.told() | {"findings": list(findings)}
         )
         while (answer := self._desk.answer()) is None:
             idle(rig, uno, _LOOK_S)

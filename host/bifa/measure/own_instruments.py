@@ -80,20 +80,24 @@ class OwnInstruments:
         if settings.get("direction") == "backward":
             stand += ", to be pulled backward"
         zero = "displacement and force" if on_machine(experiment) else "displacement"
-        self._ask("mount", f"All valves are off. Mount {stand}; {zero} at zero. Enter: valves may switch.")
+        self._ask("mount", f"All valves are off. Mount {stand}, and zero {zero}. Press Enter when valves may switch.")
 
     def start(self) -> None:
         """See Instruments."""
         self._known = dict(self._signatures())
-        which, then = ("machine's record", "") if on_machine(self._experiment) else ("camera", ": then the robot moves")
-        self._ask("start", f"Start the {which}, the strobe (D10) on its sync input. Once it records, Enter{then}.")
+        machine = on_machine(self._experiment)
+        which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
+        self._ask(
+            "start",
+            f"Start {which}, with the strobe (D10) on its sync input. Press Enter once it is recording{then}.",
+        )
 
     def move(self) -> None:
         """See Instruments."""
         planned = self._turn.planned
         static = self._experiment == "static_loading"
-        way = "to the extended state and back" if static else f"{PULL_MM:g} mm"
-        self._ask("move", f"Move the cross-head {way} at {planned.rate_mm_s:g} mm/s. Once it stands again, Enter.")
+        way = "to the extended state and back" if static else f"by {PULL_MM:g} mm"
+        self._ask("move", f"Move the cross-head {way} at {planned.rate_mm_s:g} mm/s. Press Enter once it has stopped.")
 
     @property
     def moving(self) -> bool:
@@ -121,13 +125,15 @@ class OwnInstruments:
         """See AskedInstruments."""
         if self._record is not None:
             return
-        where = f"into {self._watch}" if self._watch is not None else "and type its path"
+        where, then = (
+            (f"to {self._watch} ", "") if self._watch is not None else ("", ", then type the path of the first")
+        )
         name = Path(self._turn.planned.file).stem
         channels = ", ".join(("time_s", *CHANNELS[self._experiment]))
         self._ask(
             "save",
-            f"Valves off. Stop the record and save it {where}, as {name}.csv ({channels}) and {name}.sync.csv "
-            "(sync_time_s).",
+            f"Valves are off. Stop the recording and save it {where}as {name}.csv ({channels}) and {name}.sync.csv "
+            f"(sync_time_s){then}.",
         )
 
     def stop(self) -> dict[str, np.ndarray]:
@@ -174,7 +180,7 @@ class OwnInstruments:
             return False  # it is looked for anyway
         path = Path(answer.strip("'\"")).expanduser()
         if not answer or not path.is_file():
-            self._desk.say(f"There is no file {answer!r}; type the path of the CSV (q stops here).")
+            self._desk.say(f"There is no file {answer!r}. Type the path of the CSV, or q to stop.")
             return False
         return self._take(path)
 
@@ -183,7 +189,7 @@ class OwnInstruments:
             columns = read_columns(path, ("time_s", *CHANNELS[self._experiment]))
             edges = read_columns(sync_file(path), ("sync_time_s",))["sync_time_s"]
         except InstrumentFileError as error:
-            self._desk.say(f"{error}. Save it anew.")
+            self._desk.say(f"{error}. Correct it and save it again.")
             return False
         self._record = (path, {**columns, "sync_time_s": edges})
         self._step = "saved"

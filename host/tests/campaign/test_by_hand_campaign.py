@@ -63,7 +63,7 @@ def test_a_campaign_measures_with_the_testing_machine_stops_and_goes_on(lab, tmp
     options = ("--quick", "--out", "run", "--bench", "bench.toml")
     first = begin(lab, tmp_path, "campaign", *options)
     said = wait_for(first, "Nothing looks wrong", "Trial 2 of 30")
-    assert "Kept in bench.toml" in said
+    assert "Saved in bench.toml" in said
     assert (tmp_path / "bench.toml").read_text().startswith("[known]")
     assert "run keeps 1 trial of the stage under way" in interrupt(first)
     (trial,) = read_dataset(tmp_path / "run" / ".measure-unfinished" / "measured.partial").trials
@@ -73,7 +73,7 @@ def test_a_campaign_measures_with_the_testing_machine_stops_and_goes_on(lab, tmp
     second = begin(lab, tmp_path, "campaign", *options)
     said = wait_for(second, "Trial 2 of 30")
     assert "Trial 1 of 30" not in said
-    assert "What has been measured directly" not in said
+    assert "Which of these have you measured" not in said
     assert "1 trial " in interrupt(second)
 
 
