@@ -28,6 +28,8 @@ def register(app: typer.Typer) -> None:
 
         check_targets(folders=(pictures,))
 
+        from rich.text import Text
+
         from bifa.data import read_dataset
         from bifa.data.check import check_dataset
         from bifa.screen import Console
@@ -38,8 +40,7 @@ def register(app: typer.Typer) -> None:
             findings = check_dataset(content)
         console.print(_contents(content))
         for finding in findings:
-            console.print(f"[yellow]warning[/yellow] \\[{finding.kind}] ", end="")
-            console.print(str(finding), markup=False, highlight=False)
+            console.print(Text.assemble(("warning", "yellow"), f" [{finding.kind}] {finding}"), highlight=False)
         if not findings:
             console.print("Nothing looks wrong.")
         if pictures is not None:

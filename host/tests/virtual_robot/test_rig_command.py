@@ -37,7 +37,7 @@ def test_serve_and_stop(image, tmp_path, ending):
     [
         (["--firmware", "missing.elf"], "pio run -e uno"),
         (["--effect", "leak:much"], "NAME:PARAMETER=VALUE"),
-        (["--profile", "perfect"], "ideal, realistic, worn"),
+        (["--profile", "perfect"], "'perfect' is not one of"),
         (["--link", __file__], "no symbolic link"),
     ],
 )
