@@ -75,11 +75,12 @@ def run_campaign(
         if bench.is_by_hand:
             bench = _attended(console, bench, watch, bench_file)
 
-        from bifa.campaign.loop import Effort, campaign  # slow to import: the person is asked first
-        from bifa.campaign.page import prediction_table, speed_table
-        from bifa.campaign.progress import stage_progress
-        from bifa.campaign.stages import run_stages
-        from bifa.report.diagnosis import noise_table
+        with console.status("starting"):  # slow to import: the person is asked first
+            from bifa.campaign.loop import Effort, campaign
+            from bifa.campaign.page import prediction_table, speed_table
+            from bifa.campaign.progress import stage_progress
+            from bifa.campaign.stages import run_stages
+            from bifa.report.diagnosis import noise_table
 
         with stage_progress(console) as progress:
             if bench.hands is not None:
