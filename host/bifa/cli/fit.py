@@ -51,9 +51,9 @@ def fit(
     print_report(console, found)
     if report is not None:
         from bifa.report.fit import fit_page
-        from bifa.report.page import render
+        from bifa.report.page import write_page
 
-        report.write_text(render(fit_page(found)))
+        write_page(fit_page(found), report)
         console.print(f"report: {report}", highlight=False)
     if figures is not None:
         from bifa.report.identification import draw

@@ -18,7 +18,7 @@ from harness.pty_uno import PtyUno
 
 expect = pytest.importorskip("playwright.sync_api", reason="playwright is not installed").expect
 
-LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text()
+LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text(encoding="utf-8")
 
 
 class Monitor:

@@ -8,10 +8,10 @@ from pypdf import PdfReader
 
 from bifa.campaign.side_by_side import compare_page, read_runs
 from bifa.report.diagnosis import diagnosis_page
-from bifa.report.page import render
+from bifa.report.page import write_page
 from tests.report import sample
 
-LOOKS = Path(__file__).with_name("looks.js").read_text()
+LOOKS = Path(__file__).with_name("looks.js").read_text(encoding="utf-8")
 WIDE, NARROW = 1280, 390
 
 
@@ -25,7 +25,7 @@ def pages(tmp_path_factory):
         "compare": compare_page(runs),
         "diagnosis": diagnosis_page("the bench", sample.DIAGNOSIS, sample.LABELS),
     }.items():
-        (folder / f"{name}.html").write_text(render(page))
+        write_page(page, folder / f"{name}.html")
     return folder
 
 
