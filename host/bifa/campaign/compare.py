@@ -20,7 +20,7 @@ from bifa.gait.metric import Metric
 from bifa.gait.objectives import distribution
 from bifa.gait.uncertainty import SPREAD, spread_of
 from bifa.report.evidence import BASE, COMPLETED, errors_chart
-from bifa.report.page import render
+from bifa.report.page import write_page
 from bifa.report.picture import draw_chart
 from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model, load_model
@@ -107,12 +107,12 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
     }
     draw_walks(list(walks.values()), outputs / "walks.png")
     draw_chart(errors_chart(diagnosis["error"]), outputs / "errors.png")
-    (outputs / "walk.svg").write_text(motion_of(most_missed(walks), standalone=True)[0])
+    (outputs / "walk.svg").write_text(motion_of(most_missed(walks), standalone=True)[0], encoding="utf-8")
     measured = read_dataset(inputs / "bench")
     page = campaign_page(
         summary, diagnosis, traces, walks, labels_of(measured), robot, [*_when(measured, datasets), *made, _versions()]
     )
-    (outputs / "report.html").write_text(render(page))
+    write_page(page, outputs / "report.html")
 
 
 def _gait(trial: Trial) -> str:

@@ -13,6 +13,8 @@ from bifa.report.diagnosis import (
     COMPLETED_MODEL,
     HELD_OUT,
     NOISE_FLOOR,
+    RESIDUAL,
+    RMS,
     effects_table,
     found_sentences,
     further,
@@ -72,7 +74,7 @@ def campaign_page(
         f"{verdict} {_faster(summary['gaits'])}",
         sections,
         (
-            f"{BASE_MODEL} {COMPLETED_MODEL} {NOISE_FLOOR} {HELD_OUT}",
+            f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {HELD_OUT}",
             "Speeds are those of the settled cycles; ± is the spread of the repeats.",
         ),
         (prediction_table(summary["prediction_error"], "held-out"), speed_table(summary["gaits"])),
@@ -109,6 +111,7 @@ def _off(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping], labels
     return Section(
         "Where the base model is off, and what is left",
         [
+            RESIDUAL,
             spoken(diagnosis["signature"]["text"], labels),
             "Millimetres, psi and newtons do not add up, so errors of several quantities are put together in units of "
             "the noise floor: 1 is as good as a repeat.",

@@ -12,7 +12,7 @@ import numpy as np
 from bifa.campaign.page import GAIT_NAMES
 from bifa.errors import BifaError
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
-from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, verdict_sentence
+from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, RMS, verdict_sentence
 from bifa.report.evidence import before_and_after
 from bifa.report.page import Page, Section, Table
 from bifa.report.words import (
@@ -90,7 +90,7 @@ def compare_page(runs: Sequence[Run]) -> Page:
                 [parameter_table(runs)],
             ),
         ],
-        (f"{BASE_MODEL} {COMPLETED_MODEL} {NOISE_FLOOR} {HELD_OUT}",),
+        (f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {HELD_OUT}",),
         (verdict_table(runs), speed_table(runs)),
     )
 

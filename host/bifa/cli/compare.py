@@ -37,7 +37,7 @@ def compare(
     for which in found[0].gaits:
         print_table(console, gait_table(found, which))
     if report is not None:
-        from bifa.report.page import render
+        from bifa.report.page import write_page
 
-        report.write_text(render(compare_page(found)))
+        write_page(compare_page(found), report)
         console.print(f"report: {report}", highlight=False, soft_wrap=True)

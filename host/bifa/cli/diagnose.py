@@ -106,7 +106,7 @@ def _report(console, measured, found, json: Path | None, model: Path | None, pag
     from bifa.files import write_text
     from bifa.identify.completed import completed_model
     from bifa.report.diagnosis import diagnosis_page
-    from bifa.report.page import render
+    from bifa.report.page import write_page
     from bifa.robot import save_model
     from lacuna.diagnosis.record import as_record
 
@@ -118,7 +118,7 @@ def _report(console, measured, found, json: Path | None, model: Path | None, pag
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:
-        write_text(page, render(diagnosis_page(measured.name, record, labels_of(measured))))
+        write_page(diagnosis_page(measured.name, record, labels_of(measured)), page)
         console.print(f"report: {page}", highlight=False)
 
 

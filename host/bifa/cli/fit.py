@@ -27,7 +27,7 @@ def fit(
     together. Reports each parameter with its 90 % interval, what the data do not determine, and the error in units of
     the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's Figs. 4 to 6.
     """
-    from bifa.files import check_targets, write_text, written_into
+    from bifa.files import check_targets, written_into
 
     check_targets(out, report, folders=(pictures,))
 
@@ -56,9 +56,9 @@ def fit(
     print_report(console, found)
     if report is not None:
         from bifa.report.fit import fit_page
-        from bifa.report.page import render
+        from bifa.report.page import write_page
 
-        write_text(report, render(fit_page(found)))
+        write_page(fit_page(found), report)
         console.print(f"report: {report}", highlight=False)
     if pictures is not None:
         from bifa.report.identification import draw

@@ -54,7 +54,7 @@ def animate_walks(
             name = f"walk{number}-{part}"
             rules.append(_keyframes(name, steps, seconds))
             box = (
-                f'x="0" width="1" y="{-_BODY_MM / 2:g}" height="{_BODY_MM:g}" opacity=".85"'
+                f'x="0" width="1" y="{-_BODY_MM / 2:g}" height="{_BODY_MM:g}"'
                 if part == "body"
                 else f'x="{-_END_MM / 2:g}" width="{_END_MM:g}" y="-0.5" height="1"'
             )

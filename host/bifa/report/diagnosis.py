@@ -18,6 +18,8 @@ from bifa.report.words import (
 
 BASE_MODEL = "The base model is the paper's, with its parameters fitted to this robot."
 COMPLETED_MODEL = "The completed model has what was found added to it, and was fitted anew."
+RMS = "Errors are measured minus predicted, the root of their mean square (RMS)."
+RESIDUAL = "A residual is what is left of a measurement once the prediction is taken away."
 NOISE_FLOOR = "The noise floor is how far two runs of the same condition are apart anyway: no model can be nearer."
 HELD_OUT = "Held-out trials were measured, but neither model was fitted to them."
 
@@ -43,7 +45,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], labels: Labels | None =
         f"Diagnosis of {name}",
         verdict_sentence(record["verdict"], effects, record["remainder"]),
         lacking(record, labels) + further(record, labels),
-        (BASE_MODEL, COMPLETED_MODEL, NOISE_FLOOR, HELD_OUT),
+        (f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {HELD_OUT}",),
         (noise_table(record["error"]),),
     )
 
@@ -54,7 +56,7 @@ def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[Sec
     found = []
     if effects:
         found.append(Section("What was found", found_sentences(effects), (effects_table(effects),)))
-    found.append(Section("Where the base model is off", (spoken(record["signature"]["text"], labels),)))
+    found.append(Section("Where the base model is off", (RESIDUAL, spoken(record["signature"]["text"], labels))))
     found.append(Section("Error before and after", charts=[errors_chart(record["error"])]))
     return found
 

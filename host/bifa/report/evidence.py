@@ -46,7 +46,7 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
     panel = Panel(
         [*links, *marks],
         Axis("RMS error in units of the noise floor", reach, log=True),
-        Axis(range=(0.4, len(names) + 0.6), ticks=dict(zip(names, rows.tolist(), strict=True))),
+        Axis(range=(0.4, len(names) + 1.0), ticks=dict(zip(names, rows.tolist(), strict=True))),
         [("x", floor, "noise floor")] if floor else [],
         len(names) * _ROW_PX / 150,
     )

@@ -7,7 +7,7 @@ import numpy as np
 from bifa.identify.identification import Identification
 from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
-from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR
+from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
 from bifa.report.identification_tables import AS_NOISE, remarks
 from bifa.report.page import Page, Section, Table
@@ -54,7 +54,7 @@ def fit_page(found: Identification) -> Page:
             Section("What to know about them", [spoken(line) for line in remarks(found)]),
             *measured,
         ],
-        (f"{BASE_MODEL} {NOISE_FLOOR}",),
+        (f"{BASE_MODEL} {RMS} {NOISE_FLOOR}",),
         (_errors(found),),
     )
 

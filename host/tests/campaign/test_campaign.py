@@ -29,7 +29,7 @@ def test_the_demo_names_the_sealed_effect_and_predicts_what_is_then_measured(tmp
     for gait in speeds.values():
         assert gait["completed_model"] == pytest.approx(gait["measured"], rel=0.03)
     assert speeds["completed"]["measured"] > 1.5 * speeds["baseline"]["measured"]
-    page = (folder / "report.html").read_text()
+    page = (folder / "report.html").read_text(encoding="utf-8")
     assert "src=" not in page.split("<script>")[0], "nothing is fetched"
     assert (folder / "walk.svg").read_text().count("@keyframes") == 10
 

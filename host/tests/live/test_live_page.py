@@ -18,7 +18,7 @@ from harness.pty_uno import PtyUno
 
 expect = pytest.importorskip("playwright.sync_api", reason="playwright is not installed").expect
 
-LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text()
+LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text(encoding="utf-8")
 
 
 class Monitor:
@@ -147,7 +147,7 @@ def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
     page.get_by_label("When this page closes").uncheck()
     page.get_by_text("the robot goes on").wait_for()
     page.close()
-    time.sleep(2.5)
+    time.sleep(4.5)
     assert bifa.uno.board.state == "running"
     page = tab(bifa.url)
     assert not page.get_by_label("When this page closes").is_checked()
@@ -155,7 +155,7 @@ def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
     page.get_by_text("the robot stops").last.wait_for()
     page.reload()
     page.wait_for_selector("html[data-drawn]", state="attached")
-    time.sleep(2.0)
+    time.sleep(4.5)
     assert bifa.uno.board.state == "running", "a page that is loaded anew was not closed"
     page.close()
     assert bifa.until("stopped") == "stopped"

@@ -8,10 +8,10 @@ from pypdf import PdfReader
 
 from bifa.campaign.side_by_side import compare_page, read_runs
 from bifa.report.diagnosis import diagnosis_page
-from bifa.report.page import render
+from bifa.report.page import write_page
 from tests.report import sample
 
-LOOKS = Path(__file__).with_name("looks.js").read_text()
+LOOKS = Path(__file__).with_name("looks.js").read_text(encoding="utf-8")
 WIDE, NARROW = 1280, 390
 
 
@@ -25,7 +25,7 @@ def pages(tmp_path_factory):
         "compare": compare_page(runs),
         "diagnosis": diagnosis_page("the bench", sample.DIAGNOSIS, sample.LABELS),
     }.items():
-        (folder / f"{name}.html").write_text(render(page))
+        write_page(page, folder / f"{name}.html")
     return folder
 
 
@@ -55,7 +55,7 @@ def opened(tabs):
     def look(name, width=WIDE, scheme="light", motion="no-preference"):
         tab = found[name]
         tab.set_viewport_size({"width": width, "height": 900})
-        tab.emulate_media(color_scheme=scheme, reduced_motion=motion, media="screen")
+        tab.emulate_media(color_scheme=scheme, reduced_motion=motion)
         tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         return tab
 
@@ -110,6 +110,16 @@ def test_a_plot_zooms_and_comes_back(opened):
     assert plot.evaluate(reach) == pytest.approx(whole)
 
 
+def test_a_plot_says_under_the_pointer_what_is_there(opened):
+    page = opened("campaign")
+    plot = page.locator(".plot").last
+    plot.scroll_into_view_if_needed()
+    spot = plot.locator(".nsewdrag").first.bounding_box()
+    page.mouse.move(spot["x"] + 0.5 * spot["width"], spot["y"] + 0.5 * spot["height"])
+    page.mouse.move(spot["x"] + 0.2 * spot["width"], spot["y"] + 0.41 * spot["height"], steps=8)
+    plot.locator(".hoverlayer text", has_text="baseline").first.wait_for()
+
+
 def test_the_plots_follow_the_reader_s_scheme(opened):
     page = opened("campaign")
     colour = "document.querySelector('.plot .xtick text').style.fill"
@@ -156,17 +166,19 @@ def test_on_paper_nothing_is_cut_off_and_no_table_is_split(opened, tmp_path):
             ink: document.querySelector(".plot .xtick text").style.fill,
         };
     })""")
-    page.pdf(path=tmp_path / "page.pdf", format="A4")
-    printed = page.evaluate("window.onPaper")
-    assert printed["widest"] <= 700, "wider than what A4 leaves"
-    assert printed["ink"] == "rgb(29, 31, 35)", "dark on white, whatever the screen's scheme"
-    text = pages_of(tmp_path / "page.pdf")
-    assert len(text) > 3
-    for table in page.locator("table").all():
-        rows = [row.inner_text().split("\t")[0].strip() for row in table.locator("tbody tr").all()]
-        values = [" ".join(row.inner_text().split()) for row in table.locator("tbody tr").all()]
-        on = [{number for number, sheet in enumerate(text) if value in sheet} for value in values]
-        assert set.intersection(*on), f"a table is split between sheets: {rows}"
+    tables = [
+        [" ".join(row.inner_text().split()) for row in table.locator("tbody tr").all()]
+        for table in page.locator("table").all()
+    ]
+    for height_mm in (297, 279, 250, 215):  # A4, Letter, and sheets that would cut where those do not
+        page.pdf(path=tmp_path / "page.pdf", width="210mm", height=f"{height_mm}mm")
+        printed = page.evaluate("window.onPaper")
+        assert printed["widest"] <= 700, "wider than what A4 leaves"
+        assert printed["ink"] == "rgb(29, 31, 35)", "dark on white, whatever the screen's scheme"
+        sheets = pages_of(tmp_path / "page.pdf")
+        for rows in tables:
+            on = [{number for number, sheet in enumerate(sheets) if row in sheet} for row in rows]
+            assert set.intersection(*on), f"a table is split between sheets of {height_mm} mm: {rows}"
 
 
 def pages_of(pdf):

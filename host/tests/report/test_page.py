@@ -9,7 +9,7 @@ import pytest
 from bifa.effects import library
 from bifa.report.animation import FRAMES_PER_S, animate_walks
 from bifa.report.diagnosis import diagnosis_page, verdict_sentence
-from bifa.report.page import Page, Section, Table, render
+from bifa.report.page import Page, PageError, Section, Table, render, write_page
 from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
 from bifa.report.words import effect_words, quantity, spoken
@@ -97,6 +97,15 @@ def test_a_verdict_without_an_effect_and_without_held_out_trials_has_its_page(ve
 
 def test_the_page_is_the_same_bytes_every_time(html):
     assert render(sample.page()) == html
+
+
+def test_a_page_is_written_in_utf_8_whole_or_not_at_all(tmp_path):
+    page = Page("±", "4.4 N", [])
+    write_page(page, tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_bytes().decode("utf-8") == render(page)
+    with pytest.raises(PageError, match="nowhere"):
+        write_page(page, tmp_path / "nowhere" / "page.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 
 def test_every_plot_is_in_the_page_and_json_cannot_end_its_element(html):

@@ -33,7 +33,7 @@ from bifa.simulate import speed
 
 HOST = "127.0.0.1"
 _ANSWER_S = 15.0  # a page waits at most so long for the robot
-_BACK_WITHIN_S = 1.5  # a page that is loaded anew has not been closed
+_BACK_WITHIN_S = 3.0  # a page that is loaded anew has not been closed
 _HANDED_OVER_S = 0.05
 _WAITING = 64  # reports that a slow page may be behind
 

@@ -124,6 +124,7 @@
   };
 
   const draw = () => {
+    if (!window.Plotly) return; // it is large and comes last: the page is connected, and Stop works, before it is there
     const colours = dark.matches ? palettes.dark : palettes.light;
     const line = (name, x, y, axis, shape = "linear") => ({ type: "scatter", mode: "lines", name, x, y, yaxis: axis, line: { color: colours[name] || colours.ink, width: 1.6, shape }, hoverinfo: "skip" });
     const now = times.length ? times[times.length - 1] : 0;

@@ -39,8 +39,8 @@
   addEventListener("resize", () => boxes.forEach((box) => {
     if (Math.floor(box.parentElement.getBoundingClientRect().width) !== box.drawnAt) draw(box);
   }));
-  addEventListener("beforeprint", () => { onPaper = true; document.body.style.width = "680px"; drawAll(); });
-  addEventListener("afterprint", () => { onPaper = false; document.body.style.width = ""; drawAll(); });
+  addEventListener("beforeprint", () => { onPaper = true; document.body.classList.add("paper"); drawAll(); });
+  addEventListener("afterprint", () => { onPaper = false; document.body.classList.remove("paper"); drawAll(); });
   drawAll().then(() => { document.documentElement.dataset.drawn = boxes.length; });
 
   // --- Animations: they run by themselves, and stand still for who prefers that; here are pause, clock and slider.
