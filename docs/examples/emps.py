@@ -45,7 +45,8 @@ effects = [  # of each parameter its name, unit, a typical value, and bounds
     Effect("delay", Parameter("delay_s", "s", 2e-3, 0.0, 0.05)),
     Effect("pulses", Parameter("gain", "1", 1.0, -3.0, 3.0)),  # logged, but the motor's signal has them already
 ]
-system = lacuna.System(simulate, [Parameter("mass_kg", "kg", 95.0, 50.0, 150.0)], effects, nuisances=start, name="EMPS")
+mass = [Parameter("mass_kg", "kg", 95.0, 50.0, 150.0)]
+system = lacuna.System(simulate, mass, effects, nuisances=start, name="EMPS")
 
 
 def read(mat_file):
@@ -56,8 +57,7 @@ def read(mat_file):
 
 
 def windows(record):
-    """Of 1 s; the reference repeats every 6.24 s, so that windows at the same place of it are repeats."""
-    return lacuna.windows(record, 1.0, every=6.24 / 6, period=6.24)
+    return lacuna.windows(record, 1.0, every=6.24 / 6, period=6.24)  # at the same place of each cycle: repeats
 
 
 if __name__ == "__main__":

@@ -13,14 +13,10 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from bifa.errors import BifaError
+from bifa.files import write_text
 from bifa.report.chart import Chart
 from bifa.report.plot import as_plot, library_script
 from bifa.report.style import DARK, LIGHT
-
-
-class PageError(BifaError):
-    """A page cannot be written where it was asked for."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +96,8 @@ def render(page: Page) -> str:
 
 
 def write_page(page: Page, path: Path) -> None:
-    """Write the page, in UTF-8 whatever the computer's own encoding is: whole, or not at all."""
-    aside = path.with_name(f".{path.name}.part")
-    try:
-        aside.write_text(render(page), encoding="utf-8")
-        aside.replace(path)
-    except OSError as error:
-        aside.unlink(missing_ok=True)
-        raise PageError(f"cannot write {path}: {error}") from None
+    """Write the page, whole or not at all; TargetError where it cannot be written."""
+    write_text(path, render(page))
 
 
 @cache

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from bifa.effects import library
+from bifa.files import TargetError
 from bifa.report.animation import FRAMES_PER_S, animate_walks
 from bifa.report.diagnosis import diagnosis_page, verdict_sentence
-from bifa.report.page import Page, PageError, Section, Table, render, write_page
+from bifa.report.page import Page, Section, Table, render, write_page
 from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
 from bifa.report.words import effect_words, quantity, spoken
@@ -103,7 +104,7 @@ def test_a_page_is_written_in_utf_8_whole_or_not_at_all(tmp_path):
     page = Page("±", "4.4 N", [])
     write_page(page, tmp_path / "page.html")
     assert (tmp_path / "page.html").read_bytes().decode("utf-8") == render(page)
-    with pytest.raises(PageError, match="nowhere"):
+    with pytest.raises(TargetError, match="nowhere"):
         write_page(page, tmp_path / "nowhere" / "page.html")
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
