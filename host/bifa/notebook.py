@@ -34,7 +34,7 @@ class Robot:
         gait = _gait(gait)
         walked = walk(self.model, gait, cycles)
         columns = {name: np.asarray(column) for name, column in walked.columns.items()}
-        return Trial(f"{self.model.name} simulated", "locomotion", columns, gait=gait.as_dict())
+        return Trial(f"{self.model.name}_simulated.csv", "locomotion", columns, gait=gait.as_dict())
 
     def speed_mm_s(self, gait: Gait | str | Path = BASELINE, cycles: int = 10) -> float:
         """Of the last cycle."""
