@@ -30,4 +30,4 @@ def test_unusable_input_ends_with_status_2(tmp_path):
     command = [sys.executable, "-c", "from bifa.cli import main; main()", "diagnose", str(tmp_path / "nothing")]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.returncode == 2
-    assert "does not exist" in ended.stderr
+    assert "does not exist" in " ".join(ended.stderr.replace("│", " ").split())

@@ -65,7 +65,8 @@ def test_files_give_the_same_trials_as_instruments_that_are_driven(bench, tmp_pa
         assert check_trial(ours) == []
         for name, values in ours.columns.items():
             if not name.startswith("command") and name != "time_s":
-                assert values.max() == pytest.approx(theirs.columns[name].max(), abs=0.6)
+                # not its peak: where a pull slips lies between two samples, 4 N apart
+                assert np.median(values) == pytest.approx(np.median(theirs.columns[name]), abs=0.6)
     step = by_hand.trials[1]
     assert step.extra["switch_time_s"][0] == pytest.approx(0.5, abs=0.02)
 
