@@ -17,24 +17,28 @@ from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 
 ROUNDS = 3
-WITHIN = 1.1  # floors: as in the engine, an error within a tenth of the floor is as good as the data
+_PREDICTED = 0.005  # of a speed that repeats agree about more closely: what its prediction may be wrong by
 _UNCHANGED = 0.01  # of the measured speed
 
 
 @dataclass(frozen=True)
 class Round:
-    """One gait that was not fitted: `error_mm`, RMS of the ends' places against what `effects` and the model predict;
-    `floor_mm`, what its repeats differ by; speeds over settled cycles."""
+    """One gait that was not fitted: its speed over settled cycles as the model with `effects` predicts it and measured,
+    with the standard deviation of its repeats; `error_mm`, RMS of the ends' places against the prediction all along the
+    walk, `floor_mm`, what repeats differ by there (None: there is one only)."""
 
     effects: tuple[str, ...]
     predicted_mm_s: float
     measured_mm_s: float
+    spread_mm_s: float
     error_mm: float
-    floor_mm: float
+    floor_mm: float | None
 
     @property
     def is_predicted(self) -> bool:
-        return self.error_mm <= WITHIN * self.floor_mm
+        """Whether the speed is predicted to within what repeats differ by, or to half a per cent."""
+        error_mm_s = abs(self.predicted_mm_s - self.measured_mm_s)
+        return error_mm_s <= max(2.0 * self.spread_mm_s, _PREDICTED * abs(self.measured_mm_s))
 
     def changes_nothing(self, before: Round) -> bool:
         """Whether the model still names the same and its gait walks no faster or slower, nor is predicted better."""
@@ -53,19 +57,20 @@ class Trades:
 
 
 def judged(model: Model, effects: tuple[str, ...], walks: Dataset) -> Round:
-    """How well `model` predicts the repeats of one gait. With a single repeat the floor is NaN and nothing is within
-    it."""
+    """How well `model` predicts the repeats of one gait."""
     trials = walks.trials
     residuals = _residuals(model, trials)
     between = residuals - residuals.mean(axis=0)
-    floor = np.sqrt((between**2).sum(axis=0).mean() / (len(trials) - 1)) if len(trials) > 1 else np.nan
+    several = len(trials) > 1
+    floor = float(np.sqrt((between**2).sum(axis=0).mean() / (len(trials) - 1))) if several else None
     measured = [speed.mean_mm_s for repeats in speeds(walks).values() for speed in repeats]
     return Round(
         effects,
         predicted_speed(model, trials[0]),
         float(np.mean(measured)),
+        float(np.std(measured, ddof=1)) if several else 0.0,
         float(np.sqrt(np.mean(residuals**2))),
-        float(floor),
+        floor,
     )
 
 

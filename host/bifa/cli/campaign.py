@@ -100,8 +100,7 @@ def run_campaign(
     for number, one in enumerate(summary["rounds"], 1):
         console.print(
             f"round {number}, a gait that was not fitted: {one['predicted_mm_s']:.2f} mm/s predicted,"
-            f" {one['measured_mm_s']:.2f} measured; position error {one['error_mm']:.3f} mm,"
-            f" repeats differ by {one['floor_mm']:.3f} mm",
+            f" {one['measured_mm_s']:.2f} ± {one['spread_mm_s']:.2f} measured",
             highlight=False,
         )
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)

@@ -1,6 +1,7 @@
 """Walks fed back until a gait that was never fitted is predicted; the robot here is a model with noise."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,8 +97,15 @@ def test_it_ends_where_nothing_changes_any_more(folders):
     assert [tuple(r["effects"]) for r in rounds] == [(), ("hysteresis",), ("hysteresis",)]
 
 
-def test_one_repeat_has_no_floor_to_be_within():
+def test_one_repeat_has_no_floor():
     walks = walked({"completed": FAST})
-    alone = Dataset(None, "walks", {}, walks.trials[:1], {})
-    assert not judged(ROBOT, (), alone).is_predicted
-    assert judged(ROBOT, (), walks).is_predicted
+    alone = judged(ROBOT, (), Dataset(None, "walks", {}, walks.trials[:1], {}))
+    assert (alone.floor_mm, alone.spread_mm_s, alone.is_predicted) == (None, 0.0, True)
+
+
+def test_a_speed_within_what_repeats_differ_by_is_predicted():
+    one = judged(ROBOT, (), walked({"completed": FAST}))
+    for off, predicted in ((0.004, True), (0.006, False)):
+        assert replace(one, predicted_mm_s=(1 + off) * one.measured_mm_s, spread_mm_s=0.0).is_predicted is predicted
+    wide = replace(one, predicted_mm_s=1.04 * one.measured_mm_s, spread_mm_s=0.03 * one.measured_mm_s)
+    assert wide.is_predicted
