@@ -37,7 +37,11 @@ def figure(record_property) -> Callable[[str], None]:
 
 
 def pytest_collection_modifyitems(items) -> None:
-    """In another order where BIFA_TEST_ORDER is set, to a seed: the files shuffled, and the tests in each."""
+    """Tests in real time get a second chance. In another order where BIFA_TEST_ORDER is set, to a seed: the files
+    shuffled, and the tests in each."""
+    for item in items:
+        if item.get_closest_marker("real_time"):
+            item.add_marker(pytest.mark.flaky(reruns=1))
     if seed := os.environ.get("BIFA_TEST_ORDER"):
         draw = random.Random(seed)
         of_file = {item.path: draw.random() for item in items}

@@ -12,7 +12,7 @@ from bifa.data import read_dataset
 from bifa.measure.plan import BRISK
 from bifa.robot.gait import save_gait
 
-pytestmark = pytest.mark.uno
+pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 HOST = Path(__file__).parents[2]
 
 

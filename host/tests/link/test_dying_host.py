@@ -12,6 +12,8 @@ from bifa.link import Uno
 from harness.board import Board
 from harness.pty_uno import STEP_S, PtyUno
 
+pytestmark = pytest.mark.real_time
+
 
 class Mortal:
     """A transport that goes dead after so many bytes, wherever in a frame that is."""

@@ -13,6 +13,8 @@ from bifa.live.interactive import status_lines
 from harness.pty_uno import PtyUno
 from harness.terminal import Terminal
 
+pytestmark = pytest.mark.real_time
+
 UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
 KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})
 

@@ -21,6 +21,8 @@ from harness.board import Board
 from harness.pty_uno import PtyUno
 from harness.terminal import Terminal
 
+pytestmark = pytest.mark.real_time
+
 GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
 
 

@@ -16,6 +16,8 @@ import pytest
 from bifa.robot.gait import Gait, save_gait
 from harness.pty_uno import PtyUno
 
+pytestmark = pytest.mark.real_time
+
 expect = pytest.importorskip("playwright.sync_api", reason="playwright is not installed").expect
 
 LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text(encoding="utf-8")

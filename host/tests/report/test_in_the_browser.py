@@ -11,6 +11,8 @@ from bifa.report.diagnosis import diagnosis_page
 from bifa.report.page import write_page
 from tests.report import sample
 
+pytestmark = pytest.mark.real_time
+
 LOOKS = Path(__file__).with_name("looks.js").read_text(encoding="utf-8")
 WIDE, NARROW = 1280, 390
 

@@ -15,7 +15,7 @@ import pytest
 
 from virtual_robot.rig import FIRMWARE, open_rig
 
-pytestmark = pytest.mark.uno
+pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 
 PATIENCE_S = 60  # other tests may keep the computer busy
 SETTLED_S = 0.3  # of the rig's time: what was under way has arrived

@@ -10,7 +10,7 @@ import serial
 
 from virtual_robot.rig import open_rig
 
-pytestmark = pytest.mark.uno
+pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 
 ECHO = """
 ISR(USART_RX_vect) { uint8_t c = UDR0; UDR0 = c; }

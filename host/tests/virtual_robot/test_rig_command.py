@@ -8,7 +8,7 @@ import pexpect
 import pytest
 import serial
 
-pytestmark = pytest.mark.uno
+pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 
 GREET = "int main(void) { serial(); for (;;) { put('H'); put('i'); put('\\n'); _delay_ms(20); } }"
 BIFA = str(Path(sys.executable).with_name("bifa"))
