@@ -90,9 +90,8 @@ def test_another_order_is_the_same_for_the_same_seed(project, tmp_path):
 
     def order(seed: str) -> list[str]:
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--collect-only", "--rootdir=."]
-        done = subprocess.run(
-            command, cwd=tmp_path, env={"BIFA_TEST_ORDER": seed, "PATH": ""}, capture_output=True, text=True, check=True
-        )
+        environment = {"BIFA_TEST_ORDER": seed, "PATH": "", "PYTHONPATH": str(project / "host")}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
         return [line for line in done.stdout.splitlines() if "test_order" in line]
 
     assert order("") != order("1") == order("1") != order("2")
