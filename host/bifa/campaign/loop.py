@@ -152,9 +152,13 @@ def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, ef
     return Stage(name, title, needs, (walks,), run, settings, resumes=hands, by_hand=hands)
 
 
+def _diagnosed(dataset: Dataset, bench: Bench, part: Part) -> Diagnosis:
+    return diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
+
+
 def _diagnose(bench: Bench, part: Part) -> Stage:
     def diagnosed(dataset: Dataset) -> Diagnosis:
-        return diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
+        return _diagnosed(dataset, bench, part)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -179,7 +183,7 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
 
 def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
     def complete(dataset: Dataset) -> tuple[Model, tuple[str, ...]]:
-        found = diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
+        found = _diagnosed(dataset, bench, part)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
     def walk(number: int, gait: Gait, folder: Path) -> Dataset:

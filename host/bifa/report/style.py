@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 
+from lacuna.report.style import LOOK
+
 CHAMBERS = ("body", "head", "tail")
 # Okabe and Ito's palette: distinct for readers with any colour vision, and on paper. Nothing else has these colours.
 CHAMBER_COLOURS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
@@ -29,23 +31,7 @@ class Palette:
 LIGHT = Palette("#ffffff", "#1d1f23", "#5d636d", "#d9dce1", "#1d1f23", "#8a7000", "#a3308f")
 DARK = Palette("#16181c", "#e6e6e6", "#a2a8b2", "#33373e", "#e6e6e6", "#d6b656", "#ee9fd8")
 
-_RC = {
-    "font.size": 9,
-    "axes.titlesize": 10,
-    "axes.titleweight": "bold",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.2,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "figure.dpi": 110,
-    "savefig.dpi": 150,
-    "savefig.bbox": "tight",
-    "svg.hashsalt": "bifa",
-}
+_RC = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
 
 
 @contextmanager

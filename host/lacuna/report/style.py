@@ -20,7 +20,7 @@ class Palette:
 LIGHT = Palette("#222222", "#8a8a8a", "#222222", "#C2559D", "#B8B8B8", "#0072B2")
 DARK = Palette("#e6e6e6", "#8f8f8f", "#e6e6e6", "#E59CCB", "#6b6b6b", "#56B4E9")
 
-_RC = {
+LOOK = {  # of every figure, whatever the colours
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
@@ -57,5 +57,5 @@ def look(dark: bool = False) -> Iterator[Palette]:
     palette = DARK if dark else LIGHT
     ink = dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), palette.ink)
     background = {"figure.facecolor": "#16181c" if dark else "white", "axes.facecolor": "#16181c" if dark else "white"}
-    with matplotlib.rc_context(_RC | ink | background | {"grid.color": palette.quiet}):
+    with matplotlib.rc_context(LOOK | ink | background | {"grid.color": palette.quiet}):
         yield palette
