@@ -33,14 +33,6 @@ void vent() {
 
 bool emergency_stop_pressed() { return !(PIND & kEmergencyStop); }
 
-void light(bool on) {
-  if (on) {
-    PORTB |= kLed;
-  } else {
-    PORTB &= static_cast<uint8_t>(~kLed);
-  }
-}
-
 }  // namespace board
 
 /// D4 to D9, as the pattern has them: bits 0 to 3 on port D from bit 4, bits 4 and 5 on port B from bit 0.

@@ -11,6 +11,4 @@ void vent();
 
 bool emergency_stop_pressed();
 
-void light(bool on);
-
 }  // namespace board
