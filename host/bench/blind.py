@@ -106,7 +106,8 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None) -> None:
     system.effects = {name: effect for name, effect in system.effects.items() if name != without}
     began = time.monotonic()
     found = diagnose(system, progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
-    verdict.write_text(json.dumps(as_record(found) | {"baselines": baselines(found.search)}))
+    record = as_record(found) | {"processor_seconds": time.process_time(), "baselines": baselines(found.search)}
+    verdict.write_text(json.dumps(record))
 
 
 def baselines(search) -> dict[str, list[str]]:
@@ -172,8 +173,9 @@ def report(records: list[dict], truth: str) -> None:
     for name in BASELINES:
         _share(f"baseline {name}: one effect, named alone", [r["baselines"][name] == r["truth"] for r in single])
         _share(f"baseline {name}: no effect, says none", [not r["baselines"][name] for r in none])
-    seconds = sorted(r["seconds"] for r in records)
-    print(f"seconds a diagnosis: median {seconds[len(seconds) // 2]:.0f}, longest {seconds[-1]:.0f}")
+    for kind, members in by_kind.items():
+        if spent := sorted(r["processor_seconds"] for r in members):
+            print(f"processor seconds, {kind:8} median {spent[len(spent) // 2]:.0f}, longest {spent[-1]:.0f}")
     print("\ntruth -> named")
     for (truth, said), count in sorted(Counter((_name(r["truth"]), _said(r)) for r in records).items()):
         print(f"  {count:3d}  {truth:40} {said}")
@@ -251,7 +253,7 @@ def main() -> None:
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(
                     f"{record['kind']:8}{record['seed']}  {_name(record['truth'])} ({sizes}) -> {_said(record)}"
-                    f"  {record['seconds']:.0f} s",
+                    f"  {record['processor_seconds']:.0f} s of processor",
                     flush=True,
                 )
         except KeyboardInterrupt:

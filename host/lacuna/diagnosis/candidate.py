@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from lacuna.diagnosis.crew import Crew
-from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, solve_from_afar, starting_point
+from lacuna.estimation.afar import Begun, begin, go_on, solve_from_afar
+from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, starting_point
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, solve
@@ -23,6 +24,7 @@ from lacuna.system import Effect, Parameter
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
+_FOLLOWED = 4  # of those begun anew, the ones that are followed to the end
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
 
@@ -169,10 +171,18 @@ def from_afar(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple
     return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, afar, strict=True)]
 
 
-def anew(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Sketches that owe nothing to the parent's fit: from afar, with the effect at its typical size. The best first."""
-    found = _begun_afar(profiled, [p.at_typical_size() for p in profiled], crew)
-    fits = [(best_of(p.problem, [solution]), p) for solution, p in zip(found, profiled, strict=True)]
+def anew(parent: Fit, profiled: Sequence[Profile], policy: Policy, crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Sketches that owe nothing to `parent`: begun afar with the effect at its typical size, the best first. The trials
+    that isolate parameters go first; the few that take most away there are followed to the end."""
+    alone = begin(parent.problem, parent.structure.start())
+    names = [p.problem.structure.effects for p in profiled]
+    begun = crew.map("beginning anew with", names, begin, [(p.problem, p.at_typical_size()) for p in profiled])
+    least = (1.0 - policy.promising) * alone.cost
+    leading = sorted(range(len(begun)), key=lambda k: begun[k].cost)[:_FOLLOWED]
+    leading = [k for k in leading if begun[k].cost < least]
+    jobs = [(profiled[k].problem, begun[k]) for k in leading]
+    found = crew.map("going on with", [names[k] for k in leading], _sketched_further, jobs)
+    fits = [(best_of(profiled[k].problem, [solution]), profiled[k]) for k, solution in zip(leading, found, strict=True)]
     return sorted(fits, key=lambda pair: pair[0].cost)
 
 
@@ -188,6 +198,10 @@ def _sketched(problem: Problem, start: Point) -> Solution:
 
 def _sketched_from_afar(problem: Problem, values: np.ndarray) -> Solution:
     return solve_from_afar(problem, values, **_SKETCH)
+
+
+def _sketched_further(problem: Problem, begun: Begun) -> Solution:
+    return go_on(problem, begun, **_SKETCH)
 
 
 def finish(sketched: Fit) -> Fit:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lacuna.diagnosis.candidate import Candidate, finish, judge
+from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after, stacked
 from lacuna.diagnosis.policy import Policy
@@ -23,6 +23,7 @@ _MOST = 4  # curves in one correction
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
 _SKETCH = {"max_iterations": 8, "relative": 3e-3}
+_REFINED = {"max_iterations": 20, "relative": 3e-4}
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def _best_grown(parents: Sequence[Candidate], split: Split, policy: Policy, crew
     best = min(grown, key=lambda c: c.checked.cost)
     if before.checked.cost - best.checked.cost < policy.curve * _excess(before.checked):
         return None
-    best = min(best, judge(finish(best.fitted), split), key=lambda c: c.checked.cost)
+    best = min(best, judge(_refined(best.fitted), split), key=lambda c: c.checked.cost)
     return best if _rms(best) < _rms(before) else None
 
 
@@ -80,6 +81,11 @@ def _excess(fit: Fit) -> float:
 
 def _sketched(problem: Problem, start: Point) -> Solution:
     return solve(problem, start, **_SKETCH)
+
+
+def _refined(sketched: Fit) -> Fit:
+    """To the end, from where the sketch stands: a curve leads the others nowhere else."""
+    return Fit(sketched.problem, solve(sketched.problem, sketched.solution.point, **_REFINED), 1, 1)
 
 
 def _promises(candidate: Candidate, split: Split) -> list[_Promise]:

@@ -164,24 +164,31 @@ def _grow(
             if same not in profiled or found.cost < profiled[same].cost:
                 profiled[same] = found
     ranked = sorted(profiled.values(), key=lambda p: p.cost)
-    sketched = _sketched(ranked[: _SKETCHED[size]], _SKETCHED_TWICE[size], split, enough, policy, crew)
     before = min(beam, key=lambda c: c.cost)
-    grown = _finish(before, sketched, _FINISHED[size], split, tried, enough, policy, crew)
-    best = min([before, *grown], key=lambda c: c.cost)
-    if size == 1 and best.rms > policy.lost and not enough(best):
-        grown += _finish(best, anew(ranked, crew), _FINISHED[size], split, tried, enough, policy, crew)
-    return grown
+    sketched = _sketched(before, ranked, split, enough, policy, crew)
+    return _finish(before, sketched, _FINISHED[size], split, tried, enough, policy, crew)
 
 
-def _sketched(promising: Sequence[Profile], twice: int, split, enough, policy: Policy, crew: Crew):
-    """A quick refit of each, the best first; the best few, `twice`, from afar as well. Where one explains enough as it
-    is (it begins afar again when it is finished), only those are begun anew that could reach it."""
-    found = sketches(promising, crew)
-    again = found[:twice]
+def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, policy: Policy, crew: Crew):
+    """A quick refit of the most promising, the best first; the best few from afar as well. Where one explains enough as
+    it is (it begins afar again when it is finished), only those are begun afar that could reach it. Where the base
+    leaves so much that it may have gone astray, effects are also begun anew."""
+    size = len(before.effects) + 1
+    near = sketches(ranked[: _SKETCHED[size]], crew)
+    again = near[: _SKETCHED_TWICE[size]]
+    fresh = []
     if again and enough(judge(again[0][0], split)):
         again = [pair for pair in again[1:] if pair[0].cost < policy.reach * again[0][0].cost]
-    rest = [pair for pair in found if not any(pair is other for other in again)]
-    return sorted([*rest, *from_afar(again, crew)], key=lambda pair: pair[0].cost)
+    elif not before.effects and before.rms > policy.lost:
+        fresh = anew(before.fitted, ranked, policy, crew)
+        begun = {fitted.structure.effects for fitted, _ in fresh}
+        again = [pair for pair in again if pair[0].structure.effects not in begun][: len(again) - len(fresh) or 1]
+    best: dict[tuple[str, ...], tuple[Fit, Profile]] = {}
+    for fitted, profile in (*near, *from_afar(again, crew), *fresh):
+        effects = fitted.structure.effects
+        if effects not in best or fitted.cost < best[effects][0].cost:
+            best[effects] = (fitted, profile)
+    return sorted(best.values(), key=lambda pair: pair[0].cost)
 
 
 def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:

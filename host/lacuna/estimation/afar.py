@@ -10,6 +10,7 @@ time. What they cannot tell apart (`Parameter.elsewhere`), all trials together d
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,16 +32,34 @@ def solve_from_afar(
 ) -> Solution:
     """Minimise the cost from `values`, wherever they are. Parameters of which something was known beforehand begin
     there, and stay until the others are near."""
-    free = tuple(i for i, p in enumerate(problem.structure.parameters) if p.prior_sd is None)
-    every = range(len(values))
+    return go_on(problem, begin(problem, values), max_iterations=max_iterations, relative=relative)
+
+
+class Begun(NamedTuple):
+    """Where the trials that isolate parameters lead, and what they then cost; 0 where there are none."""
+
+    values: np.ndarray
+    cost: float
+
+
+def begin(problem: Problem, values: np.ndarray) -> Begun:
+    """Fit the trials that isolate parameters, from `values`: a small part of the whole work."""
+    free = _free(problem)
     values = np.where(np.isin(np.arange(len(values)), free), values, problem.structure.prior_mean())
-    isolates = problem.structure.system.isolates
-    isolated = problem.over([t for t in problem.trials if isolates(t)])
-    if isolated.trials:
-        values = _followed(isolated, values, _ISOLATED, free).point.values
-        values = _followed(isolated, values, (SHARP,), every).point.values
+    isolated = _isolated(problem)
+    if not isolated.trials:
+        return Begun(values, 0.0)
+    values = _followed(isolated, values, _ISOLATED, free).point.values
+    found = _followed(isolated, values, (SHARP,), range(len(values)))
+    return Begun(found.point.values, found.cost)
+
+
+def go_on(problem: Problem, begun: Begun, *, max_iterations: int, relative: float = RELATIVE) -> Solution:
+    """Minimise the cost of all trials from where those that isolate parameters led."""
+    values, every = begun.values, range(len(begun.values))
+    isolated = _isolated(problem)
     hidden = [j for j in every if not any(problem.structure.moves(j, t) for t in isolated.trials)]
-    starts = [values, *_elsewhere(isolated, values, free)]
+    starts = [values, *_elsewhere(isolated, values, _free(problem))]
     # what isolated trials have fitted waits at first: a walk seen from a distance says little of it
     for view, moving in zip(_TOGETHER, (hidden, every), strict=True):
         found = [_followed(problem, start, (view,), moving) for start in starts]
@@ -50,6 +69,15 @@ def solve_from_afar(
     # alike: where it began stays
     best = found[0] if least > _BETTER * found[0].cost else min(found, key=lambda one: one.cost)
     return solve(problem, problem.start(best.point.values), max_iterations=max_iterations, relative=relative)
+
+
+def _free(problem: Problem) -> tuple[int, ...]:
+    return tuple(i for i, p in enumerate(problem.structure.parameters) if p.prior_sd is None)
+
+
+def _isolated(problem: Problem) -> Problem:
+    isolates = problem.structure.system.isolates
+    return problem.over([t for t in problem.trials if isolates(t)])
 
 
 def _followed(problem: Problem, values: np.ndarray, views: Sequence[View], free: Sequence[int]) -> Solution:

@@ -136,11 +136,11 @@ def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]):
 
 
 def _address(array: np.ndarray) -> int:
-    return array.__array_interface__["data"][0]
+    return array.ctypes.data
 
 
 def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
-    return [array.__array_interface__["data"][0] for array in arrays]
+    return [array.ctypes.data for array in arrays]
 
 
 @cache
