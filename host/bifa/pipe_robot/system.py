@@ -6,8 +6,9 @@ from K's own contracted zero, so the two differ by that zero, which is 0 where t
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import lru_cache
+from operator import itemgetter
 
 import numpy as np
 
@@ -97,10 +98,12 @@ class RobotSystem(System):
 
     def _remember(self) -> None:
         self._plant = lru_cache(maxsize=512)(self._plant_of)
+        self._own_values = _picked(self.fitted)
+        self._shapes = {prefix: _picked(curve.names) for prefix, curve in self.curves.items()}
 
     def __getstate__(self) -> dict:
         """What travels to another process: all but what is remembered."""
-        return {name: value for name, value in vars(self).items() if name != "_plant"}
+        return {n: value for n, value in vars(self).items() if n not in ("_plant", "_own_values", "_shapes")}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -239,7 +242,7 @@ class RobotSystem(System):
         }
         model = self.model.with_values(values).with_effects(chosen)
         return _with_curves(
-            model, {prefix: curve.curve(self._weights(prefix, theta)) for prefix, curve in self.curves.items()}
+            model, {prefix: curve.curve(self._shapes[prefix](theta)) for prefix, curve in self.curves.items()}
         )
 
     def _named(self, name: str) -> Parameter:
@@ -264,18 +267,14 @@ class RobotSystem(System):
             _PLACES.get(name, ()),
         )
 
-    def _weights(self, prefix: str, theta: Theta) -> tuple[float, ...]:
-        return tuple(theta[name] for name in self.curves[prefix].names)
-
     def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple:
         """All that a plant depends on, hashable."""
-        named = tuple(theta[name] for name in self.fitted)
-        weights = tuple((prefix, self._weights(prefix, theta)) for prefix in self.curves)
+        weights = tuple((prefix, shapes(theta)) for prefix, shapes in self._shapes.items())
         extra = tuple(
             (effect, tuple((p.name, theta.get(f"{effect}.{p.name}", p.value)) for p in _all_of(self.effects[effect])))
             for effect in effects
         )
-        return named, weights, extra
+        return self._own_values(theta), weights, extra
 
     def _plant_of(self, key: tuple) -> tuple[Plant, tuple[float, float]]:
         """The compiled code's form of a model, and K's contracted zeros of body and small actuator."""
@@ -315,6 +314,13 @@ def _seen(channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case
     """What the instruments show of a simulation."""
     channels = learnt_terms.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
     return {name: channels[name] for name in trial.channels}
+
+
+def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:
+    """A function that picks these of a mapping's values: it is called for every simulation."""
+    if len(names) < 2:  # of one name itemgetter would make no tuple
+        return lambda theta: tuple(theta[name] for name in names)
+    return itemgetter(*names)
 
 
 def _all_of(effect: Effect) -> tuple[Parameter, ...]:

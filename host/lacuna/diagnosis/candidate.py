@@ -177,9 +177,9 @@ def anew(parent: Fit, profiled: Sequence[Profile], policy: Policy, crew: Crew) -
     alone = begin(parent.problem, parent.structure.start())
     names = [p.problem.structure.effects for p in profiled]
     begun = crew.map("beginning anew with", names, begin, [(p.problem, p.at_typical_size()) for p in profiled])
-    least = (1.0 - policy.promising) * alone.cost
     leading = sorted(range(len(begun)), key=lambda k: begun[k].cost)[:_FOLLOWED]
-    leading = [k for k in leading if begun[k].cost < least]
+    most = min((1.0 - policy.promising) * alone.cost, policy.reach * begun[leading[0]].cost)
+    leading = [k for k in leading if begun[k].cost < most]
     jobs = [(profiled[k].problem, begun[k]) for k in leading]
     found = crew.map("going on with", [names[k] for k in leading], _sketched_further, jobs)
     fits = [(best_of(profiled[k].problem, [solution]), profiled[k]) for k, solution in zip(leading, found, strict=True)]

@@ -95,50 +95,73 @@ def diagnose(
     split = split_trials(system.trials, system.spare())
     if not split.fit or not split.judging:
         raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
-    crew = Crew(progress, executor)
-    case = Case(system, split, policy, seed)
+    crew, case = Crew(progress, executor), Case(system, split, policy, seed)
     crew.say("fitting the base model")
     base = case.fit_base(starts)
     found, stopped = _explanations(case, base, crew)
-    choice = choose(found, split, policy, case.suffices)
-    choice = drop_absent(case, found, choice)
-    base_known = converged(case.on_known(found.base))
-    explained = converged(case.on_known(choice.candidate)) if choice.candidate.effects else base_known
-    remainder = case.remainder(base_known)
-    drifts = find_drift(explained, policy=policy, seed=seed)
-    before, floor = error_of(base_known, split), floor_of(explained, split)
-    with_effects = error_of(explained, split)
-    closed = share_of_gap(before.held_out, with_effects.held_out, floor.held_out)
+    choice = drop_absent(case, found, choose(found, split, policy, case.suffices))
+    judged = _judged(case, found, choice)
+    final = judged.explained
+    if judged.verdict != "none" and judged.left.matters:
+        final = _corrected(case, found, choice, judged, None if stopped else crew)
+    said = (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split))
+    return _reported(case, found, choice, judged, final, said, time.monotonic() - began)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """The verdict and what it rests on: both models fitted to all known trials to the end of plain least squares, and
+    what each leaves. `floor` and `drifts` are seen with the chosen effects, whatever the verdict."""
+
+    verdict: str
+    base: Fit
+    explained: Fit
+    remainder: Remainder
+    left: Remainder
+    floor: Floor
+    drifts: tuple[Drift, ...]
+
+
+def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
+    base = converged(case.on_known(found.base))
+    chosen = converged(case.on_known(choice.candidate)) if choice.candidate.effects else base
+    remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
     verdict = _verdict(case, choice, found, remainder, drifts)
-    if verdict != "identified":
-        explained, closed = base_known, 0.0
-    left = case.remainder(explained) if verdict == "identified" else remainder
-    final = explained
-    if verdict != "none" and left.matters:
-        final = _corrected(case, found, choice, verdict, explained, None if stopped else crew)
-    sites = tuple(final.structure.sites)
-    signs = impossible_signs(explained, policy) if left.matters else ()
+    explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
+    return _Judged(verdict, base, explained, remainder, left, floor_of(chosen, case.split), drifts)
+
+
+def _reported(
+    case: Case, found: Search, choice: Choice, judged: _Judged, final: Fit, said: tuple[str, ...], seconds: float
+) -> Diagnosis:
+    split, identified = case.split, judged.verdict == "identified"
+    before = error_of(judged.base, split)
+    closed = 0.0
+    if identified:
+        after = error_of(judged.explained, split)
+        closed = share_of_gap(before.held_out, after.held_out, judged.floor.held_out)
+    signature = describe(judged.explained, judged.left, judged.drifts)
     return Diagnosis(
-        verdict,
-        describe_effects(case, found, choice) if verdict == "identified" else (),
-        base_known,
-        explained,
-        final,
-        before,
-        error_of(final, split),
-        floor,
-        remainder,
-        describe(base_known, remainder, drifts),
-        Left(left, describe(explained, left, drifts), 1.0 - closed, sites),
-        nearest(case, found, choice if verdict == "identified" else None),
-        (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split), *signs),
-        tuple((system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
-        _next(choice, found) if verdict == "identified" else NextExperiment(),
-        found,
-        choice,
-        split,
-        drifts,
-        time.monotonic() - began,
+        verdict=judged.verdict,
+        effects=describe_effects(case, found, choice) if identified else (),
+        base=judged.base,
+        explained=judged.explained,
+        final=final,
+        before=before,
+        after=error_of(final, split),
+        floor=judged.floor,
+        remainder_before=judged.remainder,
+        signature=describe(judged.base, judged.remainder, judged.drifts),
+        left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
+        nearest=nearest(case, found, choice if identified else None),
+        warnings=(*said, *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ())),
+        learnt=tuple((case.system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
+        next=_next(choice, found) if identified else NextExperiment(),
+        search=found,
+        choice=choice,
+        split=split,
+        drifts=judged.drifts,
+        seconds=seconds,
     )
 
 
@@ -164,18 +187,21 @@ def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, dr
     return "identified" if case.closed(choice.candidate, found.base) >= case.policy.half else "unexplained"
 
 
-def _corrected(case: Case, found: Search, choice: Choice, verdict: str, explained: Fit, crew: Crew | None) -> Fit:
-    """`explained` with curves learnt on top where they hold on trials that informed nothing; without a crew none are.
-    Where nothing is supported, the best of everything tried stands beside them, so that what is reported is never worse
-    than that."""
-    split = case.split
-    parents = [choice.candidate] if verdict == "identified" else list(dict.fromkeys((found.base, choice.candidate)))
+def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew: Crew | None) -> Fit:
+    """What is explained with curves learnt on top, where they hold on trials that informed nothing; without a crew none
+    are learnt. Where nothing is supported, the best of everything tried stands beside them, so that what is reported is
+    never worse than that."""
+    split, unexplained = case.split, judged.verdict == "unexplained"
+    parents = list(dict.fromkeys((found.base, choice.candidate))) if unexplained else [choice.candidate]
     learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew) if crew else None
-    offered = [learnt] if learnt and holds(case.on_known(learnt), explained, split) else []
-    if verdict == "unexplained":
+    offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
+    if unexplained:
         offered += found.tried
     best = min(offered, key=lambda c: rms(c.checked.scaled_residuals()), default=None)
-    return explained if best is None else converged(case.on_known(best))
+    if best is None:
+        return judged.explained
+    final = converged(case.on_known(best))
+    return final if not split.final or holds(final, judged.explained, split) else judged.explained
 
 
 def _next(choice: Choice, found: Search) -> NextExperiment:

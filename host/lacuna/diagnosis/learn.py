@@ -21,6 +21,7 @@ from lacuna.estimation.uncertainty import effective_samples
 
 _MOST = 4  # curves in one correction
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
+_SOUGHT = 8  # sites where further curves are sought
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
 _SKETCH = {"max_iterations": 8, "relative": 3e-3}
 _REFINED = {"max_iterations": 20, "relative": 3e-4}
@@ -41,21 +42,27 @@ def learn_correction(
 ) -> Candidate | None:
     """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
     `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
-    None if none helps."""
+    None if none helps. Further ones are sought where the first regression promised most."""
     best: Candidate | None = None
+    sites = list(candidates[0].fitted.structure.system.correction_sites)
     while best is None or len(best.fitted.structure.sites) < _MOST:
-        grown = _best_grown([best] if best else candidates, split, policy, crew)
+        parents = [best] if best else candidates
+        promises = sorted((p for c in parents for p in _promises(c, sites, split, crew)), key=lambda p: p.cost)
+        grown = _best_grown(parents, promises[:_FITTED], split, policy, crew)
         if grown is None:
             break
+        if best is None:
+            sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
         best = grown
         if enough(best):
             break
     return best
 
 
-def _best_grown(parents: Sequence[Candidate], split: Split, policy: Policy, crew: Crew) -> Candidate | None:
+def _best_grown(
+    parents: Sequence[Candidate], promises: Sequence[_Promise], split: Split, policy: Policy, crew: Crew
+) -> Candidate | None:
     before = min(parents, key=lambda c: c.checked.cost)
-    promises = sorted((p for c in parents for p in _promises(c, split)), key=lambda p: p.cost)[:_FITTED]
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
     solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
@@ -88,12 +95,13 @@ def _refined(sketched: Fit) -> Fit:
     return Fit(sketched.problem, solve(sketched.problem, sketched.solution.point, **_REFINED), 1, 1)
 
 
-def _promises(candidate: Candidate, split: Split) -> list[_Promise]:
-    """Every further site's curve, regressed on what `candidate` leaves and its own parameters cannot take up."""
+def _promises(candidate: Candidate, sites: Sequence[str], split: Split, crew: Crew) -> list[_Promise]:
+    """The curve of each of `sites`, regressed on what `candidate` leaves and its own parameters cannot take up."""
+    crew.say("asking where a curve would help")
     parent = candidate.fitted
     basis, remaining = remaining_after(parent)
     found = []
-    for site in parent.structure.system.correction_sites:
+    for site in sites:
         if site in parent.structure.sites:
             continue
         structure = Structure(parent.structure.system, candidate.effects, (*parent.structure.sites, site))
@@ -110,7 +118,8 @@ def _promises(candidate: Candidate, split: Split) -> list[_Promise]:
 
 
 def holds(corrected: Fit, before: Fit, split: Split) -> bool:
-    """Whether the curves also help on the trials that informed nothing."""
+    """Whether the trials that informed nothing are predicted better, too."""
     if not split.final:
         return False
-    return evaluate_on(corrected, split.final).cost < evaluate_on(before, split.final).cost
+    on_final = (rms(evaluate_on(fit, split.final).scaled_residuals()) for fit in (corrected, before))
+    return next(on_final) < next(on_final)

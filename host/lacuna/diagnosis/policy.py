@@ -91,8 +91,8 @@ class Policy:
     lost: float = _rule(
         2.0,
         "floors, RMS",
-        "where the best explanation so far leaves more, the base fit may be so wrong that what is missing does not help"
-        " it: every effect is begun anew",
+        "where the base leaves more, and no effect explains enough from there, its fit may be so wrong that what is"
+        " missing does not help it: effects are begun anew",
         "simulation",
     )
 

@@ -21,6 +21,7 @@ from lacuna.estimation.problem import SOFT_LIMIT
 from lacuna.system import Channels, Record, System
 
 _DRAWS = 200
+_AT_ONCE = 2_000_000  # samples drawn together
 _TAIL = 0.1
 
 
@@ -135,10 +136,16 @@ def _shared(conditions: Sequence[np.ndarray]) -> float:
 def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> np.ndarray:
     """`_shared` of noise alone, `_DRAWS` times: signs, order and places in time of pure noise turned at random."""
     noise = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
-    found = np.empty(_DRAWS)
-    for k in range(_DRAWS):
-        found[k] = _shared([_stretches(noise, rows.shape, draw) for rows in conditions])
-    return found
+    total, count = np.zeros(_DRAWS), 0
+    for rows in conditions:
+        repeats, length = rows.shape
+        most = max(1, _AT_ONCE // rows.size)
+        for first in range(0, _DRAWS, most):
+            drawn = _stretches(noise, (min(most, _DRAWS - first), repeats, length), draw)
+            squares = (drawn.sum(axis=1) ** 2).sum(axis=1) - (drawn**2).sum(axis=(1, 2))
+            total[first : first + most] += squares / (2 * length)
+        count += repeats * (repeats - 1) // 2
+    return total / count
 
 
 def _exceeded(draws: np.ndarray, value: float) -> float:
@@ -151,10 +158,12 @@ def _exceeded(draws: np.ndarray, value: float) -> float:
     return _TAIL * float(np.exp(-(value - threshold) / max(float(excess.mean()), 1e-12)))
 
 
-def _stretches(noise: Sequence[np.ndarray], shape: tuple[int, int], draw: np.random.Generator) -> np.ndarray:
+def _stretches(noise: Sequence[np.ndarray], shape: tuple[int, ...], draw: np.random.Generator) -> np.ndarray:
     """Rows of noise, each a trace drawn at random, begun anywhere in it and gone round, in either sign."""
-    rows = np.empty(shape)
-    for row in rows:
-        trace = noise[draw.integers(len(noise))]
-        row[:] = np.take(trace, np.arange(shape[1]) + draw.integers(len(trace)), mode="wrap")
-    return rows * draw.choice((-1.0, 1.0), (shape[0], 1))
+    *rows, length = shape
+    lengths = np.array([len(trace) for trace in noise])
+    begins = np.cumsum(lengths) - lengths
+    chosen = draw.integers(len(noise), size=rows)
+    place = draw.integers(lengths[chosen])[..., None] + np.arange(length)
+    found = np.concatenate(noise)[begins[chosen][..., None] + place % lengths[chosen][..., None]]
+    return found * draw.choice((-1.0, 1.0), (*rows, 1))

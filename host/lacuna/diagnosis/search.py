@@ -182,7 +182,9 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, polic
     elif not before.effects and before.rms > policy.lost:
         fresh = anew(before.fitted, ranked, policy, crew)
         begun = {fitted.structure.effects for fitted, _ in fresh}
-        again = [pair for pair in again if pair[0].structure.effects not in begun][: len(again) - len(fresh) or 1]
+        most = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
+        again = [pair for pair in again if pair[0].structure.effects not in begun and pair[0].cost < most]
+        again = again[: _SKETCHED_TWICE[size] - len(fresh) or 1]
     best: dict[tuple[str, ...], tuple[Fit, Profile]] = {}
     for fitted, profile in (*near, *from_afar(again, crew), *fresh):
         effects = fitted.structure.effects

@@ -17,7 +17,7 @@ from lacuna.system import Channels, Record, System
 _SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
 _OPEN = 0.1  # scales
 _CONVERGED = 1e-4  # of the cost: half of it of the RMS error, which is then the same to four digits
-_CONVERGED_ITERATIONS, _ROUNDS = 40, 5
+_CONVERGED_ITERATIONS, _ROUNDS = 20, 5
 
 
 @dataclass(frozen=True)
@@ -131,20 +131,25 @@ def converged(fitted: Fit) -> Fit:
     """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
-    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.1 * _CONVERGED}
+    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _CONVERGED}
     solution = renewed(problem, solve(problem, fitted.solution.point, **options), **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
 def renewed(problem: Problem, solution: Solution, **options) -> Solution:
-    """Searches that follow `solution`, for as long as one gains `_CONVERGED` of the cost: with nuisances as they are,
-    and begun anew at their means. A nuisance and a parameter of like effect (a run's friction and the friction) hold
-    one another where the model predicts a jump a little early or late; a search has to let go of one of them."""
+    """Searches that follow `solution`, for as long as one gains `_CONVERGED` of the cost: with nuisances as they are
+    and, while that leads further, begun anew at their means. A nuisance and a parameter of like effect (a run's
+    friction and the friction) hold one another where the model predicts a jump a little early or late; a search has to
+    let go of one of them."""
+    letting_go = any(problem.nuisances)
     for _ in range(_ROUNDS):
-        starts = [solution.point, problem.start(solution.point.values)] if any(problem.nuisances) else [solution.point]
-        further = min((solve(problem, start, **options) for start in starts), key=lambda s: s.cost)
-        gained = solution.cost - further.cost
-        solution = min(solution, further, key=lambda s: s.cost)
+        further = [solve(problem, solution.point, **options)]
+        if letting_go:
+            further.append(solve(problem, problem.start(solution.point.values), **options))
+        best = min(further, key=lambda s: s.cost)
+        letting_go = best is not further[0]
+        gained = solution.cost - best.cost
+        solution = min(solution, best, key=lambda s: s.cost)
         if gained < _CONVERGED * solution.cost:
             break
     return solution

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -70,59 +71,94 @@ def solve(
     never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
     """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
-    lower, upper, scale = _limits(problem, start, free)
-    point = _allowed(problem, _unpack(start, free, np.clip(_pack(start, free), lower, upper)))
-    x = _pack(point, free)
-    residuals = problem.residuals(point)
-    cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
-    damping, converged, iteration = _LAMBDA_START, False, 0
-    steps = problem.first_steps()
-    keep = sensitivities is not None
+    here = _begun(problem, start, free)
+    scale = _limits(problem, here.point, free)[2]
+    keep, steps = sensitivities is not None, problem.first_steps()
     if sensitivities is None:
-        sensitivities = _sensitivities(problem, point, free, steps)
+        sensitivities = _sensitivities(problem, here.point, free, steps)
+    damping, converged, iteration = _LAMBDA_START, False, 0
     age = 0  # steps since the derivatives were taken
     while iteration < max_iterations:
         iteration += 1
-        system = _linearise(problem, point, free, residuals, sensitivities)
-        accepted = False
-        lower, upper, _ = _limits(problem, point, free)
-        while damping < _LAMBDA_MOST:
-            reach = _REACH * scale
-            step, promise = _step(system, x, np.maximum(lower, x - reach), np.minimum(upper, x + reach), scale, damping)
-            if promise < max(ENOUGH, relative * cost):
-                break
-            trial_point = _allowed(problem, _unpack(point, free, x + step))
-            step = _pack(trial_point, free) - x
-            trial_residuals = problem.residuals(trial_point)
-            trial_cost = 0.5 * sum(float(r @ r) for r in trial_residuals) + problem.prior_cost(trial_point)
-            ratio = (cost - trial_cost) / promise
-            if trial_cost < cost:
-                accepted = True
-                damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
-                break
-            damping = max(damping, 1e-6) * 8
-            if age and not keep:
-                break
-        if accepted:
-            gain = cost - trial_cost
-            corrected = _corrected(sensitivities, step, scale, residuals, trial_residuals, len(free))
-            x, point, residuals, cost = x + step, trial_point, trial_residuals, trial_cost
-            enough = gain < max(ENOUGH, relative * cost)
-            if keep or (ratio > _TRUSTED and age < _OLDEST and not enough):
-                sensitivities, age = corrected, age + 1
+        taken, damping, little = _descended(
+            problem, here, free, sensitivities, damping, relative, once=age and not keep
+        )
+        if taken:
+            enough = here.cost - taken.there.cost < max(ENOUGH, relative * taken.there.cost)
+            change = (here.residuals, taken.there.residuals)
+            here = taken.there
+            if keep or (taken.ratio > _TRUSTED and age < _OLDEST and not enough):
+                sensitivities, age = _corrected(sensitivities, taken.step, scale, *change, len(free)), age + 1
                 continue
-            if enough and (age == 0 or ratio > _FORETOLD):
+            if enough and (age == 0 or taken.ratio > _FORETOLD):
                 converged = True
                 break
         elif age == 0:
-            converged = promise < max(ENOUGH, relative * cost)
+            converged = little
             break
         if keep:
             break
         steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
-        sensitivities, age = _sensitivities(problem, point, free, steps), 0
-    system = _linearise(problem, point, free, residuals, sensitivities)
-    return Solution(point, cost, converged, iteration, free, _eliminate(system.normal, len(free)), tuple(sensitivities))
+        sensitivities, age = _sensitivities(problem, here.point, free, steps), 0
+    normal = _linearise(problem, here.point, free, here.residuals, sensitivities).normal
+    return Solution(
+        here.point, here.cost, converged, iteration, free, _eliminate(normal, len(free)), tuple(sensitivities)
+    )
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a search stands: the point, as it is and as one vector, and what it costs."""
+
+    point: Point
+    x: np.ndarray
+    residuals: list[np.ndarray]
+    cost: float
+
+    @classmethod
+    def at(cls, problem: Problem, point: Point, free: tuple[int, ...]) -> _Place:
+        residuals = problem.residuals(point)
+        cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
+        return cls(point, _pack(point, free), residuals, cost)
+
+
+class _Taken(NamedTuple):
+    """A step that led down. `ratio`: of what was promised, what it kept."""
+
+    there: _Place
+    step: np.ndarray
+    ratio: float
+
+
+def _begun(problem: Problem, start: Point, free: tuple[int, ...]) -> _Place:
+    lower, upper, _ = _limits(problem, start, free)
+    return _Place.at(problem, _allowed(problem, _unpack(start, free, np.clip(_pack(start, free), lower, upper))), free)
+
+
+def _descended(
+    problem: Problem, here: _Place, free, sensitivities, damping: float, relative: float, *, once: bool
+) -> tuple[_Taken | None, float, bool]:
+    """A step from `here` that leads down, damped the more the oftener it did not (one try where derivatives are old,
+    `once`); the damping for the next; and whether the last step tried promised too little to be worth it."""
+    system = _linearise(problem, here.point, free, here.residuals, sensitivities)
+    lower, upper, scale = _limits(problem, here.point, free)
+    reach = _REACH * scale
+    bounds = np.maximum(lower, here.x - reach), np.minimum(upper, here.x + reach)
+    least = max(ENOUGH, relative * here.cost)
+    promise = np.inf
+    while damping < _LAMBDA_MOST:
+        step, promise = _step(system, here.x, *bounds, scale, damping)
+        if promise < least:
+            break
+        there = _Place.at(problem, _allowed(problem, _unpack(here.point, free, here.x + step)), free)
+        ratio = (here.cost - there.cost) / promise
+        if there.cost < here.cost:
+            damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
+            return _Taken(there, there.x - here.x, ratio), damping, False
+        damping = max(damping, 1e-6) * 8
+        if once:
+            break
+    return None, damping, promise < least
 
 
 def _sensitivities(problem: Problem, point: Point, free, steps: Steps) -> tuple[Sensitivity, ...]:

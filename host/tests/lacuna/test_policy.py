@@ -239,14 +239,13 @@ def test_implausible_costs_as_stated_half_a_range_outside():
 # --- How far is the search worth its time? ---
 
 
-def test_lost_effects_are_begun_anew_where_much_is_left(monkeypatch):
+def test_effects_are_begun_anew_where_the_base_leaves_much(monkeypatch):
     begun = []
-    monkeypatch.setattr(search, "anew", lambda profiled, crew: begun.append(len(profiled)) or [])
+    monkeypatch.setattr(search, "anew", lambda parent, profiled, policy, crew: begun.append(len(profiled)) or [])
     system = hide({"coulomb.force_N": 0.6}, seed=5, withhold=["coulomb"])
     left = diagnose(system, policy=replace(POLICY, lost=1e6)).search
     assert begun == []
-    most = min(candidate.rms for candidate in left.tried if len(candidate.effects) <= 1)
-    for lost, anew in ((1.01 * most, False), (0.99 * most, True)):
+    for lost, anew in ((1.01 * left.base.rms, False), (0.99 * left.base.rms, True)):
         diagnose(system, policy=replace(POLICY, lost=lost))
         assert bool(begun) is anew
 
