@@ -74,7 +74,7 @@ def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(be
     assert bench.valves_on == before, "the waiting set was taken over in mid-cycle"
     bench.wait(20.0)
     assert bench.valves_on == [4, 6, 8], "at the boundary all are positive for good"
-    assert "[pressure_psi 5\n" in bench.say("show pressure_psi")
+    assert "[pressure_psi 5 psi, 0 to 14 psi, default 8.5 psi * power-up 8.5 psi\r\n" in bench.say("show pressure_psi")
 
 
 @pytest.mark.parametrize("noise", [b"\x9c", b"\n", b"x", b"nonsense\n", b"\x00\x01\x00"])
