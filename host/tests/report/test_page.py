@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from bifa.campaign.page import rounds_section
 from bifa.effects import library
 from bifa.files import TargetError
 from bifa.report.animation import FRAMES_PER_S, animate_walks
@@ -75,6 +76,21 @@ def test_the_first_screen_answers_and_says_what_its_words_mean(html):
 
 def test_the_page_says_how_many_robots_do_not_walk(html):
     assert "59 % of 256 robots" in text_of(html)
+
+
+def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
+    section = text_of(html[html.index('id="gaits-that-no-fit-has-seen"') :].split("</section>")[0])
+    one, two = section.index("1: 2.80 s, head 204° and tail 332° ahead"), section.index("2: 2.61 s")
+    assert "hysteresis 21.40 20.60 ± 0.01 2.31 0.104" in section[one:two]
+    assert "hysteresis and valve latency 20.87 20.88 ± 0.02 0.117" in section[two:]
+    assert "It ended after round 2: the speed of its gait is predicted to within what repeats differ by" in section
+
+
+@pytest.mark.parametrize(("ended", "why"), [("unchanged", "predicted no better"), ("most", "at most 3 rounds")])
+def test_rounds_that_end_without_a_prediction_say_so(ended, why):
+    section = rounds_section([*sample.ROUNDS[:1], sample.ROUNDS[1] | {"ended": ended}])
+    assert section.paragraphs[1].startswith("It ended after round 2: ")
+    assert why in section.paragraphs[1]
 
 
 def test_the_seal_is_explained_where_there_is_one(html):
