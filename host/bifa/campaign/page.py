@@ -220,9 +220,9 @@ def rounds_section(rounds: Sequence[Mapping]) -> Section:
     ]
     columns = ["round: gait", "added to the model", "predicts, mm/s", "measured, mm/s", "RMS error, mm", "floor, mm"]
     said = [
-        "A model is worth what it predicts of a gait that no fit has seen. Round 1 is the gait found with the completed "
-        "model; where its speed is not predicted, its walks become data, the diagnosis is made anew from all there "
-        "is, and the next round walks the gait of that model.",
+        "A model is worth what it predicts of a gait that no fit has seen. Round 1 is the gait found with the "
+        "completed model; where its speed is not predicted, its walks become data, the diagnosis is made anew from "
+        "all data, and the next round walks the gait of that model.",
         f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
     ]
     caption = (
