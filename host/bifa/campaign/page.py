@@ -28,7 +28,7 @@ from bifa.report.page import Motion, Page, Section, Table
 from bifa.report.residuals import residual_charts
 from bifa.report.robustness import STANDING_MM_S, robustness_chart, standing_share
 from bifa.report.walks import MEASURED, Walk, walks_chart
-from bifa.report.words import NBSP, channel_words, effect_words, plain, spoken, unit_of
+from bifa.report.words import NBSP, channel_words, effect_words, gait_words, plain, spoken, unit_of
 
 GAIT_NAMES = {
     "baseline": "baseline (the paper's)",
@@ -229,14 +229,6 @@ def rounds_section(rounds: Sequence[Mapping]) -> Section:
         "Each gait as the model of its round predicts it: its speed, and where head and tail are all along the walk."
     )
     return Section("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
-
-
-def gait_words(gait: Mapping[str, float]) -> str:
-    """ "2.72 s, head 204° and tail 332° ahead, vacuum for 0.65, 0.44 and 0.44 of the cycle"."""
-    head, tail = (f"{gait[f'psi1{i}_deg']:.0f}°" for i in (2, 3))
-    body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in ("body", "head", "tail"))
-    ahead = f"head {head} and tail {tail} ahead"
-    return f"{plain(gait['period_s'])}{NBSP}s, {ahead}, vacuum for {body}, {front} and {rear} of the cycle"
 
 
 def speed_table(gaits: Sequence[Mapping]) -> Table:

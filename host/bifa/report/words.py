@@ -117,9 +117,12 @@ def unit_of(name: str) -> str:
     return name.rpartition("_")[2]
 
 
-def condition_words(label: str) -> str:
-    """A trial's label with a walk called so."""
-    return label.replace("locomotion", "walk", 1)
+def gait_words(gait: Mapping[str, float]) -> str:
+    """ "2.72 s, head 204° and tail 332° ahead, vacuum for 0.65, 0.44 and 0.44 of the cycle"."""
+    head, tail = (f"{gait[f'psi1{i}_deg']:.0f}°" for i in (2, 3))
+    body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in _PARTS)
+    ahead = f"head {head} and tail {tail} ahead"
+    return f"{plain(gait['period_s'])}{NBSP}s, {ahead}, vacuum for {body}, {front} and {rear} of the cycle"
 
 
 def parameter_words(name: str) -> str:
@@ -153,7 +156,7 @@ def effect_parameter(effect: str, name: str) -> tuple[str, str]:
 def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
     """Text of the engine with its identifiers in words; `labels`: what trials are called, by file."""
     if labels:
-        text = _FILE.sub(lambda found: condition_words(labels.get(found[0], found[0])), text)
+        text = _FILE.sub(lambda found: labels.get(found[0], found[0]), text)
     text = (
         _IDENTIFIER.sub(lambda found: _said(found[0]), text)
         .replace("locomotion", "walking")

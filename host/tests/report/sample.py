@@ -173,7 +173,7 @@ def traces():
             [
                 ("static loading, small, 0 psi, 2 mm/s", "force_N", 5.0),
                 ("static loading, large, 0 psi, 2 mm/s", "force_N", 20.0),
-                ("locomotion, period 5.7 s", "pressure_body_psi", 8.0),
+                ("walk, period 5.7 s", "pressure_body_psi", 8.0),
             ]
         )
     ]

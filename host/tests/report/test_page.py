@@ -2,19 +2,24 @@
 
 import json
 import re
+from io import StringIO
 
 import numpy as np
 import pytest
 
-from bifa.campaign.page import rounds_section
+from bifa.campaign.page import prediction_table, rounds_section, speed_table
+from bifa.cli.diagnose import print_diagnosis
 from bifa.effects import library
 from bifa.files import TargetError
 from bifa.report.animation import FRAMES_PER_S, animate_walks
-from bifa.report.diagnosis import diagnosis_page, verdict_sentence
+from bifa.report.diagnosis import diagnosis_page, settings_words, verdict_sentence
 from bifa.report.page import Page, Section, Table, render, write_page
 from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
+from bifa.report.terminal import print_table
 from bifa.report.words import effect_words, quantity, spoken
+from bifa.robot.gait import BASELINE
+from bifa.screen import Console
 from tests.report import sample
 
 
@@ -163,7 +168,7 @@ def test_quantities_have_units_that_suit_them():
 
 def test_text_of_the_engine_is_spoken():
     assert spoken("force_N in static_loading, mu_s") == "Force in static loading, static friction coefficient"
-    assert spoken("see a_1.csv", {"a_1.csv": "locomotion, period 3 s"}) == "See walk, period 3 s"
+    assert spoken("see a_1.csv", {"a_1.csv": "walk, period 3 s"}) == "See walk, period 3 s"
 
 
 def test_the_animation_moves_as_the_record_does():
@@ -176,3 +181,47 @@ def test_the_animation_moves_as_the_record_does():
     assert tail[-1] - tail[0] == pytest.approx(way, abs=0.2)
     assert "prefers-reduced-motion" in svg
     assert np.all(np.diff([float(m) for m in re.findall(r">(\d+)(?: mm)?</text>", svg)][:3]) > 0)
+
+
+def test_the_terminal_says_a_diagnosis_in_words_within_80_columns():
+    """Tables and sentences of the page, nothing else, and no identifier."""
+    text = StringIO()
+    console = Console(file=text, width=80)
+    diagnosis = sample.DIAGNOSIS
+    print_diagnosis(console, diagnosis, sample.LABELS)
+    lines = text.getvalue().splitlines()
+    assert lines[0] == "identified"
+    assert max(map(len, lines)) <= 80
+    assert re.findall(r"\b\w+_\w+\b", text.getvalue()) == []
+    said = " ".join(text.getvalue().split())
+    for words in (
+        "hysteresis, 4.4 N over 2.7 mm",
+        "cannot tell it from viscoelasticity",
+        "as in static loading, large, 0 psi, 2 mm/s (run 1)",
+        "4.39 N to 4.41 N",
+        "A further experiment would tell hysteresis from viscoelasticity: static loading, large, 0 psi, 0.5 mm/s.",
+    ):
+        assert words in said, words
+    for table in (speed_table(sample.summary()["gaits"]), prediction_table(sample.PREDICTION_ERRORS)):
+        print_table(console, table)
+    assert max(map(len, text.getvalue().splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("experiment", "settings", "words"),
+    [
+        (
+            "anchor_pull",
+            {"pressure_psi": 8.5, "rate_mm_s": 40.0, "direction": "backward"},
+            "anchor pull, 8.5 psi, 40 mm/s, backward",
+        ),
+        (
+            "locomotion",
+            {"gait": BASELINE.as_dict()},
+            "walk, 5.70 s, head 270° and tail 90° ahead, vacuum for 0.50, 0.50 and 0.50 of the cycle",
+        ),
+        ("locomotion", {"inclination_deg": 10.0}, "walk, pipe at 10 degrees"),
+    ],
+)
+def test_an_experiment_is_told_with_its_settings(experiment, settings, words):
+    assert settings_words({"experiment": experiment, "settings": settings}).replace("\N{NO-BREAK SPACE}", " ") == words
