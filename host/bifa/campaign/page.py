@@ -209,8 +209,7 @@ def rounds_section(rounds: Sequence[Mapping]) -> Section:
     """How well gaits were predicted that no fit had seen, round by round, and why the last round is the last."""
     rows = [
         [
-            f"{number}: {gait_words(one['gait'])}",
-            " and ".join(effect_words(name) for name in one["effects"]) or "nothing",
+            str(number),
             f"{one['predicted_mm_s']:.2f}",
             f"{one['measured_mm_s']:.2f}{NBSP}±{NBSP}{one['spread_mm_s']:.2f}",
             plain(one["error_mm"]),
@@ -218,17 +217,23 @@ def rounds_section(rounds: Sequence[Mapping]) -> Section:
         ]
         for number, one in enumerate(rounds, 1)
     ]
-    columns = ["round: gait", "added to the model", "predicts, mm/s", "measured, mm/s", "RMS error, mm", "floor, mm"]
+    columns = ["round", "predicted, mm/s", "measured, mm/s", "RMS error, mm", "noise floor, mm"]
+    caption = (
+        "Each gait as the model of its round predicts it: its speed, and where head and tail are all along the walk."
+    )
     said = [
         "A model is worth what it predicts of a gait that no fit has seen. Round 1 is the gait found with the "
         "completed model; where its speed is not predicted, its walks become data, the diagnosis is made anew from "
         "all data, and the next round walks the gait of that model.",
+        *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
         f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
     ]
-    caption = (
-        "Each gait as the model of its round predicts it: its speed, and where head and tail are all along the walk."
-    )
     return Section("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
+
+
+def _round_words(one: Mapping) -> str:
+    added = " and ".join(effect_words(name) for name in one["effects"]) or "nothing"
+    return f"the model has {added} added to it, its gait is {gait_words(one['gait'])}"
 
 
 def speed_table(gaits: Sequence[Mapping]) -> Table:

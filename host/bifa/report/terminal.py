@@ -4,21 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import rich.box
 import rich.table
 
 from bifa.report.page import Section, Table
 from bifa.report.words import NBSP
 from bifa.screen import Console
 
+_BETWEEN = 3  # spaces between columns
+
 
 def print_table(console: Console, content: Table) -> None:
     """A table; figures are set to the right as on a page."""
-    table = rich.table.Table(title=content.caption or None, title_justify="left")
+    table = rich.table.Table(
+        title=content.caption or None, title_justify="left", box=rich.box.SIMPLE_HEAD, show_edge=False, pad_edge=False
+    )
+    cells = [[row[i] for row in content.rows] for i in range(len(content.columns))]
+    widths = [max(map(len, [heading, *column])) for heading, column in zip(content.columns, cells, strict=True)]
+    is_wide = sum(widths) + _BETWEEN * (len(widths) - 1) > console.width
     for i, heading in enumerate(content.columns):
-        is_text = not i or (content.words and i == len(content.columns) - 1)
-        table.add_column(heading, justify="left" if is_text else "right")
+        if not i or (content.words and i == len(content.columns) - 1):
+            table.add_column(heading)
+        else:  # rather the heads of figures in several lines than what they are of
+            most = max(map(len, [*heading.split(), *cells[i]])) if is_wide else None
+            table.add_column(heading, justify="right", max_width=most)
     for row in content.rows:
         table.add_row(*(plain_spaces(cell) for cell in row))
+    console.print()
     console.print(table)
 
 

@@ -118,11 +118,11 @@ def unit_of(name: str) -> str:
 
 
 def gait_words(gait: Mapping[str, float]) -> str:
-    """ "2.72 s, head 204° and tail 332° ahead, vacuum for 0.65, 0.44 and 0.44 of the cycle"."""
+    """ "2.72 s, head 204° and tail 332° ahead, vacuum in 0.65 (body), 0.44 (head) and 0.44 (tail) of the cycle"."""
     head, tail = (f"{gait[f'psi1{i}_deg']:.0f}°" for i in (2, 3))
     body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in _PARTS)
-    ahead = f"head {head} and tail {tail} ahead"
-    return f"{plain(gait['period_s'])}{NBSP}s, {ahead}, vacuum for {body}, {front} and {rear} of the cycle"
+    vacuum = f"vacuum in {body} (body), {front} (head) and {rear} (tail) of the cycle"
+    return f"{plain(gait['period_s'])}{NBSP}s, head {head} and tail {tail} ahead, {vacuum}"
 
 
 def parameter_words(name: str) -> str:
