@@ -125,6 +125,12 @@ def gait_words(gait: Mapping[str, float]) -> str:
     return f"{plain(gait['period_s'])}{NBSP}s, head {head} and tail {tail} ahead, {vacuum}"
 
 
+def gait_parameter_words(name: str) -> str:
+    """ "period, s" or "vacuum, body": one of a gait's numbers."""
+    words = {"period_s": "period, s", "psi12_deg": "head ahead, °", "psi13_deg": "tail ahead, °"}
+    return words.get(name, name.replace("duty_", "vacuum, "))
+
+
 def parameter_words(name: str) -> str:
     """A parameter of the model, an effect's, or a nuisance."""
     return _PARAMETERS.get(name) or _without_unit(name).replace("_", " ")
