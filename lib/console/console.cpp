@@ -283,10 +283,11 @@ void Console::show_parameter(ParameterId id, const ParameterSet& saved) {
   const uint32_t value = value_of(commands_.wanted(), id);
   print_name(id);
   print_value(id, value);
-  print(BIFA_TEXT(", "));
+  print(BIFA_TEXT(" ("));  // so that the value stands alone between spaces, unit or not
   print_range(id);
   print(BIFA_TEXT(", default "));
   print_value(id, value_of(factory_preset(0), id));
+  print(')');
   const uint32_t saved_value = value_of(saved, id);
   if (saved_value != value) {
     print(BIFA_TEXT(" * power-up "));

@@ -75,7 +75,7 @@ def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(be
     assert bench.valves_on == before, "the waiting set was taken over in mid-cycle"
     bench.wait(20.0)
     assert bench.valves_on == [4, 6, 8], "at the boundary all are positive for good"
-    assert "[pressure_psi 5 psi, 0 to 14 psi, default 8.5 psi * power-up 8.5 psi\r\n" in bench.say("show pressure_psi")
+    assert "[pressure_psi 5 psi (0 to 14 psi, default 8.5 psi) * power-up 8.5 psi\r\n" in bench.say("show pressure_psi")
 
 
 def test_answers_have_units_ranges_and_marks(bench):
@@ -83,13 +83,13 @@ def test_answers_have_units_ranges_and_marks(bench):
     assert bench.say("set duty_body 0.6535") == "[duty_body 0.5 -> 0.6535\r\nok\r\n"
     marked = [line for line in bench.say("show").split("\r\n") if "*" in line]
     assert marked == [
-        "[period_s 2.72 s, 0.5 to 60 s, default 5.7 s * power-up 5.7 s",
-        "[duty_body 0.6535, 0 to 1, default 0.5 * power-up 0.5",
+        "[period_s 2.72 s (0.5 to 60 s, default 5.7 s) * power-up 5.7 s",
+        "[duty_body 0.6535 (0 to 1, default 0.5) * power-up 0.5",
     ]
     assert bench.say("save", 1.0).endswith("ok\r\n")
     bench.board.reset("power-on")
     bench.wait(0.3)
-    assert bench.say("show period_s") == "[period_s 2.72 s, 0.5 to 60 s, default 5.7 s\r\nok\r\n"
+    assert bench.say("show period_s") == "[period_s 2.72 s (0.5 to 60 s, default 5.7 s)\r\nok\r\n"
 
 
 def test_version_and_stream_say_what_they_are(bench):

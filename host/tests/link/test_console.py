@@ -21,7 +21,7 @@ def shown(name: str, value: str, at_power_up: str | None = None) -> str:
 
     default = f"{from_wire(name, BY_NAME[name].default):g}"
     mark = "" if at_power_up is None else f" * power-up {with_unit(at_power_up)}"
-    return f"[{name} {with_unit(value)}, {range_text(BY_NAME[name])}, default {with_unit(default)}{mark}"
+    return f"[{name} {with_unit(value)} ({range_text(BY_NAME[name])}, default {with_unit(default)}){mark}"
 
 
 SHOWN = [shown(p.name, f"{from_wire(p.name, p.default):g}") for p in PARAMETERS]

@@ -16,7 +16,7 @@ from harness.terminal import Terminal
 pytestmark = pytest.mark.real_time
 
 UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
-PERIOD = "s, 0.5 to 60 s, default 5.7 s"
+PERIOD = "s (0.5 to 60 s, default 5.7 s)"
 KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})
 
 
