@@ -12,7 +12,17 @@ def constant(name: str) -> str:
 
 
 def text(value: str) -> str:
-    return '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "\\0") + '"'
+    """A literal of C++; the codes of packed texts are written in octal, which ends after three digits."""
+    plain = value.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "\\0")
+    return '"' + "".join(c if c.isascii() else f"\\{ord(c):03o}" for c in plain) + '"'
+
+
+def text_list(entries: list[str], packed: dict[str, str]) -> str:
+    """Lines of a list of texts in flash, each ended by a zero; a packed one stands in full beside it."""
+    lines = [f'    {text(packed.get(entry, entry))[:-1]}\\0"' for entry in entries]
+    lines[-1] += ";"
+    notes = [f"  // {entry}" if packed.get(entry, entry) != entry else "" for entry in entries]
+    return "\n".join(line + note for line, note in zip(lines, notes, strict=True))
 
 
 def header(table: ParameterTable) -> str:
@@ -69,8 +79,8 @@ const uint8_t kStorageFormat = {table.storage_format};
 """
 
 
-def source(table: ParameterTable) -> str:
-    texts = "\n".join(f'    {text(entry)[:-1]}\\0"' for p in table.parameters for entry in (p.name, p.unit, p.help))
+def source(table: ParameterTable, packed: dict[str, str]) -> str:
+    texts = text_list([entry for p in table.parameters for entry in (p.name, p.unit, p.help)], packed)
     rows = "\n".join(
         f"    {{{p.minimum}UL, {p.maximum}UL, {p.decimals}, offsetof(ParameterSet, {p.field}), {WIRE_BYTES[p.wire]}, "
         f"{p.since}}},  // {p.name}"
@@ -85,7 +95,7 @@ def source(table: ParameterTable) -> str:
 namespace bifa {{
 
 const char kParameterTexts[] BIFA_FLASH =
-{texts};
+{texts}
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {{
 {rows}

@@ -10,6 +10,7 @@ import cpp_commands
 import cpp_parameters
 import doc_parameters
 import doc_tables
+import phrases
 import py_ranges
 import py_tables
 from tables import WIRE_BYTES, command_table, parameter_table, table_hash
@@ -24,13 +25,15 @@ def generated() -> dict[Path, str]:
     set_size = sum(WIRE_BYTES[p.wire] for p in parameters.parameters)
     agreed = table_hash(parameters, commands)
     protocol = ROOT / "docs/protocol.md"
+    common, packed = phrases.packed_texts(parameters, commands)
     return {
         protocol: doc_tables.page(protocol.read_text(), parameters, commands),
         ROOT / "docs/parameters.md": doc_parameters.page(parameters, commands),
         ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
-        ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters),
+        ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters, packed),
         ROOT / "lib/commands/command_table.h": cpp_commands.command_header(commands),
-        ROOT / "lib/commands/command_table.cpp": cpp_commands.command_source(commands),
+        ROOT / "lib/commands/command_table.cpp": cpp_commands.command_source(commands, packed),
+        ROOT / "lib/text/phrase_table.cpp": cpp_commands.phrase_source(common),
         ROOT / "lib/link/message_table.h": cpp_commands.message_header(commands, set_size, agreed),
         ROOT / "lib/link/message_table.cpp": cpp_commands.message_source(commands, set_size),
         ROOT / "host/bifa/ranges.py": py_ranges.module(parameters),

@@ -56,13 +56,17 @@ class Field:
 
 @dataclass(frozen=True)
 class Message:
-    """What travels in one frame; `fields` follow the number of the message and its sequence number."""
+    """What travels in one frame; `fields` follow the number of the message and its sequence number.
+
+    `answer`: the report that answers it, where that is not "done".
+    """
 
     name: str
     number: int
     kind: str
     fields: tuple[Field, ...]
     help: str
+    answer: str | None = None
 
     def size(self, set_size: int) -> int:
         """Bytes of all fields."""
@@ -79,10 +83,16 @@ class Command:
     message: Message | None
     help: str
 
+    def words(self) -> tuple[int, int]:
+        """Least and most words of the line, the command itself included: what stands in brackets may be left out."""
+        words = self.usage.split(" ")
+        return len(words) - sum(word.startswith("[") for word in words), len(words)
+
 
 @dataclass(frozen=True)
 class CommandTable:
     protocol_version: int
+    firmware_version: tuple[int, int, int]
     commands: tuple[Command, ...]
     reports: tuple[Message, ...]
     results: tuple[tuple[str, str], ...]
@@ -137,7 +147,7 @@ def _message(row: dict) -> Message:
         fields.append(Field(match[1], match[2], int(match[3] or 1)))
     if row["kind"] not in ("open", "session", "stream"):
         raise ValueError(f"{row['name']}: unknown kind {row['kind']}")
-    return Message(row["name"], row["message"], row["kind"], tuple(fields), row["help"])
+    return Message(row["name"], row["message"], row["kind"], tuple(fields), row["help"], row.get("answer"))
 
 
 def command_table() -> CommandTable:
@@ -151,8 +161,11 @@ def command_table() -> CommandTable:
     messages = [c.message for c in commands if c.message] + list(reports)
     if len({m.number for m in messages}) != len(messages):
         raise ValueError("two messages have the same number")
+    if unknown := {m.answer for m in messages if m.answer} - {m.name for m in reports}:
+        raise ValueError(f"no report is called {', '.join(sorted(unknown))}")
     results = tuple((row["name"], row["text"]) for row in raw["result"])
-    return CommandTable(raw["protocol_version"], commands, reports, results, raw["words"])
+    version = tuple(int(part) for part in raw["firmware_version"].split("."))
+    return CommandTable(raw["protocol_version"], version, commands, reports, results, raw["words"])
 
 
 def table_hash(parameters: ParameterTable, commands: CommandTable) -> int:

@@ -5,6 +5,7 @@ import os
 import pty
 import threading
 import time
+import tty
 
 from harness.board import Board
 
@@ -16,6 +17,7 @@ class PtyUno:
 
     def __init__(self) -> None:
         self.master, slave = pty.openpty()
+        tty.setraw(slave)  # a serial port sends nothing back by itself
         self.device = os.ttyname(slave)
         self._slave = slave
         self.board = Board()

@@ -13,13 +13,13 @@ PATIENCE_S = 60  # other tests may keep the computer busy
 
 
 class Terminal:
-    """`bifa` with the arguments given, from the start to __exit__."""
+    """`bifa` with the arguments given, or another `program` (a module and its own), from the start to __exit__."""
 
-    def __init__(self, folder, *arguments: str) -> None:
+    def __init__(self, folder, *arguments: str, program: tuple[str, ...] = ("bifa",)) -> None:
         """`folder` keeps the history."""
         environment = {**os.environ, "TERM": "xterm", "XDG_STATE_HOME": str(folder)}
         self.program = pexpect.spawn(
-            sys.executable, ["-m", "bifa", *arguments], env=environment, dimensions=(24, 80), encoding="utf-8"
+            sys.executable, ["-m", *program, *arguments], env=environment, dimensions=(24, 80), encoding="utf-8"
         )
         self._screen = pyte.Screen(80, 24)
         self._screen.write_process_input = self.program.send  # where the cursor is, when asked

@@ -6,60 +6,60 @@ namespace bifa {
 
 const char kCommandTexts[] BIFA_FLASH =
     "help [NAME]\0"
-    "list everything, or explain one\0"
+    "li\207 ev\205y\215\213g\216\220expla\213\233ne\0"  // list everything, or explain one
     "version\0"
-    "versions, cause of the last start\0"
+    "v\205\260ons\216ca\232e\200la\207 \207\242t\0"  // versions, cause of the last start
     "status\0"
-    "state, fault, pressures, valves, link\0"
+    "\207\221e\216f\250\216\210\216v\235ves\216l\213k\0"  // state, fault, pressures, valves, link
     "show [NAME]\0"
-    "print one parameter or all\0"
+    "v\235ues\216r\241es\237*\236\205\201\256w\205-up loads\211\226\215\205\0"  // values, ranges; * where power-up loads another
     "set NAME VALUE\0"
-    "change a parameter, also while running\0"
+    "ch\241\201\240\214\205,\211lso\236\252\201runn\213g\0"  // change a parameter, also while running
     "run\0"
-    "walk\0"
+    "w\235k\0"  // walk
     "stop\0"
-    "stop, and vent all chambers\0"
+    "\207op,\211\253 v\230\211\225ch\247b\205s\0"  // stop, and vent all chambers
     "hold CHAMBER positive|vacuum|off\0"
-    "inflate, evacuate or vent body, head or tail\0"
+    "\213fl\221e\216ev\246u\221\201\220v\230 body\216\222 \220ta\252\0"  // inflate, evacuate or vent body, head or tail
     "clear\0"
-    "release a stop (!) or a fault\0"
+    "\257\223as\201\240\207op (!)\233r\211\224\250\0"  // release a stop (!) or a fault
     "stream on|off\0"
-    "telemetry: one line (>) a sample\0"
+    "te\223m\243ry:\233n\201l\213\201(>)\211\245\247p\223\0"  // telemetry: one line (>) a sample
     "plot on|off\0"
-    "telemetry for the Serial Plotter\0"
+    "te\223m\243ry\224\220\215\201S\205i\235 Plott\205\0"  // telemetry for the Serial Plotter
     "save [NAME]\0"
-    "keep the parameters; without NAME for power-up\0"
+    "keep \215\201\214\205s\237wi\215ou\261NAME\224\220\256w\205-up\0"  // keep the parameters; without NAME for power-up
     "load PRESET\0"
-    "use a preset\0"
+    "\232\201\240\202\0"  // use a preset
     "presets\0"
-    "list the presets\0"
+    "li\207 \215\201\202s\0"  // list the presets
     "forget PRESET\0"
-    "delete a preset from EEPROM\0"
+    "de\223t\201\240\202\224r\244\234\0"  // delete a preset from EEPROM
     "defaults confirm\0"
-    "erase all presets and settings\0"
+    "\205as\201a\225\202s\211\253\245\243t\213gs\0"  // erase all presets and settings
     "zero confirm|factory\0"
-    "take the pressures as zero; or undo that\0"
+    "tak\201\215\201\210\211\227z\205o\237\220u\253\254\215\221\0"  // take the pressures as zero; or undo that
     "echo on|off\0"
-    "repeat what you type (bare terminal)\0";
+    "\257pe\221\236\221 you\204\201(b\242\201t\205m\213\235)\0";  // repeat what you type (bare terminal)
 const char kResultTexts[] BIFA_FLASH =
     "ok\0"
-    "no such command; type help\0"
-    "wrong arguments\0"
-    "no such parameter; type show\0"
-    "out of range\0"
-    "stopped: type clear first\0"
-    "not in this state; type status\0"
-    "no such preset; type presets\0"
-    "a name is 1 to 12 of a-z 0-9 _ -, not factory\0"
-    "no room left\0"
-    "the EEPROM failed\0"
-    "busy saving; try again\0"
-    "no begin, or a part was refused\0"
-    "the set arrived damaged\0"
-    "its cause is still there; type status\0"
-    "times must not go backwards\0"
-    "pressures still move: rest 4 s first\0"
-    "more than 0.9 psi from zero\0";
+    "\226\212comma\253;\204\201help\0"  // no such command; type help
+    "wrong\211rgum\230s\0"  // wrong arguments
+    "\226\212\214\205;\204\201show\0"  // no such parameter; type show
+    "out\233f r\241e\0"  // out of range
+    "\207opp\251:\204\201c\223\242\224ir\207\0"  // stopped: type clear first
+    "\226\261\213 \215i\227\207\221e;\204\201\207\221\232\0"  // not in this state; type status
+    "\226\212\202;\204\201\202s\0"  // no such preset; type presets
+    "\240n\247\201i\2271 t\25412\233f\211-z 0-9 _ -\216\226t\224\246t\255y\0"  // a name is 1 to 12 of a-z 0-9 _ -, not factory
+    "\226 ro\244\223ft\0"  // no room left
+    "\215\201\234\224ai\223d\0"  // the EEPROM failed
+    "b\232y\245av\213g\237try\211ga\213\0"  // busy saving; try again
+    "\226 beg\213\216\255\211 p\242\261wa\227\257f\232\251\0"  // no begin, or a part was refused
+    "\215\201s\243\211rriv\251 d\247ag\251\0"  // the set arrived damaged
+    "it\227ca\232\201i\227\207i\225\215\205e;\204\201\207\221\232\0"  // its cause is still there; type status
+    "time\227mu\207 \226\261g\254b\246kw\242ds\0"  // times must not go backwards
+    "\210 \207i\225move: \257\207 4\245\224ir\207\0"  // pressures still move: rest 4 s first
+    "m\255\201\215an 0.9 p\260\224r\244z\205o\0";  // more than 0.9 psi from zero
 const char kChamberWords[] BIFA_FLASH =
     "body\0"
     "head\0"
@@ -91,5 +91,26 @@ const char kStartCauseWords[] BIFA_FLASH =
     "brown_out\0"
     "watchdog\0"
     "restart\0";
+
+const uint8_t kCommandWords[kCommandCount] BIFA_FLASH = {
+    0x12,  // help [NAME]
+    0x11,  // version
+    0x11,  // status
+    0x12,  // show [NAME]
+    0x33,  // set NAME VALUE
+    0x11,  // run
+    0x11,  // stop
+    0x33,  // hold CHAMBER positive|vacuum|off
+    0x11,  // clear
+    0x22,  // stream on|off
+    0x22,  // plot on|off
+    0x12,  // save [NAME]
+    0x22,  // load PRESET
+    0x11,  // presets
+    0x22,  // forget PRESET
+    0x22,  // defaults confirm
+    0x22,  // zero confirm|factory
+    0x22,  // echo on|off
+};
 
 }  // namespace bifa

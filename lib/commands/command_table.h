@@ -54,12 +54,58 @@ enum class CommandId : uint8_t {
 const uint8_t kCommandCount = 18;
 
 // Lists of texts, one after the other, each ended by a zero; read them with flash_text().
-extern const char kCommandTexts[] BIFA_FLASH;  ///< of each command: how it is typed, what it does
-extern const char kResultTexts[] BIFA_FLASH;   ///< of each result: what went wrong
+extern const char kCommandTexts[] BIFA_FLASH;     ///< of each command: how it is typed, what it does
+extern const char kResultTexts[] BIFA_FLASH;      ///< of each result: what went wrong
 extern const char kChamberWords[] BIFA_FLASH;
 extern const char kChamberStateWords[] BIFA_FLASH;
 extern const char kStateWords[] BIFA_FLASH;
 extern const char kFaultWords[] BIFA_FLASH;
 extern const char kStartCauseWords[] BIFA_FLASH;
+
+/// How many words a line of each command has, itself included: the least in the upper half, the most in the lower.
+extern const uint8_t kCommandWords[kCommandCount];
+
+/// Calls what is called as the command: a console that lacks one does not compile.
+template <typename Handler>
+void dispatch(CommandId id, Handler& console) {
+  switch (id) {
+    case CommandId::kHelp:
+      return console.help();
+    case CommandId::kVersion:
+      return console.version();
+    case CommandId::kStatus:
+      return console.status();
+    case CommandId::kShow:
+      return console.show();
+    case CommandId::kSet:
+      return console.set();
+    case CommandId::kRun:
+      return console.run();
+    case CommandId::kStop:
+      return console.stop();
+    case CommandId::kHold:
+      return console.hold();
+    case CommandId::kClear:
+      return console.clear();
+    case CommandId::kStream:
+      return console.stream();
+    case CommandId::kPlot:
+      return console.plot();
+    case CommandId::kSave:
+      return console.save();
+    case CommandId::kLoad:
+      return console.load();
+    case CommandId::kPresets:
+      return console.presets();
+    case CommandId::kForget:
+      return console.forget();
+    case CommandId::kDefaults:
+      return console.defaults();
+    case CommandId::kZero:
+      return console.zero();
+    case CommandId::kEcho:
+      return console.echo();
+  }
+}
 
 }  // namespace bifa

@@ -4,6 +4,8 @@
 
 namespace bifa {
 
+const char kStartPreset[kNameSize + 1] = "startup";
+
 namespace {
 
 /// In the order of Verdict.
@@ -33,9 +35,14 @@ void Commands::begin(StartCause cause) {
     memcpy(&calibration, payload, sizeof calibration);
     if (!is_valid(calibration)) calibration = {};
   }
-  if (!store_.load(kStartPreset, wanted_)) wanted_ = factory_preset(0);
-  running_ = wanted_;
+  running_ = wanted_ = at_power_up();
   controller_.begin(cause, wanted_, calibration);
+}
+
+ParameterSet Commands::at_power_up() {
+  ParameterSet set;
+  if (!store_.load(kStartPreset, set)) set = factory_preset(0);
+  return set;
 }
 
 Result Commands::run() { return result_of(controller_.run()); }

@@ -8,7 +8,7 @@
 namespace bifa {
 
 /// Name of the preset that `save` without a name writes, and that is loaded at start.
-const char kStartPreset[kNameSize + 1] = "startup";
+extern const char kStartPreset[kNameSize + 1];
 
 class Commands {
  public:
@@ -38,6 +38,8 @@ class Commands {
   /// The running set, or the one that will take over at the next cycle boundary.
   const ParameterSet& wanted() const { return wanted_; }
   bool is_pending() const { return pending_; }
+  /// The set that power-up loads: the start preset, or the baseline.
+  ParameterSet at_power_up();
   /// A new sample shows where in the cycle the robot is.
   void follow(const Sample& sample);
 

@@ -28,21 +28,23 @@ uint8_t find_command(const char* name) {
   }
   return kCommandCount;
 }
-/// Whether a command takes so many words, itself included, as its usage shows.
 bool takes_words(uint8_t command, uint8_t count) {
-  uint8_t most = 1, optional = 0;
-  for (const char* at = reinterpret_cast<const char*>(usage_of(command)); flash_byte(at) != '\0'; ++at) {
-    if (flash_byte(at) == ' ') ++most;
-    if (flash_byte(at) == '[') ++optional;
-  }
-  return count <= most && count + optional >= most;
+  const uint8_t bounds = flash_byte(&kCommandWords[command]);
+  return count >= bounds >> 4 && count <= (bounds & 0x0F);
 }
+void print_word(const char* list, uint8_t index) { print(flash_text(list, index)); }
 uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
+void print_number_of(ParameterId id, uint32_t value) { print_decimal(value, decimals_of(id)); }
+void print_name(ParameterId id) {
+  print('[');
+  print(name_of(id));
+  print(' ');
+}
 }  // namespace
 
 void Console::greet() {
-  version();
-  print(BIFA_TEXT("[type help\n"));
+  print_version();
+  print(BIFA_TEXT("[type help\r\n"));
 }
 
 void Console::feed(uint8_t byte) {
@@ -79,13 +81,13 @@ void Console::feed(uint8_t byte) {
 }
 
 void Console::end_line() {
-  if (echo_) print('\n');
+  if (echo_) print_line_end();
   line_[length_] = '\0';
   length_ = 0;
   if (spoilt_) {
-    print(BIFA_TEXT("error the line arrived damaged\n"));
+    print(BIFA_TEXT("error the line arrived damaged\r\n"));
   } else if (too_long_) {
-    print(BIFA_TEXT("error the line exceeds 63 characters\n"));
+    print(BIFA_TEXT("error the line exceeds 63 characters\r\n"));
   } else {
     execute();
   }
@@ -105,76 +107,27 @@ void Console::execute() {
     while (*at != '\0' && *at != ' ' && *at != '\t') ++at;
   }
   if (word_count_ == 0) return answer(Result::kOk);
-  const uint8_t command = find_command(words_[0]);
-  if (command < kCommandCount) {
-    commands_.controller().host_heard();
-    return dispatch(static_cast<CommandId>(command));
-  }
-  answer(Result::kUnknown);
+  command_ = find_command(words_[0]);
+  if (command_ == kCommandCount) return answer(Result::kUnknown);
+  commands_.controller().host_heard();
+  if (!takes_words(command_, word_count_)) return answer_usage();
+  dispatch(static_cast<CommandId>(command_), *this);
 }
 
 bool Console::is(uint8_t word, FlashText text) const {
   return flash_equal(words_[word], reinterpret_cast<const char*>(text));
 }
 
-void Console::dispatch(CommandId id) {
-  if (!takes_words(static_cast<uint8_t>(id), word_count_)) return answer_usage(id);
-  switch (id) {
-    case CommandId::kHelp:
-      return word_count_ == 1 ? help() : help_on(words_[1]);
-    case CommandId::kVersion:
-      version();
-      return answer(Result::kOk);
-    case CommandId::kStatus:
-      status();
-      return answer(Result::kOk);
-    case CommandId::kShow:
-      return show();
-    case CommandId::kSet:
-      return set();
-    case CommandId::kRun:
-      return answer(commands_.run());
-    case CommandId::kStop:
-      return answer(commands_.stop());
-    case CommandId::kHold:
-      return hold();
-    case CommandId::kClear:
-      return answer(commands_.clear());
-    case CommandId::kStream:
-      return switch_to(id, streaming_);
-    case CommandId::kPlot:
-      return switch_to(id, plotting_);
-    case CommandId::kEcho:
-      return switch_to(id, echo_);
-    case CommandId::kSave:
-      return with_preset(&Commands::save);
-    case CommandId::kLoad:
-      return with_preset(&Commands::load);
-    case CommandId::kForget:
-      return with_preset(&Commands::forget);
-    case CommandId::kPresets:
-      return presets();
-    case CommandId::kDefaults:
-      if (!is(1, BIFA_TEXT("confirm"))) break;
-      return finish_later(commands_.defaults());
-    case CommandId::kZero:
-      if (is(1, BIFA_TEXT("confirm"))) return zero(false);
-      if (is(1, BIFA_TEXT("factory"))) return zero(true);
-      break;
-  }
-  answer_usage(id);
-}
-
 void Console::answer(Result result) {
   if (result != Result::kOk) print(BIFA_TEXT("error "));
   print(flash_text(kResultTexts, static_cast<uint8_t>(result)));
-  print('\n');
+  print_line_end();
 }
 
-void Console::answer_usage(CommandId id) {
+void Console::answer_usage() {
   print(BIFA_TEXT("error usage: "));
-  print(usage_of(static_cast<uint8_t>(id)));
-  print('\n');
+  print(usage_of(command_));
+  print_line_end();
 }
 
 void Console::finish_later(Result started) {
@@ -190,7 +143,7 @@ void Console::poll(const LinkCounters& counters) {
   const State state = commands_.controller().state();
   if (state != last_state_) {
     last_state_ = state;
-    if (state == State::kStopped) print(BIFA_TEXT("[stopped: all valves off until clear\n"));
+    if (state == State::kStopped) print(BIFA_TEXT("[stopped: all valves off until clear\r\n"));
     if (state == State::kFault) print_fault(commands_.controller().status().fault);
   }
   if (!waiting_ || commands_.store().busy()) return;
@@ -198,24 +151,25 @@ void Console::poll(const LinkCounters& counters) {
   answer(commands_.store().result());
 }
 
-void Console::switch_to(CommandId id, bool& flag) {
+void Console::switch_to(bool& flag) {
   const bool on = is(1, BIFA_TEXT("on"));
-  if (!on && !is(1, BIFA_TEXT("off"))) return answer_usage(id);
+  if (!on && !is(1, BIFA_TEXT("off"))) return answer_usage();
   flag = on;
-  if (on && id == CommandId::kStream) {
-    print(BIFA_TEXT("[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\n"));
+  if (on && &flag == &streaming_) {
+    print(BIFA_TEXT("[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\r\n"));
   }
   answer(Result::kOk);
 }
 
 void Console::help() {
+  if (word_count_ > 1) return help_on(words_[1]);
   for (uint8_t i = 0; i < kCommandCount; ++i) print_help(usage_of(i), help_of(i));
-  print(BIFA_TEXT("[!  (at any time, no Enter) stop: all chambers vent until clear\n[parameters:"));
+  print(BIFA_TEXT("[!  (at any time, no Enter) stop: all chambers vent until clear\r\n[parameters:"));
   for (uint8_t i = 0; i < kParameterCount; ++i) {
     print(' ');
     print(name_of(static_cast<ParameterId>(i)));
   }
-  print(BIFA_TEXT("\n[try: set period_s 6, run, help run\n"));
+  print(BIFA_TEXT("\r\n[try: set period_s 6, run, help run\r\n"));
   answer(Result::kOk);
 }
 
@@ -224,21 +178,14 @@ void Console::print_help(FlashText name, FlashText text) {
   print(name);
   print(BIFA_TEXT("  "));
   print(text);
-  print('\n');
+  print_line_end();
 }
 
 void Console::help_on(const char* name) {
   ParameterId id;
   if (find_parameter(name, id)) {
     print_help(name_of(id), text_of(id, ParameterText::kHelp));
-    print(BIFA_TEXT("[range "));
-    print_range(id);
-    print(BIFA_TEXT(", default "));
-    print_decimal(value_of(factory_preset(0), id), decimals_of(id));
-    print(BIFA_TEXT(", now "));
-    print_decimal(value_of(commands_.wanted(), id), decimals_of(id));
-    print('\n');
-    return answer(Result::kOk);
+    return show();
   }
   const uint8_t command = find_command(name);
   if (command < kCommandCount) {
@@ -248,50 +195,50 @@ void Console::help_on(const char* name) {
   answer(Result::kUnknown);
 }
 
-void Console::print_range(ParameterId id) {
-  print_decimal(minimum_of(id), decimals_of(id));
-  print(BIFA_TEXT(" to "));
-  print_decimal(maximum_of(id), decimals_of(id));
+void Console::print_value(ParameterId id, uint32_t value) {
+  print_number_of(id, value);
   const FlashText unit = text_of(id, ParameterText::kUnit);
   if (flash_byte(unit) != 0) print(' ');
   print(unit);
 }
 
+void Console::print_range(ParameterId id) {
+  print_number_of(id, minimum_of(id));
+  print(BIFA_TEXT(" to "));
+  print_value(id, maximum_of(id));
+}
+
 void Console::version() {
-  print(BIFA_TEXT("[bifa "));
-  for (uint8_t i = 0; i < sizeof kFirmwareVersion; ++i) {
-    if (i > 0) print('.');
-    print_number(kFirmwareVersion[i]);
-  }
-  print(BIFA_TEXT(", protocol "));
-  print_number(kProtocolVersion);
-  print(BIFA_TEXT(", table "));
-  print_number(kTableHash);
-  print(BIFA_TEXT(", started by "));
-  print(flash_text(kStartCauseWords, static_cast<uint8_t>(session_.cause())));
-  print('\n');
+  print_version();
+  answer(Result::kOk);
+}
+
+void Console::print_version() {
+  print(BIFA_TEXT("[bifa " BIFA_VERSIONS ", started by "));
+  print_word(kStartCauseWords, static_cast<uint8_t>(session_.cause()));
+  print_line_end();
 }
 
 void Console::status() {
   const Status status = commands_.controller().status();
   print(BIFA_TEXT("[state "));
-  print(flash_text(kStateWords, static_cast<uint8_t>(status.state)));
+  print_word(kStateWords, static_cast<uint8_t>(status.state));
   if (status.scheduled) print(BIFA_TEXT(", timed holds"));
   if (status.emergency_stop) print(BIFA_TEXT(", emergency stop pressed"));
-  print('\n');
+  print_line_end();
   if (status.fault.fault != Fault::kNone) print_fault(status.fault);
   print(BIFA_TEXT("[psi "));
   print_triple(status.pressure_mpsi);
-  print(BIFA_TEXT("\n[valves"));
+  print(BIFA_TEXT("\r\n[valves"));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(' ');
-    print(flash_text(kChamberWords, i));
+    print_word(kChamberWords, i);
     print(' ');
     // the two bits of a chamber, positive and vacuum, in the order of ChamberState
     const uint8_t bits = status.valves >> (2 * i) & 3;
-    print(flash_text(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0));
+    print_word(kChamberStateWords, bits == 1 ? 2 : bits == 2 ? 1 : 0);
   }
-  print(BIFA_TEXT("\n[link: frames bad "));
+  print(BIFA_TEXT("\r\n[link: frames bad "));
   print_number(counters_.frames_bad);
   print(BIFA_TEXT(", repeated "));
   print_number(session_.repeated());
@@ -299,13 +246,14 @@ void Console::status() {
   print_number(counters_.bytes_lost);
   print(BIFA_TEXT(", samples lost "));
   print_number(status.samples_lost);
-  print('\n');
+  print_line_end();
+  answer(Result::kOk);
 }
 
 void Console::print_triple(const int16_t (&pressure_mpsi)[kChamberCount]) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     if (i > 0) print(' ');
-    print(flash_text(kChamberWords, i));
+    print_word(kChamberWords, i);
     print(' ');
     print_signed(pressure_mpsi[i], 3);
   }
@@ -313,10 +261,10 @@ void Console::print_triple(const int16_t (&pressure_mpsi)[kChamberCount]) {
 
 void Console::print_fault(const FaultReport& fault) {
   print(BIFA_TEXT("[fault "));
-  print(flash_text(kFaultWords, static_cast<uint8_t>(fault.fault)));
+  print_word(kFaultWords, static_cast<uint8_t>(fault.fault));
   if (fault.channel < kChamberCount) {
     print(' ');
-    print(flash_text(kChamberWords, fault.channel));
+    print_word(kChamberWords, fault.channel);
   }
   print(BIFA_TEXT(" value "));
   print_signed(fault.value, 0);
@@ -324,28 +272,37 @@ void Console::print_fault(const FaultReport& fault) {
   print_signed(fault.limit, 0);
   print(BIFA_TEXT(" at_ms "));
   print_number(fault.time_ms);
-  print(BIFA_TEXT("\n[the second before, psi from "));
+  print(BIFA_TEXT("\r\n[the second before, psi from "));
   print_triple(fault.lowest_mpsi);
   print(BIFA_TEXT(" to "));
   print_triple(fault.highest_mpsi);
-  print('\n');
+  print_line_end();
 }
 
-void Console::show_parameter(ParameterId id) {
-  print('[');
-  print(name_of(id));
-  print(' ');
-  print_decimal(value_of(commands_.wanted(), id), decimals_of(id));
-  print('\n');
+void Console::show_parameter(ParameterId id, const ParameterSet& saved) {
+  const uint32_t value = value_of(commands_.wanted(), id);
+  print_name(id);
+  print_value(id, value);
+  print(BIFA_TEXT(" ("));  // so that the value stands alone between spaces, unit or not
+  print_range(id);
+  print(BIFA_TEXT(", default "));
+  print_value(id, value_of(factory_preset(0), id));
+  print(')');
+  const uint32_t saved_value = value_of(saved, id);
+  if (saved_value != value) {
+    print(BIFA_TEXT(" * power-up "));
+    print_value(id, saved_value);
+  }
+  print_line_end();
 }
 
 void Console::show() {
-  ParameterId id;
-  if (word_count_ == 2) {
-    if (!find_parameter(words_[1], id)) return answer(Result::kNoParameter);
-    show_parameter(id);
-  } else {
-    for (uint8_t i = 0; i < kParameterCount; ++i) show_parameter(static_cast<ParameterId>(i));
+  ParameterId one;
+  if (word_count_ == 2 && !find_parameter(words_[1], one)) return answer(Result::kNoParameter);
+  const ParameterSet saved = commands_.at_power_up();
+  for (uint8_t i = 0; i < kParameterCount; ++i) {
+    const ParameterId id = static_cast<ParameterId>(i);
+    if (word_count_ < 2 || id == one) show_parameter(id, saved);
   }
   answer(Result::kOk);
 }
@@ -356,6 +313,11 @@ void Console::set() {
   uint32_t value;
   switch (parse_decimal(words_[2], decimals_of(id), minimum_of(id), maximum_of(id), value)) {
     case DecimalResult::kOk:
+      print_name(id);
+      print_number_of(id, value_of(commands_.wanted(), id));
+      print(BIFA_TEXT(" -> "));
+      print_value(id, value);
+      print_line_end();
       return answer(commands_.set(id, value));
     case DecimalResult::kNotANumber:
       print(BIFA_TEXT("error not a decimal number; "));
@@ -367,7 +329,7 @@ void Console::set() {
   print(name_of(id));
   print(BIFA_TEXT(" is "));
   print_range(id);
-  print('\n');
+  print_line_end();
 }
 
 void Console::hold() {
@@ -377,21 +339,29 @@ void Console::hold() {
       if (is(2, flash_text(kChamberStateWords, state))) return answer(commands_.hold(chamber, state));
     }
   }
-  answer_usage(CommandId::kHold);
+  answer_usage();
 }
 
-void Console::with_preset(Result (Commands::*command)(const char*)) {
-  char name[kNameSize + 1] = {};
-  if (word_count_ < 2) {
-    memcpy(name, kStartPreset, sizeof name);
-  } else {
-    if (strlen(words_[1]) > kNameSize) return answer(Result::kName);
-    strncpy(name, words_[1], kNameSize);
+const char* Console::preset_name() {
+  if (word_count_ < 2) return kStartPreset;
+  // Padded with zeros, over the words that are done with.
+  const char* from = words_[1];
+  for (uint8_t i = 0; i <= kNameSize; ++i) {
+    line_[i] = *from;
+    if (*from != '\0') ++from;
   }
-  finish_later((commands_.*command)(name));
+  if (line_[kNameSize] != '\0') line_[0] = '\0';  // too long for any
+  return line_;
 }
 
-void Console::zero(bool factory) {
+void Console::defaults() {
+  if (!is(1, BIFA_TEXT("confirm"))) return answer_usage();
+  finish_later(commands_.defaults());
+}
+
+void Console::zero() {
+  const bool factory = is(1, BIFA_TEXT("factory"));
+  if (!factory && !is(1, BIFA_TEXT("confirm"))) return answer_usage();
   print_offsets();
   const Result started = commands_.zero(factory);
   if (started == Result::kOk) print_offsets();
@@ -401,7 +371,7 @@ void Console::zero(bool factory) {
 void Console::print_offsets() {
   print(BIFA_TEXT("[offset psi "));
   print_triple(commands_.controller().calibration().offset_mpsi);
-  print('\n');
+  print_line_end();
 }
 
 void Console::presets() {
@@ -410,7 +380,7 @@ void Console::presets() {
   for (uint8_t i = 0; commands_.preset_at(i, name, stored); ++i) {
     print('[');
     print(name);
-    print(stored ? BIFA_TEXT(" saved\n") : BIFA_TEXT(" factory\n"));
+    print(stored ? BIFA_TEXT(" saved\r\n") : BIFA_TEXT(" factory\r\n"));
   }
   answer(Result::kOk);
 }
@@ -429,30 +399,30 @@ void Console::print_stream(const Sample& sample) {
   print(',');
   print_number(sample.time_us);
   print(',');
-  print(flash_text(kStateWords, static_cast<uint8_t>(sample.state)));
+  print_word(kStateWords, static_cast<uint8_t>(sample.state));
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(',');
     print_signed(sample.pressure_mpsi[i], 3);
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(',');
-    print(flash_text(kChamberStateWords, static_cast<uint8_t>(sample.command[i])));
+    print_word(kChamberStateWords, static_cast<uint8_t>(sample.command[i]));
   }
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     print(',');
     print_number(static_cast<uint32_t>(sample.phase[i]) * 360 >> 16);
   }
-  print('\n');
+  print_line_end();
 }
 
 void Console::print_plot(const Sample& sample) {
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     if (i > 0) print('\t');
-    print(flash_text(kChamberWords, i));
+    print_word(kChamberWords, i);
     print(BIFA_TEXT("_psi:"));
     print_signed(sample.pressure_mpsi[i], 3);
   }
-  print('\n');
+  print_line_end();
 }
 
 }  // namespace bifa

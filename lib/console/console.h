@@ -35,28 +35,41 @@ class Console {
  private:
   void end_line();
   void execute();
-  void dispatch(CommandId id);
   void answer(Result result);
-  void answer_usage(CommandId id);
+  void answer_usage();
   void finish_later(Result started);
   bool is(uint8_t word, FlashText text) const;
 
+  // One for each command of the schema; the words of its line are words_, as many as it takes.
+  friend void dispatch<Console>(CommandId, Console&);
   void help();
-  void help_on(const char* name);
   void version();
   void status();
   void show();
   void set();
+  void run() { answer(commands_.run()); }
+  void stop() { answer(commands_.stop()); }
   void hold();
-  void switch_to(CommandId id, bool& flag);
-  void with_preset(Result (Commands::*command)(const char*));
-  void zero(bool factory);
+  void clear() { answer(commands_.clear()); }
+  void stream() { switch_to(streaming_); }
+  void plot() { switch_to(plotting_); }
+  void save() { finish_later(commands_.save(preset_name())); }
+  void load() { finish_later(commands_.load(preset_name())); }
   void presets();
+  void forget() { finish_later(commands_.forget(preset_name())); }
+  void defaults();
+  void zero();
+  void echo() { switch_to(echo_); }
 
+  void switch_to(bool& flag);
+  const char* preset_name();
+  void help_on(const char* name);
+  void print_version();
   void print_offsets();
   void print_help(FlashText name, FlashText text);
   void print_range(ParameterId id);
-  void show_parameter(ParameterId id);
+  void print_value(ParameterId id, uint32_t value);
+  void show_parameter(ParameterId id, const ParameterSet& saved);
   void print_fault(const FaultReport& fault);
   void print_triple(const int16_t (&pressure_mpsi)[kChamberCount]);
   void print_stream(const Sample& sample);
@@ -68,6 +81,7 @@ class Console {
   const Session& session_;
   uint8_t length_ = 0;
   uint8_t word_count_ = 0;
+  uint8_t command_ = 0;  ///< of the line that is carried out
   LinkCounters counters_ = {};
   State last_state_ = State::kIdle;
   bool spoilt_ = false;

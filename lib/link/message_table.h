@@ -2,15 +2,17 @@
 // clang-format off
 #pragma once
 
-#include <stdint.h>
-
+#include "command_table.h"
 #include "parameter_table.h"
 
 namespace bifa {
 
+const uint8_t kFirmwareVersion[3] BIFA_FLASH = {0, 1, 0};
 const uint8_t kProtocolVersion = 1;
 /// Changes whenever anything changes that host and Uno must agree on.
 const uint32_t kTableHash = 0x6908B694UL;
+/// The same three for people, as the host writes them.
+#define BIFA_VERSIONS "0.1.0, protocol 1, table 6908b694"
 
 enum class MessageId : uint8_t {
   kVersion = 0x01,
@@ -200,5 +202,80 @@ struct SampleMessage {
   uint8_t valves;
 } __attribute__((packed));
 static_assert(sizeof(SampleMessage) == 21, "no holes");
+
+/// The fields of a message, from the bytes that travelled.
+template <typename Fields>
+Fields fields_as(const uint8_t* bytes) {
+  static_assert(sizeof(Fields) <= kLongestInward, "fields fit their frame");
+  Fields fields;
+  memcpy(&fields, bytes, sizeof fields);
+  return fields;
+}
+
+// Both call the member `on_` and the name of the message: a session that lacks one does not compile.
+
+/// Messages that are answered by what they ask for; false if this is none. `about`: what the answers need to know.
+template <typename Handler, typename... About>
+bool answer(MessageId message, const uint8_t* fields, Handler& session, const About&... about) {
+  switch (message) {
+    case MessageId::kStatus:
+      session.on_status(about...);
+      return true;
+    case MessageId::kPresets:
+      session.on_presets(fields_as<PresetsMessage>(fields), about...);
+      return true;
+    case MessageId::kReadSet:
+      session.on_read_set(about...);
+      return true;
+    case MessageId::kReadClock:
+      session.on_read_clock(about...);
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Messages that do something; unknown if this is none.
+template <typename Handler>
+Result carry_out(MessageId message, const uint8_t* fields, Handler& session) {
+  switch (message) {
+    case MessageId::kRun:
+      return session.on_run();
+    case MessageId::kStop:
+      return session.on_stop();
+    case MessageId::kHold:
+      return session.on_hold(fields_as<HoldMessage>(fields));
+    case MessageId::kClear:
+      return session.on_clear();
+    case MessageId::kStream:
+      return session.on_stream(fields_as<StreamMessage>(fields));
+    case MessageId::kSave:
+      return session.on_save(fields_as<SaveMessage>(fields));
+    case MessageId::kLoad:
+      return session.on_load(fields_as<LoadMessage>(fields));
+    case MessageId::kForget:
+      return session.on_forget(fields_as<ForgetMessage>(fields));
+    case MessageId::kDefaults:
+      return session.on_defaults();
+    case MessageId::kZero:
+      return session.on_zero(fields_as<ZeroMessage>(fields));
+    case MessageId::kBegin:
+      return session.on_begin();
+    case MessageId::kField:
+      return session.on_field(fields_as<FieldMessage>(fields));
+    case MessageId::kCommit:
+      return session.on_commit(fields_as<CommitMessage>(fields));
+    case MessageId::kScheduleClear:
+      return session.on_schedule_clear();
+    case MessageId::kScheduleAdd:
+      return session.on_schedule_add(fields_as<ScheduleAddMessage>(fields));
+    case MessageId::kScheduleStart:
+      return session.on_schedule_start();
+    case MessageId::kMark:
+      return session.on_mark();
+    default:
+      return Result::kUnknown;
+  }
+}
 
 }  // namespace bifa

@@ -6,13 +6,14 @@ namespace bifa {
 
 namespace {
 
-template <typename Fields>
-Fields fields_of(const Frame& frame) {
-  static_assert(sizeof(Fields) <= kLongestInward, "a field fits its frame");
-  Fields fields;
-  memcpy(&fields, frame.fields, sizeof fields);
-  return fields;
-}
+/// A preset's name as it travels, with an end.
+struct Name {
+  char text[kNameSize + 1];
+  __attribute__((noinline)) explicit Name(const char* bytes) {
+    memcpy(text, bytes, kNameSize);
+    text[kNameSize] = '\0';
+  }
+};
 
 void count(uint16_t& counter) {
   if (counter != 0xFFFF) ++counter;
@@ -49,7 +50,7 @@ void Session::take(const Frame& frame, const LinkCounters& counters) {
 void Session::hello() {
   HelloMessage message;
   message.protocol = kProtocolVersion;
-  memcpy(message.firmware, kFirmwareVersion, sizeof message.firmware);
+  flash_copy(message.firmware, kFirmwareVersion, sizeof message.firmware);
   message.table_hash = kTableHash;
   message.boot_nonce = boot_nonce_;
   message.start_cause = static_cast<uint8_t>(cause_);
@@ -58,7 +59,7 @@ void Session::hello() {
 }
 
 void Session::connect(const Frame& frame) {
-  const ConnectMessage wanted = fields_of<ConnectMessage>(frame);
+  const ConnectMessage wanted = fields_as<ConnectMessage>(frame.fields);
   if (wanted.boot_nonce == boot_nonce_) {
     key_ = wanted.session_key;
     expected_ = 0;
@@ -72,7 +73,7 @@ void Session::in_order(const Frame& frame, const LinkCounters& counters) {
   ++expected_;
   if (query(frame, counters)) return;
   Result& result = results_[frame.sequence % kRemembered];
-  result = execute(frame);
+  result = carry_out(static_cast<MessageId>(frame.message), frame.fields, *this);
   waiting_ = result == Result::kOk && commands_.store().busy();
   if (!waiting_) done(frame.sequence);
 }
@@ -85,80 +86,32 @@ void Session::poll() {
   done(sequence);
 }
 
-/// Commands that only ask: they are answered by what they ask for, as often as they come.
 bool Session::query(const Frame& frame, const LinkCounters& counters) {
-  switch (static_cast<MessageId>(frame.message)) {
-    case MessageId::kStatus:
-      send_status(frame.sequence, counters);
-      return true;
-    case MessageId::kReadSet: {
-      const SetReportMessage message = {commands_.is_pending(), commands_.wanted()};
-      send(MessageId::kSetReport, frame.sequence, &message, sizeof message);
-      return true;
-    }
-    case MessageId::kPresets:
-      send_preset(frame.sequence, fields_of<PresetsMessage>(frame).index);
-      return true;
-    case MessageId::kReadClock: {
-      const ClockReportMessage message = {commands_.controller().uptime_ms() * 1000, commands_.controller().marked()};
-      send(MessageId::kClockReport, frame.sequence, &message, sizeof message);
-      return true;
-    }
-    default:
-      return false;
-  }
+  return answer(static_cast<MessageId>(frame.message), frame.fields, *this, frame.sequence, counters);
 }
 
-Result Session::execute(const Frame& frame) {
-  char name[kNameSize + 1];
-  memcpy(name, frame.fields, kNameSize);
-  name[kNameSize] = '\0';
-  switch (static_cast<MessageId>(frame.message)) {
-    case MessageId::kRun:
-      return commands_.run();
-    case MessageId::kStop:
-      return commands_.stop();
-    case MessageId::kClear:
-      return commands_.clear();
-    case MessageId::kHold: {
-      const HoldMessage fields = fields_of<HoldMessage>(frame);
-      return commands_.hold(fields.chamber, fields.state);
-    }
-    case MessageId::kStream:
-      streaming_ = fields_of<StreamMessage>(frame).on != 0;
-      return Result::kOk;
-    case MessageId::kMark:
-      commands_.controller().mark_strobe();
-      return Result::kOk;
-    case MessageId::kSave:
-      return commands_.save(name);
-    case MessageId::kLoad:
-      return commands_.load(name);
-    case MessageId::kForget:
-      return commands_.forget(name);
-    case MessageId::kDefaults:
-      return commands_.defaults();
-    case MessageId::kZero:
-      return commands_.zero(fields_of<ZeroMessage>(frame).factory != 0);
-    case MessageId::kBegin:
-      return commands_.begin_set();
-    case MessageId::kField: {
-      const FieldMessage fields = fields_of<FieldMessage>(frame);
-      return commands_.field(fields.parameter, fields.value);
-    }
-    case MessageId::kCommit:
-      return commands_.commit(fields_of<CommitMessage>(frame).check);
-    case MessageId::kScheduleClear:
-      return commands_.schedule_clear();
-    case MessageId::kScheduleAdd: {
-      const ScheduleAddMessage fields = fields_of<ScheduleAddMessage>(frame);
-      return commands_.schedule_add(fields.time_ms, fields.chamber, fields.state);
-    }
-    case MessageId::kScheduleStart:
-      return commands_.schedule_start();
-    default:
-      return Result::kUnknown;
-  }
+void Session::on_read_set(uint8_t sequence, const LinkCounters&) {
+  const SetReportMessage message = {commands_.is_pending(), commands_.wanted()};
+  send(MessageId::kSetReport, sequence, &message, sizeof message);
+}
+
+void Session::on_read_clock(uint8_t sequence, const LinkCounters&) {
+  const ClockReportMessage message = {commands_.controller().uptime_ms() * 1000, commands_.controller().marked()};
+  send(MessageId::kClockReport, sequence, &message, sizeof message);
+}
+
+Result Session::on_stream(const StreamMessage& fields) {
+  streaming_ = fields.on != 0;
+  return Result::kOk;
+}
+
+Result Session::on_save(const SaveMessage& fields) { return commands_.save(Name(fields.preset).text); }
+Result Session::on_load(const LoadMessage& fields) { return commands_.load(Name(fields.preset).text); }
+Result Session::on_forget(const ForgetMessage& fields) { return commands_.forget(Name(fields.preset).text); }
+
+Result Session::on_mark() {
+  commands_.controller().mark_strobe();
+  return Result::kOk;
 }
 
 void Session::send(MessageId message, uint8_t sequence, const void* fields, uint8_t size) {
@@ -170,7 +123,7 @@ void Session::done(uint8_t sequence) {
   send(MessageId::kDone, sequence, &message, sizeof message);
 }
 
-void Session::send_status(uint8_t sequence, const LinkCounters& counters) {
+void Session::on_status(uint8_t sequence, const LinkCounters& counters) {
   const Status status = commands_.controller().status();
   StatusReportMessage message;
   message.state = static_cast<uint8_t>(status.state);
@@ -192,12 +145,12 @@ void Session::send_status(uint8_t sequence, const LinkCounters& counters) {
   send(MessageId::kStatusReport, sequence, &message, sizeof message);
 }
 
-void Session::send_preset(uint8_t sequence, uint8_t index) {
+void Session::on_presets(const PresetsMessage& fields, uint8_t sequence, const LinkCounters&) {
   char name[kNameSize + 1];
   bool stored = false;
   PresetReportMessage message = {};
   message.count = commands_.preset_count();
-  if (commands_.preset_at(index, name, stored)) memcpy(message.preset, name, sizeof message.preset);
+  if (commands_.preset_at(fields.index, name, stored)) memcpy(message.preset, name, sizeof message.preset);
   message.source = stored;
   send(MessageId::kPresetReport, sequence, &message, sizeof message);
 }

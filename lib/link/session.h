@@ -6,8 +6,6 @@
 
 namespace bifa {
 
-const uint8_t kFirmwareVersion[3] = {0, 1, 0};
-
 /// What the port counts, up to 65535.
 struct LinkCounters {
   uint16_t frames_bad;
@@ -46,12 +44,39 @@ class Session {
   void hello();
   void connect(const Frame& frame);
   void in_order(const Frame& frame, const LinkCounters& counters);
+  /// Commands that only ask: they are answered by what they ask for, as often as they come.
   bool query(const Frame& frame, const LinkCounters& counters);
-  Result execute(const Frame& frame);
   void send(MessageId message, uint8_t sequence, const void* fields, uint8_t size);
   void done(uint8_t sequence);
-  void send_status(uint8_t sequence, const LinkCounters& counters);
-  void send_preset(uint8_t sequence, uint8_t index);
+
+  // One for each message of the schema; those that are answered by a report first.
+  template <typename Handler, typename... About>
+  friend bool answer(MessageId, const uint8_t*, Handler&, const About&...);
+  template <typename Handler>
+  friend Result carry_out(MessageId, const uint8_t*, Handler&);
+  void on_status(uint8_t sequence, const LinkCounters& counters);
+  void on_presets(const PresetsMessage& fields, uint8_t sequence, const LinkCounters& counters);
+  void on_read_set(uint8_t sequence, const LinkCounters& counters);
+  void on_read_clock(uint8_t sequence, const LinkCounters& counters);
+  Result on_run() { return commands_.run(); }
+  Result on_stop() { return commands_.stop(); }
+  Result on_hold(const HoldMessage& fields) { return commands_.hold(fields.chamber, fields.state); }
+  Result on_clear() { return commands_.clear(); }
+  Result on_stream(const StreamMessage& fields);
+  Result on_save(const SaveMessage& fields);
+  Result on_load(const LoadMessage& fields);
+  Result on_forget(const ForgetMessage& fields);
+  Result on_defaults() { return commands_.defaults(); }
+  Result on_zero(const ZeroMessage& fields) { return commands_.zero(fields.factory != 0); }
+  Result on_begin() { return commands_.begin_set(); }
+  Result on_field(const FieldMessage& fields) { return commands_.field(fields.parameter, fields.value); }
+  Result on_commit(const CommitMessage& fields) { return commands_.commit(fields.check); }
+  Result on_schedule_clear() { return commands_.schedule_clear(); }
+  Result on_schedule_add(const ScheduleAddMessage& fields) {
+    return commands_.schedule_add(fields.time_ms, fields.chamber, fields.state);
+  }
+  Result on_schedule_start() { return commands_.schedule_start(); }
+  Result on_mark();
 
   Commands& commands_;
   uint16_t boot_nonce_ = 0;

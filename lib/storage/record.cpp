@@ -4,6 +4,9 @@
 
 namespace bifa {
 
+// Defined once: such constants lie in RAM, and each file that had its own would take 13 bytes more.
+const char kSettingsName[kNameSize + 1] = "#settings";
+
 namespace {
 const uint8_t kHeadBytes = offsetof(Record, payload);
 

@@ -12,7 +12,7 @@ const uint8_t kSlotCount = kEepromBytes / kSlotBytes;
 const uint8_t kRecordValid = 0xA5;  ///< the mark of a complete record, written last
 const uint8_t kRecordVoid = 0x00;
 
-const char kSettingsName[kNameSize + 1] = "#settings";  ///< not a name that anybody can give
+extern const char kSettingsName[kNameSize + 1];  ///< not a name that anybody can give
 /// Sequence numbers above this are no honest ones: the cells wear out long before.
 const uint32_t kSequenceLimit = 0xFFFFFF00UL;
 

@@ -1,22 +1,25 @@
 #include "print.h"
 
 #include "output.h"
+#include "phrases.h"
 
 namespace bifa {
 
 namespace {
 
 // To subtract them is six times as fast as to divide, and eight numbers make a line of telemetry.
-const uint32_t kPowersOfTen[] BIFA_FLASH = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000, 1000000000};
-const uint8_t kLongPlaces = 10;
-const uint8_t kShortPlaces = 5;
+const uint32_t kLong[] BIFA_FLASH = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000, 1000000000};
+const uint16_t kShort[] BIFA_FLASH = {1, 10, 100, 1000, 10000};
+inline uint32_t flash_number(const uint32_t* address) { return flash_long(address); }
+inline uint16_t flash_number(const uint16_t* address) { return flash_word(address); }
 
-template <typename Number>
-void print_digits(Number value, uint8_t place, uint8_t decimals) {
+template <typename Number, uint8_t kPlaces>
+void print_digits(Number value, uint8_t decimals, const Number (&powers)[kPlaces]) {
   bool leading = true;
+  uint8_t place = kPlaces;
   do {
     --place;
-    const Number one = static_cast<Number>(flash_long(&kPowersOfTen[place]));
+    const Number one = flash_number(&powers[place]);
     char digit = '0';
     for (; value >= one; value -= one) ++digit;
     if (digit != '0' || place == decimals) leading = false;
@@ -25,13 +28,27 @@ void print_digits(Number value, uint8_t place, uint8_t decimals) {
   } while (place > decimals || value != 0);
 }
 
+/// Prints what stands in flash up to the next phrase or the end, and returns where that is.
+const char* print_plain(const char* at) {
+  for (uint8_t c; (c = flash_byte(at)) != '\0' && c < kFirstPhrase; ++at) print(static_cast<char>(c));
+  return at;
+}
+
 }  // namespace
 
 void print(char character) { output(static_cast<uint8_t>(character)); }
 
+void print_line_end() {
+  print('\r');
+  print('\n');
+}
+
 void print(FlashText text) {
-  const char* at = reinterpret_cast<const char*>(text);
-  for (char c; (c = static_cast<char>(flash_byte(at))) != '\0'; ++at) print(c);
+  const char* at = print_plain(reinterpret_cast<const char*>(text));
+  while (flash_byte(at) != '\0') {
+    print_plain(reinterpret_cast<const char*>(flash_text(kPhrases, flash_byte(at) - kFirstPhrase)));
+    at = print_plain(at + 1);
+  }
 }
 
 void print(const char* text) {
@@ -39,10 +56,10 @@ void print(const char* text) {
 }
 
 void print_decimal(uint32_t value, uint8_t decimals) {
-  if (value <= UINT16_MAX && decimals < kShortPlaces) {
-    print_digits(static_cast<uint16_t>(value), kShortPlaces, decimals);
+  if (value <= UINT16_MAX && decimals < sizeof kShort / sizeof *kShort) {
+    print_digits(static_cast<uint16_t>(value), decimals, kShort);
   } else {
-    print_digits(value, kLongPlaces, decimals);
+    print_digits(value, decimals, kLong);
   }
 }
 

@@ -8,6 +8,8 @@ namespace bifa {
 void print(char character);
 void print(FlashText text);
 void print(const char* text);
+/// A carriage return as well: bare terminals begin the next line at the margin then. Texts with line ends have both too.
+void print_line_end();
 
 /// Prints value / 10^decimals without trailing zeros: (5700000, 6) -> "5.7".
 void print_decimal(uint32_t value, uint8_t decimals);

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
@@ -21,18 +22,28 @@ _PREDICTED = 0.005  # of a speed that repeats agree about more closely: what its
 _UNCHANGED = 0.01  # of the measured speed
 
 
+class Ending(StrEnum):
+    """Why there is no further round."""
+
+    PREDICTED = "predicted"
+    UNCHANGED = "unchanged"
+    MOST = "most"  # as many as there may be
+
+
 @dataclass(frozen=True)
 class Round:
     """One gait that was not fitted: its speed over settled cycles as the model with `effects` predicts it and measured,
     with the standard deviation of its repeats; `error_mm`, RMS of the ends' places against the prediction all along the
-    walk, `floor_mm`, what repeats differ by there (None: there is one only)."""
+    walk, `floor_mm`, what repeats differ by there (None: there is one only). `ended`: of the last round, why it is."""
 
     effects: tuple[str, ...]
+    gait: dict[str, float]
     predicted_mm_s: float
     measured_mm_s: float
     spread_mm_s: float
     error_mm: float
     floor_mm: float | None
+    ended: Ending | None = None
 
     @property
     def is_predicted(self) -> bool:
@@ -44,6 +55,15 @@ class Round:
         """Whether the model still names the same and its gait walks no faster or slower, nor is predicted better."""
         as_fast = abs(self.measured_mm_s - before.measured_mm_s) < _UNCHANGED * before.measured_mm_s
         return self.effects == before.effects and as_fast and self.error_mm > 0.9 * before.error_mm
+
+
+def ending(rounds: Sequence[Round]) -> Ending | None:
+    """Why the rounds end with the last of these; None where they go on."""
+    if rounds[-1].is_predicted:
+        return Ending.PREDICTED
+    if len(rounds) > 1 and rounds[-1].changes_nothing(rounds[-2]):
+        return Ending.UNCHANGED
+    return Ending.MOST if len(rounds) >= ROUNDS else None
 
 
 @dataclass(frozen=True)
@@ -66,6 +86,7 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset) -> Round:
     measured = [speed.mean_mm_s for repeats in speeds(walks).values() for speed in repeats]
     return Round(
         effects,
+        dict(trials[0].gait),
         predicted_speed(model, trials[0]),
         float(np.mean(measured)),
         float(np.std(measured, ddof=1)) if several else 0.0,
@@ -102,7 +123,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     dataset = joined(dataset, _without_baseline(read_dataset(inputs / "walks-base")), "walks-1/")
     (outputs / "rounds").mkdir(exist_ok=True)
     rounds = [judged(model, effects, walks)]
-    while not rounds[-1].is_predicted and len(rounds) < ROUNDS:
+    while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         model, effects = trades.complete(dataset)
@@ -110,8 +131,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, gait, folder)
         rounds.append(judged(model, effects, walks))
-        if rounds[-1].changes_nothing(rounds[-2]):
-            break
+    rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)
     save_gait(outputs / "gait-last.toml", gait, {"created_by": "bifa campaign"})
     (outputs / "rounds.json").write_text(json.dumps([asdict(r) for r in rounds], indent=1) + "\n")

@@ -25,6 +25,7 @@ from bifa.identify.start import prepare
 from bifa.measure import plan
 from bifa.measure.known import known_of
 from bifa.measure.session import run_session
+from bifa.report.words import spoken
 from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from lacuna.diagnosis.diagnose import Diagnosis, diagnose
@@ -86,7 +87,7 @@ def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
                 name="campaign: characterisation",
                 known=known_of(rig, bench.known),
                 provenance=bench.settings(0),
-                on_event=lambda e: part(e.planned.file, (e.number - 1 + e.share) / e.total),
+                on_event=lambda e: part(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
 
     settings = bench.settings(0) | {"effort": asdict(effort), "known": dict(bench.known)}
@@ -153,7 +154,7 @@ def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, ef
 
 
 def _diagnosed(dataset: Dataset, bench: Bench, part: Part) -> Diagnosis:
-    return diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(what, 0.0))
+    return diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(spoken(what), 0.0))
 
 
 def _diagnose(bench: Bench, part: Part) -> Stage:

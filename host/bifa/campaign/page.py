@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bifa.campaign.again import ROUNDS, Ending
 from bifa.report.animation import animate_walks
 from bifa.report.chart import Chart
 from bifa.report.diagnosis import (
@@ -27,7 +28,7 @@ from bifa.report.page import Motion, Page, Section, Table
 from bifa.report.residuals import residual_charts
 from bifa.report.robustness import STANDING_MM_S, robustness_chart, standing_share
 from bifa.report.walks import MEASURED, Walk, walks_chart
-from bifa.report.words import NBSP, channel_words, effect_words, plain, spoken, unit_of
+from bifa.report.words import NBSP, channel_words, effect_words, gait_words, plain, spoken, unit_of
 
 GAIT_NAMES = {
     "baseline": "baseline (the paper's)",
@@ -68,6 +69,7 @@ def campaign_page(
         *further(diagnosis, labels),
         walking(walks),
         _gaits(summary, walks),
+        rounds_section(summary["rounds"]),
     ]
     return Page(
         f"What {robot} does that the paper's model does not",
@@ -194,6 +196,44 @@ def _gaits(summary: Mapping, walks: Mapping[str, Walk]) -> Section:
     )
     charts: list[Chart] = [walks_chart(list(walks.values())), robustness_chart(summary["robustness"], GAIT_NAMES)]
     return Section("The gaits", said, [table], charts)
+
+
+_ENDED = {
+    Ending.PREDICTED: "the speed of its gait is predicted to within what repeats differ by, or to half a per cent",
+    Ending.UNCHANGED: "its model names the same as the one before, its gait is as fast, and is predicted no better",
+    Ending.MOST: f"there are at most {ROUNDS} rounds, and the speed of its gait is still not predicted",
+}
+
+
+def rounds_section(rounds: Sequence[Mapping]) -> Section:
+    """How well gaits were predicted that no fit had seen, round by round, and why the last round is the last."""
+    rows = [
+        [
+            str(number),
+            f"{one['predicted_mm_s']:.2f}",
+            f"{one['measured_mm_s']:.2f}{NBSP}±{NBSP}{one['spread_mm_s']:.2f}",
+            plain(one["error_mm"]),
+            "" if one["floor_mm"] is None else plain(one["floor_mm"]),
+        ]
+        for number, one in enumerate(rounds, 1)
+    ]
+    columns = ["round", "predicted, mm/s", "measured, mm/s", "RMS error, mm", "noise floor, mm"]
+    caption = (
+        "Each gait as the model of its round predicts it: its speed, and where head and tail are all along the walk."
+    )
+    said = [
+        "A model is worth what it predicts of a gait that no fit has seen. Round 1 is the gait found with the "
+        "completed model; where its speed is not predicted, its walks become data, the diagnosis is made anew from "
+        "all data, and the next round walks the gait of that model.",
+        *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
+        f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
+    ]
+    return Section("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
+
+
+def _round_words(one: Mapping) -> str:
+    added = " and ".join(effect_words(name) for name in one["effects"]) or "nothing"
+    return f"the model has {added} added to it, its gait is {gait_words(one['gait'])}"
 
 
 def speed_table(gaits: Sequence[Mapping]) -> Table:

@@ -51,7 +51,7 @@ def resolve(
                 name=f"to tell {' and '.join(found.next.separates)} apart",
                 known=dataset.known,
                 provenance=dataset.provenance,
-                on_event=lambda e: progress(e.planned.file, (e.number - 1 + e.share) / e.total),
+                on_event=lambda e: progress(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
         dataset = joined(dataset, read_dataset(folder / f"separate-{number}"), f"separate-{number}_")
         ran.append(found.next)

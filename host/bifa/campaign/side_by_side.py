@@ -20,6 +20,7 @@ from bifa.report.words import (
     channel_words,
     effect_parameter,
     effect_words,
+    gait_parameter_words,
     parameter_words,
     plain,
     quantity,
@@ -177,13 +178,8 @@ def _differ(parameters) -> bool:
 def gait_table(runs: Sequence[Run], which: str) -> Table:
     """The parameters of the gaits found with the "base" or the "completed" model."""
     gaits = [run.gaits[which].as_dict() for run in runs]
-    rows = [[_gait_words(name), *(plain(gait[name], 3) for gait in gaits)] for name in gaits[0]]
+    rows = [[gait_parameter_words(name), *(plain(gait[name], 3) for gait in gaits)] for name in gaits[0]]
     return Table([f"gait {GAIT_NAMES[which]}", *(run.name for run in runs)], rows)
-
-
-def _gait_words(name: str) -> str:
-    words = {"period_s": "period, s", "psi12_deg": "head ahead, °", "psi13_deg": "tail ahead, °"}
-    return words.get(name, name.replace("duty_", "vacuum, "))
 
 
 def _errors(runs: Sequence[Run]) -> Chart:

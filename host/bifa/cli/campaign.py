@@ -81,6 +81,8 @@ def run_campaign(
             from bifa.campaign.progress import stage_progress
             from bifa.campaign.stages import run_stages
             from bifa.report.diagnosis import noise_table
+            from bifa.report.terminal import plain_spaces, print_lines, print_table
+            from bifa.report.words import effect_words
 
         with stage_progress(console) as progress:
             if bench.hands is not None:
@@ -89,11 +91,11 @@ def run_campaign(
             run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
 
     summary = json.loads((out / "summary.json").read_text())
-    effects = "; ".join(_said(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
-    console.print(f"verdict: [bold]{summary['verdict']}[/bold], {effects}", highlight=False)
+    effects = "; ".join(effect_words(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
+    console.print(f"verdict: [bold]{summary['verdict']}[/bold], {plain_spaces(effects)}", highlight=False)
     if summary["truth"] is not None:
-        inside = "; ".join(_said(name, values) for name, values in summary["truth"].items())
-        console.print(f"the seal opened: {inside or 'nothing'}", highlight=False)
+        inside = "; ".join(effect_words(name, values) for name, values in summary["truth"].items())
+        print_lines(console, [f"the seal opened: {inside or 'nothing'}"])
     errors = prediction_table(summary["prediction_error"]), noise_table(summary["error"])
     for table in (*errors, speed_table(summary["gaits"])):
         print_table(console, table)
@@ -153,20 +155,3 @@ def _kept(out: Path) -> str:
     under_way = f"{trials} trial{'' if trials == 1 else 's'} of the stage under way" if trials else ""
     kept = " and ".join(part for part in (f"the stages {', '.join(done)}" if done else "", under_way) if part)
     return f"{out} keeps {kept}" if kept else "nothing has been finished yet"
-
-
-def _said(name: str, values: Mapping[str, float]) -> str:
-    from bifa.report.words import effect_words
-
-    return effect_words(name, values).replace("\N{NO-BREAK SPACE}", " ")
-
-
-def print_table(console, content) -> None:
-    from rich.table import Table
-
-    table = Table(title=content.caption, title_justify="left")
-    for i, heading in enumerate(content.columns):
-        table.add_column(heading, justify="right" if i else "left")
-    for row in content.rows:
-        table.add_row(*(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in row))
-    console.print(table)

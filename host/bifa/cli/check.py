@@ -38,7 +38,7 @@ def register(app: typer.Typer) -> None:
         with console.status("reading"):
             content = read_dataset(dataset)
             findings = check_dataset(content)
-        console.print(_contents(content))
+        _print_contents(console, content)
         for finding in findings:
             console.print(Text.assemble(("warning", "yellow"), f" [{finding.kind}] {finding}"), highlight=False)
         if not findings:
@@ -53,19 +53,21 @@ def register(app: typer.Typer) -> None:
             raise typer.Exit(1)
 
 
-def _contents(dataset):
-    from rich.table import Table
+def _print_contents(console, dataset) -> None:
+    from bifa.report.page import Table
+    from bifa.report.terminal import print_lines, print_table
+    from bifa.report.words import parameter_words, quantity
+    from bifa.robot import nominal
 
-    title = f"{dataset.name}: {len(dataset.trials)} trials"
-    table = Table(title=title, title_justify="left", caption_justify="left")
-    for heading in ("experiment and settings", "repeats", "samples", "rate [Hz]", "duration [s]"):
-        table.add_column(heading, justify="left" if heading.startswith("exp") else "right")
+    rows = []
     for group in dataset.repeats():
         samples = [len(trial.time_s) for trial in group]
         rates = [trial.rate_hz for trial in group]
         seconds = sum(float(trial.time_s[-1] - trial.time_s[0]) for trial in group)
         repeats = ", ".join(str(trial.repeat) for trial in group)
-        table.add_row(group[0].label, repeats, f"{sum(samples)}", f"{sum(rates) / len(rates):.1f}", f"{seconds:.1f}")
-    known = ", ".join(f"{name} = {value:g}" for name, value in dataset.known.items()) or "nothing"
-    table.caption = f"known beforehand: {known}"
-    return table
+        rows.append([group[0].label, repeats, f"{sum(samples)}", f"{sum(rates) / len(rates):.1f}", f"{seconds:.1f}"])
+    columns = ["experiment and settings", "repeats", "samples", "rate, Hz", "duration, s"]
+    print_table(console, Table(columns, rows, f"{dataset.name}: {len(dataset.trials)} trials"))
+    units = {name: parameter.unit for name, parameter in nominal().parameters.items()}
+    known = [f"{parameter_words(name)} {quantity(v, units.get(name, ''), 3)}" for name, v in dataset.known.items()]
+    print_lines(console, [f"known beforehand: {', '.join(known) or 'nothing'}"])

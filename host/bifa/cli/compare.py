@@ -27,7 +27,7 @@ def compare(
         speed_table,
         verdict_table,
     )
-    from bifa.cli.campaign import print_table
+    from bifa.report.terminal import print_table
     from bifa.screen import Console
 
     console = Console()

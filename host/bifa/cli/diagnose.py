@@ -77,13 +77,14 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
 
     from bifa.campaign.resolve import resolve
     from bifa.identify.start import prepare
+    from bifa.report.words import spoken
     from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 
     with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("fitting stiffness curves, steps and pulls in turn")
 
         def said(what: str, share: float = 0.0) -> None:
-            progress.update(task, description=what)
+            progress.update(task, description=spoken(what))
 
         def diagnosed(trials) -> Diagnosis:
             system = prepare(trials, robot)
@@ -110,15 +111,15 @@ def _report(console, measured, found, json: Path | None, model: Path | None, pag
     from bifa.robot import save_model
     from lacuna.diagnosis.record import as_record
 
-    record = as_record(found)
-    _print(console, record)
+    record, labels = as_record(found), labels_of(measured)
+    print_diagnosis(console, record, labels)
     if model is not None:
         save_model(model, completed_model(found.final))
         console.print(f"model: {model}. Next: bifa optimize --model {model} --out gait.toml", highlight=False)
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:
-        write_page(diagnosis_page(measured.name, record, labels_of(measured)), page)
+        write_page(diagnosis_page(measured.name, record, labels), page)
         console.print(f"report: {page}", highlight=False)
 
 
@@ -148,50 +149,12 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
     return opened
 
 
-def _print(console, record: dict) -> None:
-    from rich.table import Table
+def print_diagnosis(console, record: dict, labels) -> None:
+    """The record of a diagnosis in the words of its page; `labels`: what trials are called, by file."""
+    from bifa.report.diagnosis import further, lacking, noise_table, verdict_sentence
+    from bifa.report.terminal import print_lines, print_sections, print_table
 
     console.print(f"[bold]{record['verdict']}[/bold]")
-    for effect in record["effects"]:
-        values = ", ".join(f"{name} = {value:g}" for name, value in effect["parameters"].items())
-        console.print(
-            f"  {effect['name']} ({values}), closes {100 * effect['share_of_gap']:.0f} % of the gap, "
-            f"probability {effect['probability']:.2f}",
-            highlight=False,
-        )
-        if effect["confusable_with"]:
-            console.print(f"    indistinguishable from: {', '.join(effect['confusable_with'])}", highlight=False)
-    console.print(record["signature"]["text"], highlight=False)
-    if record["verdict"] == "identified":
-        console.print(f"Left unexplained: {record['remainder']['text']}", highlight=False)
-    if record["verdict"] == "unexplained" and record["nearest"]:
-        near = [f"{' + '.join(r['effects'])} ({100 * r['share_of_gap']:.0f} %)" for r in record["nearest"]]
-        console.print(f"Nearest, with the share of the gap that each would close: {', '.join(near)}.", highlight=False)
-    for warning in record["warnings"]:
-        console.print(f"Note: {warning}", highlight=False)
-    error = record["error"]
-    table = Table(title=error["unit"], title_justify="left")
-    for heading in ("", "before", "after"):
-        table.add_column(heading, justify="left" if not heading else "right")
-    for what, label in (
-        ("fitted", "fitted"),
-        ("held_out", "not fitted"),
-        ("held_out_conditions", "conditions not fitted"),
-    ):
-        if error["before"][what] is None:
-            continue
-        table.add_row(label, *(f"{error[side][what]:.2f}" for side in ("before", "after")))
-    for name in error["before"]["by_experiment"]:
-        table.add_row(name, *(f"{error[side]['by_experiment'][name]:.2f}" for side in ("before", "after")))
-    table.add_row("noise floor", "", f"{error['noise_floor']['held_out']:.2f}")
-    console.print(table)
-    for curve in record["learnt"]:
-        console.print(f"Learnt: a curve over {curve['variable']}, added to {curve['term']}.", highlight=False)
-    if record["not_detectable_here"]:
-        console.print(f"Not detectable in this data: {', '.join(record['not_detectable_here'])}.", highlight=False)
-    if record["next_experiment"]["experiment"]:
-        n = record["next_experiment"]
-        settings = ", ".join(f"{k} {v}" for k, v in n["settings"].items())
-        console.print(
-            f"Next: {n['experiment']} ({settings}) would separate {', '.join(n['separates'])}.", highlight=False
-        )
+    print_lines(console, [verdict_sentence(record["verdict"], record["effects"], record["remainder"])])
+    print_table(console, noise_table(record["error"]))
+    print_sections(console, [*lacking(record, labels), *further(record, labels)])

@@ -141,7 +141,7 @@ def _run(console, port, options, out, trials, name, known, watch) -> None:
         task = bars.add_task(name, total=len(trials))
 
         def show(event) -> None:
-            bars.update(task, description=event.planned.file, completed=event.number - 1 + event.share)
+            bars.update(task, description=event.planned.title, completed=event.number - 1 + event.share)
             if event.clock_error_s is not None:
                 errors.append(event.clock_error_s)
             if event.misfit and not by_hand:

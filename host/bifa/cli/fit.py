@@ -37,7 +37,8 @@ def fit(
 
     from bifa.data import read_dataset
     from bifa.identify.identification import identify
-    from bifa.report.identification_tables import print_report
+    from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
+    from bifa.report.terminal import print_sections, print_table
     from bifa.robot import load_model, save_model
     from bifa.screen import Console
 
@@ -53,9 +54,9 @@ def fit(
             progress=lambda stage: progress.update(task, description=stage),
         )
     save_model(out, found.model)
-    print_report(console, found)
+    print_sections(console, parameters_and_remarks(found))
+    print_table(console, errors_table(found))
     if report is not None:
-        from bifa.report.fit import fit_page
         from bifa.report.page import write_page
 
         write_page(fit_page(found), report)

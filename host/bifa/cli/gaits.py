@@ -41,9 +41,9 @@ def gaits(
         with stoppable(lambda: f"the gaits named above are in {folder}"):
             _make(console, model, folder, names, seed)
         return
-    title = "Gaits of the nominal robot, speeds in mm/s"
+    title = "Gaits of the nominal robot: mm/s; head, tail ahead; vacuum of body, head, tail"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    for heading in ("gait", "speed", "9 in 10", "period_s", "psi12, psi13", "duties"):
+    for heading in ("gait", "speed", "9 in 10", "period, s", "ahead, °", "vacuum"):
         table.add_column(heading, no_wrap=True)
     for name in names:
         entry = library.load(name)

@@ -133,9 +133,11 @@ def _summary(optimum):
     import numpy as np
     from rich.table import Table
 
+    from bifa.report.words import gait_parameter_words
+
     table = Table(title="The gait", title_justify="left", show_header=False)
     for name, value in optimum.gait.as_dict().items():
-        table.add_row(name, f"{value:.4f}")
+        table.add_row(gait_parameter_words(name), f"{value:.4f}")
     speeds = optimum.speeds_mm_s
     table.add_row("speed on the model, 20 cycles, fine step", f"{optimum.nominal_mm_s:.2f} mm/s")
     for share in (5, 10, 50, 90):

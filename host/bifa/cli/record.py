@@ -39,25 +39,20 @@ def record(
     check_port(port)
 
     from bifa.live.record import record_telemetry, record_walks
+    from bifa.report.terminal import plain_spaces
+    from bifa.report.words import gait_words
     from bifa.rig import open_rig
     from bifa.robot.gait import BASELINE, read_gait_file
     from bifa.screen import Console
 
     console = Console()
-    steps = read_gait_file(gait).gait if gait else BASELINE
+    steps = plain_spaces(gait_words((read_gait_file(gait).gait if gait else BASELINE).as_dict()))
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None
         if has_instruments:
-            console.print(f"gait: {gait or 'the baseline'}, {_words(steps)}", highlight=False)
+            console.print(f"gait: {gait or 'the baseline'}, {steps}", highlight=False)
             with stoppable(lambda: f"valves off; finished walks are kept in {out}.partial; the same command resumes"):
                 record_walks(rig, out, gait, cycles, repeats, console)
     if not has_instruments:
-        console.print(
-            f"gait: {gait}, {_words(steps)}" if gait else "no --gait: recording without walking", highlight=False
-        )
+        console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking", highlight=False)
         record_telemetry(lambda: open_rig(port), out, gait, seconds, console)
-
-
-def _words(gait) -> str:
-    duties = ", ".join(f"{duty:g}" for duty in (gait.duty_body, gait.duty_head, gait.duty_tail))
-    return f"period {gait.period_s:g} s, phases {gait.psi12_deg:g} and {gait.psi13_deg:g} degrees, duties {duties}"

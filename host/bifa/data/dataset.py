@@ -56,7 +56,7 @@ class Trial:
     @property
     def label(self) -> str:
         """The condition in a few words, for tables and plots."""
-        parts = [self.experiment.replace("_", " ")]
+        parts = ["walk" if self.experiment == "locomotion" else self.experiment.replace("_", " ")]
         if self.actuator:
             parts.append(self.actuator)
         if self.pressure_psi is not None:
@@ -65,7 +65,12 @@ class Trial:
             parts.append(f"{self.rate_mm_s:g} mm/s")
         if self.gait:
             parts.append(f"period {self.gait['period_s']:g} s")
-        parts += [f"{key} {self.extra[key]}" for key in SETTINGS if key in self.extra]
+        if "load_cell_N_m" in self.extra:
+            parts.append(f"load cell {self.extra['load_cell_N_m']:g} N/m")
+        if "direction" in self.extra:
+            parts.append(str(self.extra["direction"]))
+        if "inclination_deg" in self.extra:
+            parts.append(f"pipe at {self.extra['inclination_deg']:g} degrees")
         return ", ".join(parts)
 
     def to_pandas(self):

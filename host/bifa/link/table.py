@@ -135,7 +135,7 @@ CONSOLE_COMMANDS = (
     ('help', 'help [NAME]', 'list everything, or explain one'),
     ('version', 'version', 'versions, cause of the last start'),
     ('status', 'status', 'state, fault, pressures, valves, link'),
-    ('show', 'show [NAME]', 'print one parameter or all'),
+    ('show', 'show [NAME]', 'values, ranges; * where power-up loads another'),
     ('set', 'set NAME VALUE', 'change a parameter, also while running'),
     ('run', 'run', 'walk'),
     ('stop', 'stop', 'stop, and vent all chambers'),

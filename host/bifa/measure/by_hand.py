@@ -50,7 +50,7 @@ class ByHand:
         turn = Turn(planned, number, total)
         self._instruments.begin(turn)
         while True:
-            self._desk.say(f"\nTrial {number} of {total}: {turn.planned.as_trial().label}, repeat {planned.repeat}")
+            self._desk.say(f"\nTrial {number} of {total}: {planned.title}")
             try:
                 trial = record_trial(rig, uno, planned, on_progress, attempts=1)
             except (LinkError, PortGoneError):

@@ -53,7 +53,7 @@ def record_trial(
         if not lost:
             return planned.as_trial(columns, extra=extra)
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
-    raise BifaError(f"{planned.file}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
+    raise BifaError(f"{planned.title}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
 
 
 def _static(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):

@@ -52,6 +52,11 @@ class PlannedTrial:
         parts += [f"{key.split('_')[0]}{value}" for key, value in sorted(self.settings.items())]
         return "_".join([*parts, str(self.repeat)]) + ".csv"
 
+    @property
+    def title(self) -> str:
+        """What it is called on the terminal: "static loading, large, 4 psi, 2 mm/s, repeat 1"."""
+        return f"{self.as_trial().label}, repeat {self.repeat}"
+
     def as_trial(self, columns: Mapping | None = None, **fields: Any) -> Trial:
         """The trial that this becomes once it is recorded."""
         return Trial(

@@ -11,7 +11,7 @@ from bifa.data.layout import is_command
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.picture import draw_chart
 from bifa.report.style import CHAMBERS
-from bifa.report.words import channel_words, condition_words, unit_of
+from bifa.report.words import channel_words, unit_of
 
 _MAX_POINTS = 4000  # a pixel shows no more; the extremes of each stretch are kept
 _APART = 1.3  # rows of commands
@@ -51,7 +51,7 @@ def condition_chart(group: Sequence[Trial]) -> Chart:
                 lifted, style = (y + _APART * row, "steps") if is_command(name) else (y, "line")
                 series.append(Series((key.label,), x, lifted, key.colour, style))
         panels.append(Panel(series, Axis(_axis(abscissa)), _upward(what, names)))
-    title = f"{condition_words(first.label)} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
+    title = f"{first.label} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
     return Chart([Column(panels)], list(keys.values()), title, title=title, across=1, height=160)
 
 

@@ -11,9 +11,10 @@ from bifa.report.words import (
     effect_parameter,
     effect_words,
     experiment_words,
-    parameter_words,
+    gait_words,
     quantity,
     spoken,
+    unit_of,
 )
 
 BASE_MODEL = "The base model is the paper's, with its parameters fitted to this robot."
@@ -159,18 +160,12 @@ def next_sentence(coming: Mapping[str, Any]) -> str:
 def settings_words(experiment: Mapping[str, Any]) -> str:
     """ "static loading, large, 4 psi, 2 mm/s"."""
     said = [experiment_words(experiment["experiment"])]
-    for key, value in experiment["settings"].items():
-        inner = value if isinstance(value, Mapping) else {key: value}
-        said += [_setting_words(name, of) for name, of in inner.items()]
+    for name, value in experiment["settings"].items():
+        if isinstance(value, Mapping):
+            said.append(gait_words(value))
+        elif isinstance(value, float | int):
+            unit = "mm/s" if name.endswith("_mm_s") else unit_of(name)
+            said.append(f"pipe at {value:g} degrees" if name == "inclination_deg" else f"{value:g} {unit}")
+        else:
+            said.append(str(value))
     return ", ".join(said)
-
-
-def _setting_words(name: str, value: Any) -> str:
-    return f"{parameter_words(name)} {value:g}{_unit_behind(name)}" if isinstance(value, float | int) else str(value)
-
-
-def _unit_behind(key: str) -> str:
-    for ending, unit in (("_mm_s", " mm/s"), ("_psi", " psi"), ("_deg", "°"), ("_s", " s")):
-        if key.endswith(ending):
-            return unit
-    return ""

@@ -9,11 +9,10 @@ from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
-from bifa.report.identification_tables import AS_NOISE, remarks
+from bifa.report.identification_remarks import AS_NOISE, remarks
 from bifa.report.page import Page, Section, Table
 from bifa.report.words import (
     channel_words,
-    condition_words,
     experiment_words,
     parameter_words,
     plain,
@@ -49,14 +48,18 @@ def fit_page(found: Identification) -> Page:
     return Page(
         f"Fit of {dataset.name}",
         f"{says} {counted}",
-        [
-            Section("Parameters", tables=[_parameters(found)]),
-            Section("What to know about them", [spoken(line) for line in remarks(found)]),
-            *measured,
-        ],
+        [*parameters_and_remarks(found), *measured],
         (f"{BASE_MODEL} {RMS} {NOISE_FLOOR}",),
-        (_errors(found),),
+        (errors_table(found),),
     )
+
+
+def parameters_and_remarks(found: Identification) -> list[Section]:
+    """Every parameter with its interval, and what there is to know about them."""
+    return [
+        Section("Parameters", tables=[_parameters(found)]),
+        Section("What to know about them", [spoken(line) for line in remarks(found)]),
+    ]
 
 
 def _parameters(found: Identification) -> Table:
@@ -77,7 +80,8 @@ def _parameters(found: Identification) -> Table:
     return Table(["", "value", "90 % interval", "unit", "remark"], rows, words=True)
 
 
-def _errors(found: Identification) -> Table:
+def errors_table(found: Identification) -> Table:
+    """The error of each channel in its unit, and against the noise floor."""
     rows = []
     for (experiment, channel), error in found.error.items():
         noise = found.fit.problem.floor.channels[experiment, channel]
@@ -122,7 +126,7 @@ def _column(trial: Record, prediction: Channels, label: str) -> Column:
         unit = unit_of(channel)
         panels.append(Panel(both, over, Axis(f"{_short(channel)}, {unit}")))
         panels.append(Panel([left], over, Axis(f"off, {unit}"), height=0.55))
-    return Column(panels, condition_words(label))
+    return Column(panels, label)
 
 
 def _short(channel: str) -> str:

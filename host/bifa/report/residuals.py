@@ -8,7 +8,7 @@ import numpy as np
 
 from bifa.report.chart import Axis, Chart, Column, Panel, Series, thinned
 from bifa.report.evidence import BASE, COMPLETED, MODEL_KEYS
-from bifa.report.words import channel_words, condition_words
+from bifa.report.words import channel_words
 
 _QUANTITIES = ("force", "displacement", "pressure")
 
@@ -38,7 +38,7 @@ def _column(trace: Mapping) -> Column:
         Series((key,), *thinned(trace["time_s"], trace[side], 240), colour)
         for key, side, colour in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
     ]
-    title = f"{condition_words(_label(trace))}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
+    title = f"{_label(trace)}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
     return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)
 
 

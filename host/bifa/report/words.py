@@ -117,9 +117,18 @@ def unit_of(name: str) -> str:
     return name.rpartition("_")[2]
 
 
-def condition_words(label: str) -> str:
-    """A trial's label with a walk called so."""
-    return label.replace("locomotion", "walk", 1)
+def gait_words(gait: Mapping[str, float]) -> str:
+    """ "2.72 s, head 204° and tail 332° ahead, vacuum in 0.65 (body), 0.44 (head) and 0.44 (tail) of the cycle"."""
+    head, tail = (f"{gait[f'psi1{i}_deg']:.0f}°" for i in (2, 3))
+    body, front, rear = (f"{gait[f'duty_{part}']:.2f}" for part in _PARTS)
+    vacuum = f"vacuum in {body} (body), {front} (head) and {rear} (tail) of the cycle"
+    return f"{plain(gait['period_s'])}{NBSP}s, head {head} and tail {tail} ahead, {vacuum}"
+
+
+def gait_parameter_words(name: str) -> str:
+    """ "period, s" or "vacuum, body": one of a gait's numbers."""
+    words = {"period_s": "period, s", "psi12_deg": "head ahead, °", "psi13_deg": "tail ahead, °"}
+    return words.get(name, name.replace("duty_", "vacuum, "))
 
 
 def parameter_words(name: str) -> str:
@@ -153,7 +162,7 @@ def effect_parameter(effect: str, name: str) -> tuple[str, str]:
 def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
     """Text of the engine with its identifiers in words; `labels`: what trials are called, by file."""
     if labels:
-        text = _FILE.sub(lambda found: condition_words(labels.get(found[0], found[0])), text)
+        text = _FILE.sub(lambda found: labels.get(found[0], found[0]), text)
     text = (
         _IDENTIFIER.sub(lambda found: _said(found[0]), text)
         .replace("locomotion", "walking")

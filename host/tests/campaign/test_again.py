@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.campaign.again import ROUNDS, Trades, again, judged
+from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, save_gait
@@ -75,6 +75,7 @@ def test_a_gait_that_is_predicted_ends_it(folders):
     rounds, seen = go_round(folders, ROBOT, [])
     assert len(rounds) == 1
     assert seen == []
+    assert (rounds[0]["gait"], rounds[0]["ended"]) == (FAST.as_dict(), "predicted")
     assert rounds[0]["floor_mm"] == pytest.approx(0.1, rel=0.1)
     assert rounds[0]["error_mm"] <= 1.1 * rounds[0]["floor_mm"]
     assert rounds[0]["predicted_mm_s"] == pytest.approx(rounds[0]["measured_mm_s"], rel=0.01)
@@ -89,12 +90,20 @@ def test_a_gait_that_is_not_is_fed_back_and_the_next_one_judged(folders):
     assert len(seen[0]) == 6
     walks = read_dataset(folders[1] / "rounds" / "walks-2")
     assert {Gait(**trial.gait) for trial in walks.trials} == {FASTER}
+    assert [(Gait(**r["gait"]), r["ended"]) for r in rounds] == [(FAST, None), (FASTER, "predicted")]
 
 
 def test_it_ends_where_nothing_changes_any_more(folders):
     rounds, _ = go_round(folders, SLIPPERY, [SLIPPERY, SLIPPERY])
     assert len(rounds) == ROUNDS, "the second round names something else"
     assert [tuple(r["effects"]) for r in rounds] == [(), ("hysteresis",), ("hysteresis",)]
+    assert [r["ended"] for r in rounds] == [None, None, "unchanged"]
+
+
+def test_it_ends_with_as_many_rounds_as_there_may_be():
+    missed = replace(judged(SLIPPERY, (), walked({"completed": FAST})), effects=("leak",))
+    rounds = [missed, replace(missed, effects=("hysteresis",)), missed]
+    assert [ending(rounds[:count]) for count in (1, 2, 3)] == [None, None, Ending.MOST]
 
 
 def test_one_repeat_has_no_floor():

@@ -4,6 +4,7 @@ import pytest
 
 from bench.bench_uno import connected
 from bifa.link.errors import LinkError, RefusedError
+from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH
 
 pytestmark = pytest.mark.uno
 
@@ -74,7 +75,37 @@ def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(be
     assert bench.valves_on == before, "the waiting set was taken over in mid-cycle"
     bench.wait(20.0)
     assert bench.valves_on == [4, 6, 8], "at the boundary all are positive for good"
-    assert "[pressure_psi 5\n" in bench.say("show pressure_psi")
+    assert "[pressure_psi 5 psi (0 to 14 psi, default 8.5 psi) * power-up 8.5 psi\r\n" in bench.say("show pressure_psi")
+
+
+def test_answers_have_units_ranges_and_marks(bench):
+    assert bench.say("set period_s 2.72") == "[period_s 5.7 -> 2.72 s\r\nok\r\n"
+    assert bench.say("set duty_body 0.6535") == "[duty_body 0.5 -> 0.6535\r\nok\r\n"
+    marked = [line for line in bench.say("show").split("\r\n") if "*" in line]
+    assert marked == [
+        "[period_s 2.72 s (0.5 to 60 s, default 5.7 s) * power-up 5.7 s",
+        "[duty_body 0.6535 (0 to 1, default 0.5) * power-up 0.5",
+    ]
+    assert bench.say("save", 1.0).endswith("ok\r\n")
+    bench.board.reset("power-on")
+    bench.wait(0.3)
+    assert bench.say("show period_s") == "[period_s 2.72 s (0.5 to 60 s, default 5.7 s)\r\nok\r\n"
+
+
+def test_version_and_stream_say_what_they_are(bench):
+    assert f"protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}, started by " in bench.say("version")
+    header = "[>sequence,time_us,state,psi body,head,tail,command body,head,tail,phase_deg body,head,tail\r\n"
+    for _ in range(2):  # also while it streams
+        assert header in bench.say("stream on", 0.3)
+
+
+def test_help_is_printed_whole_and_with_line_ends_for_bare_terminals(bench):
+    said = bench.say("help", 0.5)
+    for _, usage, text in CONSOLE_COMMANDS:
+        assert f"[{usage}  {text}\r\n" in said
+    for parameter in PARAMETERS:
+        assert f"[{parameter.name}  {parameter.help}\r\n" in bench.say(f"help {parameter.name}")
+    assert said.count("\n") == said.count("\r\n") == said.count("\r")
 
 
 @pytest.mark.parametrize("noise", [b"\x9c", b"\n", b"x", b"nonsense\n", b"\x00\x01\x00"])

@@ -16,7 +16,7 @@ MONITOR = 3  # A3
 
 def test_dac_follows_the_set_point_and_ends_at_14_psi(bench):
     for value, code in (("8.5", 267), ("0", 0), ("14", COUNT_OF_14_PSI)):
-        assert bench.say(f"set pressure_psi {value}", 0.2).endswith("ok\n")
+        assert bench.say(f"set pressure_psi {value}", 0.2).endswith("ok\r\n")
         assert bench.board.dac_code == code
     for value in ("14.001", "15", "65535", "-1", "1e9", "nan", "inf", "0x20"):
         assert "error" in bench.say(f"set pressure_psi {value}", 0.1)
@@ -66,7 +66,7 @@ def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(ben
     assert "error" in bench.say("clear")
     bench.board.set_analog(MONITOR, monitor_volts(0))
     bench.wait(0.1)
-    assert bench.say("clear").endswith("ok\n")
+    assert bench.say("clear").endswith("ok\r\n")
 
 
 @pytest.mark.parametrize("mode", ["absent", "stuck", "held"])
@@ -81,7 +81,7 @@ def test_dac_that_does_not_answer_vents_and_names_itself(bench, mode):
     assert "error" in bench.say("clear", 0.3)
     bench.board.set_bus("dac")
     bench.wait(0.5)
-    assert bench.say("clear").endswith("ok\n")
+    assert bench.say("clear").endswith("ok\r\n")
 
 
 def test_brown_out_is_a_fault(bench):
@@ -101,7 +101,7 @@ def test_sensor_without_its_wire_vents(bench):
     assert "error" in bench.say("clear")
     bench.volts[1] = 2.5
     bench.wait(0.1)
-    assert bench.say("clear").endswith("ok\n")
+    assert bench.say("clear").endswith("ok\r\n")
 
 
 def test_silent_host_vents(bench):

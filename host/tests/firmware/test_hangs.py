@@ -58,7 +58,7 @@ def test_program_that_hangs_vents_and_restarts_into_a_fault_that_says_so(bench, 
     assert cause(bench) == expected
     assert f"[fault {expected}" in bench.say("status", 0.5)
     assert "error" in bench.say("run")
-    assert bench.say("clear").endswith("ok\n")
+    assert bench.say("clear").endswith("ok\r\n")
 
 
 def test_clock_that_stops_restarts_the_chip_though_the_main_loop_goes_on(bench):

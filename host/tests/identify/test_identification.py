@@ -13,10 +13,11 @@ from scipy.stats import binom
 from bifa.data import Dataset
 from bifa.identify.identification import identify
 from bifa.pipe_robot.unmeasured import PRIOR_SD
-from bifa.report.fit import fit_page
+from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
 from bifa.report.identification import draw
-from bifa.report.identification_tables import print_report, remarks
+from bifa.report.identification_remarks import remarks
 from bifa.report.page import render
+from bifa.report.terminal import print_sections, print_table
 from bifa.robot import load_model, save_model
 
 _DAYS = 8
@@ -114,14 +115,23 @@ def test_the_model_file_carries_the_uncertainty(found, tmp_path):
         assert np.sqrt(read.covariance.matrix[i, i]) == pytest.approx(interval.sd)
 
 
-def test_figures_and_report_name_everything(found, tmp_path):
+def test_figures_are_those_of_the_paper(found, tmp_path):
     paths = draw(found, tmp_path)
     assert [p.name for p in paths] == ["fig4_stiffness.png", "fig5_steps.png", "fig6_anchor.png", "walks.png"]
     assert all(p.stat().st_size > 10_000 for p in paths)
+
+
+def test_the_terminal_names_everything_in_words_within_80_columns(found):
     text = StringIO()
-    print_report(Console(file=text, width=100), found)
-    for name in (*found.intervals, "static_loading", "locomotion"):
-        assert name in text.getvalue()
+    console = Console(file=text, width=80)
+    print_sections(console, parameters_and_remarks(found))
+    print_table(console, errors_table(found))
+    lines = text.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert not re.findall(r"\b[a-z]+_[a-z]+\b", text.getvalue())
+    said = " ".join(text.getvalue().split())
+    for word in ("mass of the head", "area of the body", "force, static loading", "displacement of the head, walk"):
+        assert word in said, word
 
 
 def test_the_page_has_every_parameter_and_condition_in_words(found):

@@ -3,15 +3,29 @@
 import random
 import string
 
+import pyte
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS
-from bifa.link.units import from_wire
+from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, RESULTS, TABLE_HASH
+from bifa.link.units import BY_NAME, from_wire, range_text
 from harness.board import Board
 
-SHOWN = [f"[{p.name} {from_wire(p.name, p.default):g}" for p in PARAMETERS]
+
+def shown(name: str, value: str, at_power_up: str | None = None) -> str:
+    """The line of `show` for a parameter at `value`, where power-up loads another, `at_power_up`."""
+
+    def with_unit(text: str) -> str:
+        return f"{text} {BY_NAME[name].unit}".rstrip()
+
+    default = f"{from_wire(name, BY_NAME[name].default):g}"
+    mark = "" if at_power_up is None else f" * power-up {with_unit(at_power_up)}"
+    return f"[{name} {with_unit(value)} ({range_text(BY_NAME[name])}, default {with_unit(default)}){mark}"
+
+
+SHOWN = [shown(p.name, f"{from_wire(p.name, p.default):g}") for p in PARAMETERS]
+PERIOD = shown("period_s", "5.7")
 
 
 @pytest.fixture
@@ -40,22 +54,112 @@ def test_help_names_every_command_and_parameter(board):
     for parameter in PARAMETERS:
         assert parameter.name in text
         about = board.type(f"help {parameter.name}")
-        assert parameter.help in about[0]
-        assert about[1].startswith(f"[range {from_wire(parameter.name, parameter.minimum):g} to ")
+        default = f"{from_wire(parameter.name, parameter.default):g}"
+        assert about == [f"[{parameter.name}  {parameter.help}", shown(parameter.name, default), "ok"]
 
 
-def test_show_prints_what_set_was_told(board):
+def test_set_says_the_old_and_the_new_value_and_show_what_is_now(board):
     assert board.type("show") == [*SHOWN, "ok"]
-    for name, value in [("period_s", "2.72"), ("psi12_deg", "204.5"), ("duty_body", "0.6535"), ("coupling_per_s", "0")]:
-        assert board.type(f"set {name} {value}") == ["ok"]
-        assert board.type(f"show {name}") == [f"[{name} {value}", "ok"]
+    for name, old, new, unit in [
+        ("period_s", "5.7", "2.72", " s"),
+        ("psi12_deg", "270", "204.5", " deg"),
+        ("duty_body", "0.5", "0.6535", ""),
+        ("coupling_per_s", "10", "0", " 1/s"),
+    ]:
+        assert board.type(f"set {name} {new}") == [f"[{name} {old} -> {new}{unit}", "ok"]
+        assert board.type(f"show {name}") == [shown(name, new, old), "ok"]
+
+
+def test_show_marks_what_power_up_would_change(board):
+    def marked() -> list[str]:
+        return [line.split()[0][1:] for line in board.type("show") if "*" in line]
+
+    board.type("set period_s 3.3")
+    board.type("set duty_tail 0.25")
+    assert marked() == ["period_s", "duty_tail"]
+    board.type("save other")
+    assert marked() == ["period_s", "duty_tail"], "it is not what power-up loads"
+    board.type("save")
+    assert marked() == []
+    board.type("load baseline")
+    assert board.type("show period_s") == [shown("period_s", "5.7", "3.3"), "ok"]
+    board.type("load startup")
+    assert marked() == []
+    board.type("defaults confirm")
+    assert board.type("show") == [*SHOWN, "ok"]
+
+
+def test_the_longest_line_of_a_parameter_fits_80_columns(board):
+    for parameter in PARAMETERS:
+        longest = [from_wire(parameter.name, parameter.maximum - less) for less in (1, 2)]
+        board.type(f"set {parameter.name} {longest[0]:.6f}")
+    board.type("save")
+    for parameter in PARAMETERS:
+        board.type(f"set {parameter.name} {from_wire(parameter.name, parameter.maximum - 2):.6f}")
+    lines = board.type("show")
+    assert all("* power-up" in line for line in lines[:-1])
+    assert max(map(len, lines)) <= 80
+
+
+SAID = ["help", "version", "status", "show", "set period_s 4", "set period_s 99", "hold", "presets", "zero confirm"]
+SAID += ["help set", "help duty_body", "stream on", "plot on", "fly", "!", "x" * 70, "echo on", "run"]
+
+
+def test_a_bare_terminal_begins_every_line_at_its_margin(board):
+    """A terminal in raw mode, as picocom leaves it: a line feed alone goes down and no further."""
+    screen = pyte.HistoryScreen(120, 40, history=2000)
+    stream = pyte.ByteStream(screen)
+    for line in SAID:
+        board.write(line.encode() + b"\r\n")
+        board.sleep(0.05)
+        stream.feed(board.receive())
+    rows = [*screen.history.top, *(screen.buffer[y] for y in range(screen.lines))]
+    lines = ["".join(row[x].data for x in range(120)).rstrip() for row in rows]
+    assert "[period_s 5.7 -> 4 s" in lines
+    assert not [line for line in lines if line.startswith(" ")]
+
+
+def test_every_line_feed_has_its_carriage_return(board):
+    for line in SAID:
+        board.write(line.encode() + b"\n")
+        board.sleep(0.05)
+    text = board.receive()
+    assert text.count(b"\n") == text.count(b"\r\n") == text.count(b"\r") > 100
+
+
+def test_results_read_as_in_the_table(board):
+    words = dict(RESULTS)
+    assert board.type("fly") == [f"error {words['unknown']}"]
+    assert board.type("show speed") == [f"error {words['no_parameter']}"]
+    assert board.type("load nosuch") == [f"error {words['no_preset']}"]
+    assert board.type("save baseline") == [f"error {words['name']}"]
+    assert board.type("zero confirm")[-1] == f"error {words['unrest']}"
+
+
+def test_the_tables_hash_reads_as_the_host_writes_it(board):
+    assert f", protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}, started by power" in board.type("version")[0]
+
+
+def test_the_stream_says_what_its_columns_are_and_their_units(board):
+    board.write(b"stream on\n")
+    board.sleep(0.5)
+    header, *lines = board.receive().decode().splitlines()
+    columns = header.removeprefix("[>").split(",")
+    samples = [line.removeprefix(">").split(",") for line in lines if line.startswith(">")]
+    assert len(samples) > 40
+    assert {len(sample) for sample in samples} == {len(columns)}
+    assert columns[:4] == ["sequence", "time_us", "state", "psi body"]
+    assert columns[9:] == ["phase_deg body", "head", "tail"]
+    board.write(b"stream on\n")  # on request, also while it streams
+    board.sleep(0.05)
+    assert header in board.receive().decode().splitlines()
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
 def test_values_at_and_beyond_the_bounds(board, parameter):
     low, high = (from_wire(parameter.name, bound) for bound in (parameter.minimum, parameter.maximum))
     for good in (f"{low:g}", f"{high:g}", f"+{high:g}.000000000000", f"00{high:g}"):
-        assert board.type(f"set {parameter.name} {good}") == ["ok"], good
+        assert board.type(f"set {parameter.name} {good}")[-1] == "ok", good
     before = board.type("show")
     bad = [f"{high:g}.00000000001", f"{high + 1:g}", "-1", "-0.0000001", "99999999999999999999"]
     nonsense = ["nan", "NaN", "inf", "-inf", "1e1", "0x5", "1,5", "5..7", "--5", ".", "", "-", "five", "5s", "1_0", "٣"]
@@ -123,19 +227,20 @@ def test_lines_sent_at_once_are_answered_in_order(board):
     board.write(b"save one\nfly\nset period_s 3\nsave two\nshow period_s\n")
     board.sleep(3)
     assert board.receive().decode().splitlines() == [
-        "ok", "error no such command; type help", "ok", "ok", "[period_s 3", "ok"]  # fmt: skip
+        "ok", "error no such command; type help", "[period_s 5.7 -> 3 s", "ok", "ok",
+        shown("period_s", "3", "5.7"), "ok"]  # fmt: skip
 
 
 def test_echo_and_backspace_for_a_bare_terminal(board):
-    assert board.type("shox\bw period_s") == ["[period_s 5.7", "ok"]
-    assert board.type("shox\x7fw period_s") == ["[period_s 5.7", "ok"]
+    assert board.type("shox\bw period_s") == [PERIOD, "ok"]
+    assert board.type("shox\x7fw period_s") == [PERIOD, "ok"]
     board.type("echo on")
     board.write(b"shox\bw period_s\r\n")
     board.sleep(0.02)
-    assert board.receive() == b"shox\b \bw period_s\n[period_s 5.7\nok\n"
+    assert board.receive() == f"shox\b \bw period_s\r\n{PERIOD}\r\nok\r\n".encode()
     board.write(b"version\r")  # the Enter key of most terminals
     board.sleep(0.02)
-    assert board.receive().endswith(b"ok\n")
+    assert board.receive().endswith(b"ok\r\n")
 
 
 def test_a_stop_byte_between_letters_stops_and_the_line_goes_on(board):
@@ -143,7 +248,7 @@ def test_a_stop_byte_between_letters_stops_and_the_line_goes_on(board):
     assert board.state == "running"
     got = board.type("sh!ow period_s")
     assert (board.state, board.valves) == ("stopped", 0)
-    assert got == ["[stopped: all valves off until clear", "[period_s 5.7", "ok"]
+    assert got == ["[stopped: all valves off until clear", PERIOD, "ok"]
     assert board.type("run") == ["error stopped: type clear first"]
     assert board.type("hold head vacuum") == ["error stopped: type clear first"]
     assert board.type("clear") == ["ok"]
@@ -164,14 +269,14 @@ def test_hold_runs_through_the_states(board):
 
 def test_presets(board):
     assert board.type("load obstacle") == ["ok"]
-    assert board.type("show period_s") == ["[period_s 6", "ok"]
+    assert board.type("show period_s") == [shown("period_s", "6", "5.7"), "ok"]
     board.type("set period_s 3.3")
     assert board.type("save mine") == ["ok"]
     assert board.type("save") == ["ok"]
     assert board.type("presets") == ["[baseline factory", "[obstacle factory", "[mine saved", "[startup saved", "ok"]
     board.reset()
     board.type("")
-    assert board.type("show period_s") == ["[period_s 3.3", "ok"]
+    assert board.type("show period_s") == [shown("period_s", "3.3"), "ok"]
     assert board.type("forget startup") == ["ok"]
     assert board.type("defaults confirm") == ["ok"]
     assert board.type("presets") == ["[baseline factory", "[obstacle factory", "ok"]
@@ -211,7 +316,8 @@ def test_text_and_frames_share_the_port(board):
         uno.status()
         for _ in range(5):
             uno.session.poll(0.002)
-        assert list(uno.session.lines) == [f"[period_s {1 + i / 10:g}", "ok"]
+        value = f"{1 + i / 10:g}"
+        assert list(uno.session.lines) == [shown("period_s", value, None if value == "5.7" else "5.7"), "ok"]
     assert uno.counters.bad == 0
 
 
@@ -219,4 +325,4 @@ def test_a_flood_is_told_and_survived(board):
     board.write(("".join(random.Random(1).choices(string.ascii_letters, k=100)) + "\n").encode() * 300)
     board.sleep(3)
     board.receive()
-    assert board.type("show period_s") == ["[period_s 5.7", "ok"]
+    assert board.type("show period_s") == [PERIOD, "ok"]

@@ -67,7 +67,7 @@ def test_what_the_uno_says_by_itself_outlasts_the_next_line_typed():
         uno.run()
         uno.stop()  # reads on until the Uno has confirmed it, and so takes in what it says of it
         assert type_line(uno, "show period_s", board) == [
-            "[stopped: all valves off until clear", "[period_s 5.7", "ok"]  # fmt: skip
+            "[stopped: all valves off until clear", "[period_s 5.7 s (0.5 to 60 s, default 5.7 s)", "ok"]  # fmt: skip
 
 
 def test_leaving_turns_the_valves_off():
@@ -147,7 +147,10 @@ def test_upload_and_console_on_the_virtual_robot(tmp_path):
     assert done.exit_code == 0, done.output
     assert "read back equal, saved as fast walking for 1 s valves off" in " ".join(done.output.split())
     done = runner.invoke(app, ["console", "--port", "virtual"], input="show period_s\nset period_s 4\nshow period_s\n")
-    assert done.output.splitlines() == ["[period_s 5.7", "ok", "ok", "[period_s 4", "ok"]
+    period = "s (0.5 to 60 s, default 5.7 s)"
+    assert done.output.splitlines() == [
+        f"[period_s 5.7 {period}", "ok", "[period_s 5.7 -> 4 s", "ok", f"[period_s 4 {period} * power-up 5.7 s",
+        "ok"]  # fmt: skip
     assert runner.invoke(app, ["console", "--port", "virtual"], input="fly\n").exit_code == 1
 
 

@@ -16,6 +16,7 @@ from harness.terminal import Terminal
 pytestmark = pytest.mark.real_time
 
 UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
+PERIOD = "s (0.5 to 60 s, default 5.7 s)"
 KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})
 
 
@@ -48,18 +49,18 @@ def enters(console: Terminal, line: str, *answers: str, keys: str = "") -> None:
 def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
     console.presses("help" + ENTER)
     console.sees("[save [NAME]  keep", "[load PRESET", "[parameters: period_s", "[try: set period_s 6, run")
-    enters(console, "help period_s", "[period_s  time of one cycle (1/f)", "[range 0.5 to 60 s, default 5.7, now 5.7")
-    enters(console, "set period_s 4", "ok")
+    enters(console, "help period_s", "[period_s  time of one cycle (1/f)", f"[period_s 5.7 {PERIOD}")
+    enters(console, "set period_s 4", "[period_s 5.7 -> 4 s", "ok")
     enters(console, "run", "ok")
     console.sees(" running  psi: body", "vacuum    tail", "positive")
     enters(console, "set period_s 400", "error out of range; period_s is 0.5 to 60 s")
-    enters(console, "show period_s", "[period_s 4", "ok")
+    enters(console, "show period_s", f"[period_s 4 {PERIOD} * power-up 5.7 s", "ok")
     enters(console, "save fast", "ok")
     enters(console, "stop", "ok")
     console.sees(" idle ")
     enters(console, "load baseline", "ok")
     enters(console, "load fast", "ok")
-    enters(console, "show period_s", "[period_s 4", "ok")
+    enters(console, "show period_s", f"[period_s 4 {PERIOD} * power-up 5.7 s", "ok")
     console.presses(CTRL_D)
     assert console.exit_status() == 0
 
@@ -67,10 +68,10 @@ def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
 def test_completion_shows_what_a_parameter_means_and_what_it_is_now(console, uno):
     console.presses("set per")
     console.sees("period_s  time of one cycle (1/f); 0.5 to 60 s, now 5.7")
-    enters(console, "set period_s 3", "ok", keys=TAB + " 3")
+    enters(console, "set period_s 3", "[period_s 5.7 -> 3 s", "ok", keys=TAB + " 3")
     console.presses("set period_s ")
     console.sees("3      now; 0.5 to 60 s")
-    enters(console, "set period_s 7", "ok", keys="7")
+    enters(console, "set period_s 7", "[period_s 3 -> 7 s", "ok", keys="7")
     enters(console, "save slow-one", "ok")
     enters(console, "load baseline", "ok")
     console.presses("load slo")
@@ -78,7 +79,7 @@ def test_completion_shows_what_a_parameter_means_and_what_it_is_now(console, uno
     console.presses(TAB)
     console.sees_line("uno> load slow-one")
     enters(console, "load slow-one", "ok", keys=" ")
-    enters(console, "show period_s", "[period_s 7", "ok")
+    enters(console, "show period_s", f"[period_s 7 {PERIOD} * power-up 5.7 s", "ok")
 
 
 def test_completion_knows_the_grammar():
@@ -93,7 +94,7 @@ def test_completion_knows_the_grammar():
 
 
 def test_history_outlasts_the_program(console, uno, tmp_path):
-    enters(console, "set period_s 9", "ok")
+    enters(console, "set period_s 9", "[period_s 5.7 -> 9 s", "ok")
     console.presses(CTRL_D)
     assert console.exit_status() == 0
     with Terminal(tmp_path, "console", "--port", uno.device) as again:
@@ -147,15 +148,15 @@ def test_unplugged_is_said_at_once(console, uno):
 
 
 def test_a_restarted_uno_is_said_and_the_conversation_goes_on(console, uno):
-    enters(console, "set period_s 4", "ok")
+    enters(console, "set period_s 4", "[period_s 5.7 -> 4 s", "ok")
     uno.board.reset()
     console.sees("-- the Uno restarted, all valves off; connected again, with its start preset")
-    enters(console, "show period_s", "[period_s 5.7", "ok")
+    enters(console, "show period_s", f"[period_s 5.7 {PERIOD}", "ok")
     console.sees(" idle ")
 
 
 def test_an_open_console_keeps_host_timeout_s_from_venting_and_its_end_does_not(console, uno):
-    enters(console, "set host_timeout_s 0.4", "ok")
+    enters(console, "set host_timeout_s 0.4", "[host_timeout_s 0 -> 0.4 s", "ok")
     enters(console, "run", "ok")
     uno.wait(1.5)
     assert uno.board.state == "running"
@@ -166,7 +167,22 @@ def test_an_open_console_keeps_host_timeout_s_from_venting_and_its_end_does_not(
 
 def test_several_lines_pasted_are_answered_in_order(console):
     console.presses("\x1b[200~set period_s 3\nshow period_s\nset duty_body 2\x1b[201~" + ENTER)
-    console.sees("[period_s 3", "error out of range; duty_body is 0 to 1")
+    console.sees(f"[period_s 3 {PERIOD} * power-up 5.7 s", "error out of range; duty_body is 0 to 1")
+
+
+def test_pyserials_miniterm_shows_answers_from_the_margin_on(uno, tmp_path):
+    """As it comes, without an option; `echo on` makes what is typed visible."""
+    terminal = Terminal(tmp_path, program=("serial.tools.miniterm", uno.device, "250000"))
+    with terminal:
+        terminal.sees("--- Miniterm on")
+        terminal.presses("echo on" + ENTER)
+        terminal.sees_line("ok")
+        terminal.presses("set period_s 4" + ENTER)
+        terminal.sees_line("set period_s 4")
+        terminal.sees_line("[period_s 5.7 -> 4 s")
+        terminal.presses("show period_s" + ENTER)
+        terminal.sees_line(f"[period_s 4 {PERIOD} * power-up 5.7 s")
+        assert not [line for line in terminal.look() if line.startswith(" ")]
 
 
 def test_the_status_lines_fit_and_tell_old_telemetry():

@@ -179,7 +179,7 @@ def test_what_is_shown_is_printable_and_says_what_it_was(text):
 def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(tmp_path):
     uno = PtyUno()
     served = uno.board.receive
-    uno.board.receive = lambda: served().replace(b"ok\n", b"[\x1b]0;owned\x07 \x9b2J\nok\n")
+    uno.board.receive = lambda: served().replace(b"ok\r\n", b"[\x1b]0;owned\x07 \x9b2J\r\nok\r\n")
     done = CliRunner().invoke(app, ["console", "--port", uno.device], input="show period_s\n" * 3)
     uno.unplug()
     assert done.exit_code == 0, done.output

@@ -35,6 +35,43 @@ def test_words_stand_for_the_enumerators_of_the_code(name):
     assert [re.sub(r"(?<!^)([A-Z])", r"_\1", e).lower() for e in enumerators] == list(words)
 
 
+@pytest.fixture
+def phrases(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "schema"))
+    import phrases
+
+    return phrases
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [[], ["a"], ["no such preset", "no such parameter", "no such command"], ["aaaaaaaa"], ["x\x7e", "{}~~{}~~"]],
+)
+def test_packed_texts_say_the_same_and_are_no_longer(phrases, texts):
+    found, packed = phrases.pack(texts)
+    unpacked = [
+        "".join(found[ord(c) - phrases.FIRST] if ord(c) >= phrases.FIRST else c for c in text) for text in packed
+    ]
+    assert unpacked == texts
+    assert all(phrase.isascii() for phrase in found)
+    assert sum(map(len, packed)) + sum(len(phrase) + 1 for phrase in found) <= sum(map(len, texts))
+
+
+@pytest.mark.parametrize("text", ["psi \N{MULTIPLICATION SIGN} 2", "line\nend", "end\0"])
+def test_what_cannot_be_packed_is_refused(phrases, text):
+    with pytest.raises(ValueError, match="only plain ASCII"):
+        phrases.pack(["plain", text])
+
+
+def test_every_command_takes_as_many_words_as_its_usage_shows():
+    source = (ROOT / "lib/commands/command_table.cpp").read_text()
+    rows = re.findall(r"^    0x(\d)(\d),  // (.+)$", source, re.M)
+    assert [usage for _, _, usage in rows] == [usage for _, usage, _ in table.CONSOLE_COMMANDS]
+    for least, most, usage in rows:
+        assert int(most) == len(usage.split()), usage
+        assert int(least) == len(re.sub(r" \[\w+\]", "", usage).split()), usage
+
+
 def test_files_know_the_ranges_of_the_uno():
     assert list(RANGES) == [parameter.name for parameter in table.PARAMETERS]
     for parameter in table.PARAMETERS:

@@ -191,7 +191,7 @@ def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_sa
         rig.instruments.stop = deaf
         uno.connect()
         with pytest.raises(
-            BifaError, match=r"anchor_8\.5psi.*3 times over: the sync edges do not show the pause.*repeat"
+            BifaError, match=r"anchor pull, 8\.5 psi.*3 times over: the sync edges do not show the pause.*repeat"
         ):
             record_trial(rig, uno, PLAN[2])
         assert len(tries) == 3

@@ -92,6 +92,36 @@ PREDICTION_ERRORS = [
     for trials in ("fitted", "held-out")
 ]
 LABELS = {"static_large_0psi_2mm_s_1.csv": "static loading, large, 0 psi, 2 mm/s (run 1)"}
+_GAIT = {
+    "period_s": 2.8,
+    "psi12_deg": 204.5,
+    "psi13_deg": 331.7,
+    "duty_body": 0.6535,
+    "duty_head": 0.44,
+    "duty_tail": 0.4,
+}
+ROUNDS = [
+    {
+        "effects": ["hysteresis"],
+        "gait": _GAIT,
+        "predicted_mm_s": 21.4,
+        "measured_mm_s": 20.6,
+        "spread_mm_s": 0.01,
+        "error_mm": 2.31,
+        "floor_mm": 0.104,
+        "ended": None,
+    },
+    {
+        "effects": ["hysteresis", "valve_latency"],
+        "gait": _GAIT | {"period_s": 2.61},
+        "predicted_mm_s": 20.87,
+        "measured_mm_s": 20.88,
+        "spread_mm_s": 0.02,
+        "error_mm": 0.117,
+        "floor_mm": None,
+        "ended": "predicted",
+    },
+]
 _GAITS = (("baseline", 5.7, 8.0, 10.8), ("base", 2.9, 20.4, 23.3), ("completed", 2.8, 20.6, 23.3))
 
 
@@ -143,7 +173,7 @@ def traces():
             [
                 ("static loading, small, 0 psi, 2 mm/s", "force_N", 5.0),
                 ("static loading, large, 0 psi, 2 mm/s", "force_N", 20.0),
-                ("locomotion, period 5.7 s", "pressure_body_psi", 8.0),
+                ("walk, period 5.7 s", "pressure_body_psi", 8.0),
             ]
         )
     ]
@@ -168,6 +198,7 @@ def summary(sealed=True):
         "remainder": DIAGNOSIS["remainder"],
         "error": ERROR,
         "prediction_error": PREDICTION_ERRORS,
+        "rounds": ROUNDS,
         "robustness": {
             "baseline": [0.0] * 151 + np.linspace(3, 11, 105).tolist(),
             "base": [0.0] * 10 + np.linspace(20.2, 20.6, 246).tolist(),

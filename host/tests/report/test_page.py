@@ -2,18 +2,24 @@
 
 import json
 import re
+from io import StringIO
 
 import numpy as np
 import pytest
 
+from bifa.campaign.page import prediction_table, rounds_section, speed_table
+from bifa.cli.diagnose import print_diagnosis
 from bifa.effects import library
 from bifa.files import TargetError
 from bifa.report.animation import FRAMES_PER_S, animate_walks
-from bifa.report.diagnosis import diagnosis_page, verdict_sentence
+from bifa.report.diagnosis import diagnosis_page, settings_words, verdict_sentence
 from bifa.report.page import Page, Section, Table, render, write_page
 from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
+from bifa.report.terminal import print_table
 from bifa.report.words import effect_words, quantity, spoken
+from bifa.robot.gait import BASELINE
+from bifa.screen import Console
 from tests.report import sample
 
 
@@ -75,6 +81,21 @@ def test_the_first_screen_answers_and_says_what_its_words_mean(html):
 
 def test_the_page_says_how_many_robots_do_not_walk(html):
     assert "59 % of 256 robots" in text_of(html)
+
+
+def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
+    section = text_of(html[html.index('id="gaits-that-no-fit-has-seen"') :].split("</section>")[0])
+    assert "Round 1: the model has hysteresis added to it, its gait is 2.80 s, head 204° and tail 332° ahead" in section
+    assert "Round 2: the model has hysteresis and valve latency added to it, its gait is 2.61 s" in section
+    assert "1 21.40 20.60 ± 0.01 2.31 0.104 2 20.87 20.88 ± 0.02 0.117" in section
+    assert "It ended after round 2: the speed of its gait is predicted to within what repeats differ by" in section
+
+
+@pytest.mark.parametrize(("ended", "why"), [("unchanged", "predicted no better"), ("most", "at most 3 rounds")])
+def test_rounds_that_end_without_a_prediction_say_so(ended, why):
+    section = rounds_section([*sample.ROUNDS[:1], sample.ROUNDS[1] | {"ended": ended}])
+    assert section.paragraphs[-1].startswith("It ended after round 2: ")
+    assert why in section.paragraphs[-1]
 
 
 def test_the_seal_is_explained_where_there_is_one(html):
@@ -147,7 +168,7 @@ def test_quantities_have_units_that_suit_them():
 
 def test_text_of_the_engine_is_spoken():
     assert spoken("force_N in static_loading, mu_s") == "Force in static loading, static friction coefficient"
-    assert spoken("see a_1.csv", {"a_1.csv": "locomotion, period 3 s"}) == "See walk, period 3 s"
+    assert spoken("see a_1.csv", {"a_1.csv": "walk, period 3 s"}) == "See walk, period 3 s"
 
 
 def test_the_animation_moves_as_the_record_does():
@@ -160,3 +181,48 @@ def test_the_animation_moves_as_the_record_does():
     assert tail[-1] - tail[0] == pytest.approx(way, abs=0.2)
     assert "prefers-reduced-motion" in svg
     assert np.all(np.diff([float(m) for m in re.findall(r">(\d+)(?: mm)?</text>", svg)][:3]) > 0)
+
+
+def test_the_terminal_says_a_diagnosis_in_words_within_80_columns():
+    """Tables and sentences of the page, nothing else, and no identifier."""
+    text = StringIO()
+    console = Console(file=text, width=80)
+    diagnosis = sample.DIAGNOSIS
+    print_diagnosis(console, diagnosis, sample.LABELS)
+    lines = text.getvalue().splitlines()
+    assert lines[0] == "identified"
+    assert max(map(len, lines)) <= 80
+    assert re.findall(r"\b\w+_\w+\b", text.getvalue()) == []
+    said = " ".join(text.getvalue().split())
+    for words in (
+        "hysteresis, 4.4 N over 2.7 mm",
+        "cannot tell it from viscoelasticity",
+        "as in static loading, large, 0 psi, 2 mm/s (run 1)",
+        "4.39 N to 4.41 N",
+        "A further experiment would tell hysteresis from viscoelasticity: static loading, large, 0 psi, 0.5 mm/s.",
+    ):
+        assert words in said, words
+    for table in (speed_table(sample.summary()["gaits"]), prediction_table(sample.PREDICTION_ERRORS)):
+        print_table(console, table)
+    assert max(map(len, text.getvalue().splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("experiment", "settings", "words"),
+    [
+        (
+            "anchor_pull",
+            {"pressure_psi": 8.5, "rate_mm_s": 40.0, "direction": "backward"},
+            "anchor pull, 8.5 psi, 40 mm/s, backward",
+        ),
+        (
+            "locomotion",
+            {"gait": BASELINE.as_dict()},
+            "walk, 5.70 s, head 270° and tail 90° ahead, "
+            "vacuum in 0.50 (body), 0.50 (head) and 0.50 (tail) of the cycle",
+        ),
+        ("locomotion", {"inclination_deg": 10.0}, "walk, pipe at 10 degrees"),
+    ],
+)
+def test_an_experiment_is_told_with_its_settings(experiment, settings, words):
+    assert settings_words({"experiment": experiment, "settings": settings}).replace("\N{NO-BREAK SPACE}", " ") == words

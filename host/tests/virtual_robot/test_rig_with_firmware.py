@@ -30,10 +30,10 @@ def say(rig, line: str) -> str:
 
 
 def test_the_image_walks_the_baseline_at_the_papers_speed(rig):
-    assert say(rig, "load baseline").endswith("ok\n")
+    assert say(rig, "load baseline").endswith("ok\r\n")
     rig.instruments.mount("locomotion")
     rig.instruments.start()
-    assert say(rig, "run").endswith("ok\n")
+    assert say(rig, "run").endswith("ok\r\n")
     rig.clock.sleep(6 * 5.7)
     record = rig.instruments.stop()
     time_s, head_mm = record["time_s"] - record["time_s"][0], record["displacement_head_mm"]

@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     text.clear();
     for (const char c : {'v', 'e', 'r', 's', 'i', 'o', 'n', '\n'}) board.send(static_cast<uint8_t>(c));
     board.run_ms(900);
-    if (text.find("ok\n") != std::string::npos) return 0;
+    if (text.find("ok\r\n") != std::string::npos) return 0;
   }
   abort();
 }

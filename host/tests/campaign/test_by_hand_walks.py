@@ -1,0 +1,120 @@
+"""The stages that walk, on a serial port with the camera's files: the image behind a pty, a second process as the lab.
+
+What computes between them is given: the gaits, and a diagnosis that errs at first.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bifa.campaign import loop
+from bifa.campaign.bench import Bench
+from bifa.campaign.loop import Effort, campaign
+from bifa.campaign.stages import run_stages
+from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.measure.by_hand import RAW, ByHand
+from bifa.measure.desk import Desk
+from bifa.measure.plan import BRISK
+from bifa.robot import nominal, save_model
+from bifa.robot.gait import BASELINE, Gait, save_gait
+from bifa.simulate import walk
+
+pytestmark = [pytest.mark.uno, pytest.mark.real_time]
+HOST = Path(__file__).parents[2]
+ROBOT = nominal()
+SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * ROBOT.values["mu_s"]})
+FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
+FASTER = Gait(2.6, 204.5, 331.7, 0.6535, 0.439, 0.439)
+EFFORT = Effort(quick=True, cycles=4, repeats=1)
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """(pty, watched folder) of a bench served by another process."""
+    link, files = tmp_path / "uno", tmp_path / "files"
+    files.mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness.lab", str(link), str(files)], cwd=HOST, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    yield link, files
+    process.terminate()
+    process.wait(10)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """What the stages before and between the walks leave: the day's data, models and gaits."""
+    folder = tmp_path / "run"
+    (folder / "separating").mkdir(parents=True)
+    columns = walk(ROBOT, BASELINE, time_s=np.arange(0.0, 6.0, 0.01)).columns
+    day = Trial("walk_1.csv", "locomotion", columns=columns, gait=BASELINE.as_dict(), repeat=1, session_order=1)
+    write_dataset(folder / "bench", Dataset(None, "day", {}, (day,), {}))
+    save_model(folder / "model-completed.toml", SLIPPERY)
+    save_gait(folder / "gait-base.toml", BRISK)
+    save_gait(folder / "gait-completed.toml", FAST)
+    (folder / "diagnosis.json").write_text('{"effects": []}')
+    return folder
+
+
+def walks(lab, folder, said, stop_at=None):
+    """Run the stages that walk; Ctrl-C as soon as `stop_at` is said."""
+    link, files = lab
+
+    def say(text: str) -> None:
+        said.append(text)
+        if stop_at is not None and stop_at in text:
+            raise KeyboardInterrupt
+
+    bench = Bench(str(link), hands=ByHand(Desk(say, files), files))
+    stages = [s for s in campaign(bench, EFFORT, lambda *_: None) if s.name in ("walk-base", "walk-completed", "again")]
+    assert [stage.by_hand for stage in stages] == [True, True, True]
+    run_stages(folder, stages)
+
+
+def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
+    fed = []
+
+    def diagnosed(dataset, bench, part):
+        fed.append({trial.file for trial in dataset.trials})
+        return SimpleNamespace(effects=[SimpleNamespace(name="stribeck")], final=ROBOT)
+
+    monkeypatch.setattr(loop, "_diagnosed", diagnosed)
+    monkeypatch.setattr(loop, "completed_model", lambda final: final)
+    monkeypatch.setattr(loop, "_robust_gait", lambda robot, bench, part: SimpleNamespace(gait=FASTER))
+
+    first = []
+    with pytest.raises(KeyboardInterrupt):
+        walks(lab, folder, first, stop_at="Trial 2 of 2")
+    assert not (folder / "walks-base").exists()
+
+    said = []
+    walks(lab, folder, said)
+    announced = [line.split(",")[0].strip() for line in said if line.strip().startswith("Trial")]
+    assert announced == ["Trial 2 of 2: walk", "Trial 1 of 1: walk", "Trial 1 of 1: walk"]
+    assert said.count("Nothing looks wrong. Enter keeps it, r repeats it, q discards it and stops.") == 3
+
+    for where, gait in (("walks-base", BRISK), ("walks-completed", FAST), ("rounds/walks-2", FASTER)):
+        walked = read_dataset(folder / where)
+        trial = walked.trials[-1]
+        assert Gait(**trial.gait) == gait
+        assert trial.extra["clock_error_s"] < 1e-3
+        assert trial.columns["displacement_head_mm"][-1] > 100.0
+        assert [path.name for path in (folder / where / RAW).glob("*.sync.csv")]
+    assert {Gait(**trial.gait) for trial in read_dataset(folder / "walks-base").trials} == {BASELINE, BRISK}
+
+    rounds = json.loads((folder / "rounds.json").read_text())
+    assert fed == [{"walk_1.csv", "walks-1/base_1.csv", "walks-1/completed_1.csv"}]
+    assert [(Gait(**one["gait"]), one["effects"]) for one in rounds] == [(FAST, []), (FASTER, ["stribeck"])]
+    assert rounds[0]["error_mm"] > 1.5 * rounds[1]["error_mm"]
+    assert rounds[1]["predicted_mm_s"] == pytest.approx(rounds[1]["measured_mm_s"], rel=0.005)
+    assert [one["ended"] for one in rounds] == [None, "predicted"]
+
+    again = []
+    walks(lab, folder, again)
+    assert again == [], "what was walked is not walked again"
