@@ -65,14 +65,14 @@ def _problem(effect: str | None, seed: int, folder: Path):
 
 def _fits(problem, starts: int, seed: int) -> tuple[np.ndarray, list[float]]:
     """Cost of the fit from each start over the best one found, and the processor's seconds that each took."""
-    from lacuna.estimation.afar import solve_from_afar
     from lacuna.estimation.fit import spread_starts
+    from lacuna.estimation.graduated import solve_graduated
 
     costs, seconds = [], []
     structure = problem.structure
     for place, start in enumerate(spread_starts(structure, structure.start(), starts + 1, seed)[1:]):
         began = time.process_time()
-        costs.append(solve_from_afar(problem, start, **_TO_THE_END).cost)
+        costs.append(solve_graduated(problem, start, **_TO_THE_END).cost)
         seconds.append(time.process_time() - began)
         print(f"\r{place + 1} of {starts}", end="\r", flush=True)
     return np.array(costs) / min(costs), seconds

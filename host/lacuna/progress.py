@@ -8,8 +8,9 @@ from typing import TextIO
 
 _QUIET_S = 2.0  # what is over before then says nothing
 # At most, by the size of the sets that are tried: parents grown, effects tried on each (None: the whole library),
-# and explanations refitted, from near, from afar and to the end.
-_STAGES = ((1, None, 15), (3, 7, 14), (3, 7, 10))
+# and explanations refitted: quickly, from the initial guess, and to convergence. In the first stage each effect may
+# also be begun anew.
+_STAGES = ((2, None, 19), (3, 7, 14), (3, 7, 10))
 
 
 def most_steps(effects: int) -> int:

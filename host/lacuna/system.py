@@ -30,7 +30,7 @@ class Parameter:
     a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
     deviation of its spread. `prior_sd`: standard deviation of what was known about it beforehand, around
     `value`; None: nothing was. `at_least` names another parameter that it cannot be below. `elsewhere`: values at
-    which fits from afar begin as well, where trials that isolate the parameter fit at several places alike.
+    which graduated fits begin as well, where trials that isolate the parameter fit at several places alike.
     """
 
     name: str
@@ -241,7 +241,7 @@ class System(Protocol):
         return True
 
     def isolates(self, trial: Record) -> bool:
-        """Whether a trial shows a few parameters by themselves. Fits from afar begin with such trials: in one where
+        """Whether a trial shows a few parameters by themselves. Graduated fits begin with such trials: in one where
         everything acts together, and small errors add up, they would lose their way."""
         return True
 

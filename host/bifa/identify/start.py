@@ -2,7 +2,7 @@
 
 Static loading gives the stiffness curve K and the area a of each actuator; where an actuator rests in its step
 responses pins K beyond the static range; supplies are read off the sensors. Everything else is found by the fit over
-all experiments, from afar.
+all experiments, graduated (`lacuna.estimation.graduated`).
 """
 
 from __future__ import annotations

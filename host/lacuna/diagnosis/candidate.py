@@ -12,8 +12,8 @@ from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.afar import Begun, begin, go_on, solve_from_afar
 from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, starting_point
+from lacuna.estimation.graduated import Isolated, fit_isolated, fit_together, solve_graduated
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, solve
@@ -114,9 +114,9 @@ class Profile:
         structure = self.problem.structure
         return structure.values(structure.theta(structure.start()))
 
-    def from_afar(self) -> np.ndarray:
-        """The base model's own start, with the effect as it is at the best point: what has been fitted without the
-        effect may have gone astray."""
+    def from_initial_guess(self) -> np.ndarray:
+        """The base model's initial guess, with the effect as it is at the best point: what has been fitted without the
+        effect may be in the wrong minimum."""
         structure = self.problem.structure
         effect = structure.system.effects[self.effect]
         own = {effect.full_name(p) for p in effect.parameters}
@@ -164,50 +164,50 @@ def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile
     return sorted(fits, key=lambda pair: pair[0].cost)
 
 
-def from_afar(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Each sketch, or what comes of beginning afar with its effect, whichever is better."""
+def from_initial_guess(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple[Fit, Profile]]:
+    """Each sketch, or a refit from the initial guess with its effect, whichever is better."""
     profiled = [p for _, p in sketched]
-    afar = _begun_afar(profiled, [p.from_afar() for p in profiled], crew)
-    return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, afar, strict=True)]
+    again = _refitted(profiled, [p.from_initial_guess() for p in profiled], crew)
+    return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, again, strict=True)]
 
 
 def anew(parent: Fit, profiled: Sequence[Profile], policy: Policy, crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Sketches that owe nothing to `parent`: begun afar with the effect at its typical size, the best first. The trials
-    that isolate parameters go first; the few that take most away there are followed to the end."""
-    alone = begin(parent.problem, parent.structure.start())
+    """Sketches that owe nothing to `parent`: from the initial guess, the effect at its typical size, the best first.
+    The trials that isolate parameters go first; the few that take most away there are followed to the end."""
+    alone = fit_isolated(parent.problem, parent.structure.start())
     names = [p.problem.structure.effects for p in profiled]
-    begun = crew.map("beginning anew with", names, begin, [(p.problem, p.at_typical_size()) for p in profiled])
+    begun = crew.map("restarting with", names, fit_isolated, [(p.problem, p.at_typical_size()) for p in profiled])
     leading = sorted(range(len(begun)), key=lambda k: begun[k].cost)[:_FOLLOWED]
     most = min((1.0 - policy.promising) * alone.cost, policy.reach * begun[leading[0]].cost)
     leading = [k for k in leading if begun[k].cost < most]
     jobs = [(profiled[k].problem, begun[k]) for k in leading]
-    found = crew.map("going on with", [names[k] for k in leading], _sketched_further, jobs)
+    found = crew.map("following up", [names[k] for k in leading], _sketched_further, jobs)
     fits = [(best_of(profiled[k].problem, [solution]), profiled[k]) for k, solution in zip(leading, found, strict=True)]
     return sorted(fits, key=lambda pair: pair[0].cost)
 
 
-def _begun_afar(profiled: Sequence[Profile], starts: Sequence[np.ndarray], crew: Crew) -> list[Solution]:
+def _refitted(profiled: Sequence[Profile], starts: Sequence[np.ndarray], crew: Crew) -> list[Solution]:
     names = [p.problem.structure.effects for p in profiled]
     jobs = [(p.problem, start) for p, start in zip(profiled, starts, strict=True)]
-    return crew.map("refitting from afar", names, _sketched_from_afar, jobs)
+    return crew.map("refitting from the initial guess", names, _sketched_graduated, jobs)
 
 
 def _sketched(problem: Problem, start: Point) -> Solution:
     return solve(problem, start, **_SKETCH)
 
 
-def _sketched_from_afar(problem: Problem, values: np.ndarray) -> Solution:
-    return solve_from_afar(problem, values, **_SKETCH)
+def _sketched_graduated(problem: Problem, values: np.ndarray) -> Solution:
+    return solve_graduated(problem, values, **_SKETCH)
 
 
-def _sketched_further(problem: Problem, begun: Begun) -> Solution:
-    return go_on(problem, begun, **_SKETCH)
+def _sketched_further(problem: Problem, begun: Isolated) -> Solution:
+    return fit_together(problem, begun, **_SKETCH)
 
 
 def finish(sketched: Fit) -> Fit:
-    """Refit to the end: from afar once more, since with the effect at its size the trials that isolate parameters lead
-    those back that went astray without it."""
-    again = solve_from_afar(sketched.problem, sketched.solution.point.values, **_REFIT)
+    """Refit to convergence: graduated once more, since with the effect at its size the trials that isolate parameters
+    lead those back that were in the wrong minimum without it."""
+    again = solve_graduated(sketched.problem, sketched.solution.point.values, **_REFIT)
     best = min(sketched.solution, again, key=lambda s: s.cost)
     return best_of(sketched.problem, [renewed(sketched.problem, best, **_REFIT)])
 

@@ -30,7 +30,7 @@ class Case:
         structure, split = Structure(self.system), self.split
         floor = estimate_noise(self.system, split.fit + split.judging)
         vectors = spread_starts(structure, structure.start(), starts, self.seed)
-        first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, from_afar=True)
+        first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, graduated=True)
         residuals = first.residuals() | evaluate_on(first, split.judging).residuals()
         sharper = floor.lowered_by(estimate_noise(self.system, split.fit + split.judging, residuals))
         again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], relative=_FINE)

@@ -13,7 +13,7 @@ from lacuna.diagnosis.candidate import (
     anew,
     finish,
     finish_elsewhere,
-    from_afar,
+    from_initial_guess,
     judge,
     profiles,
     sketches,
@@ -31,7 +31,7 @@ from lacuna.estimation.uncertainty import effective_samples
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 8, 3: 6}  # sets refitted, by their size: roughly,
-_SKETCHED_TWICE = {1: 4, 2: 3, 3: 2}  # the best of these from afar as well,
+_SKETCHED_TWICE = {1: 4, 2: 3, 3: 2}  # the best of these from the initial guess as well,
 _FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
 _ROUNDS = 4  # of finishing at most
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
@@ -170,9 +170,9 @@ def _grow(
 
 
 def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, policy: Policy, crew: Crew):
-    """A quick refit of the most promising, the best first; the best few from afar as well. Where one explains enough as
-    it is (it begins afar again when it is finished), only those are begun afar that could reach it. Where the base
-    leaves so much that it may have gone astray, effects are also begun anew."""
+    """A quick refit of the most promising, the best first; the best few from the initial guess as well. Where one
+    explains enough as it is (it restarts when it is finished), only those are that could reach it. Where the base
+    leaves so much that it may be in the wrong minimum, effects are also begun anew."""
     size = len(before.effects) + 1
     near = sketches(ranked[: _SKETCHED[size]], crew)
     again = near[: _SKETCHED_TWICE[size]]
@@ -186,7 +186,7 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, polic
         again = [pair for pair in again if pair[0].structure.effects not in begun and pair[0].cost < most]
         again = again[: _SKETCHED_TWICE[size] - len(fresh) or 1]
     best: dict[tuple[str, ...], tuple[Fit, Profile]] = {}
-    for fitted, profile in (*near, *from_afar(again, crew), *fresh):
+    for fitted, profile in (*near, *from_initial_guess(again, crew), *fresh):
         effects = fitted.structure.effects
         if effects not in best or fitted.cost < best[effects][0].cost:
             best[effects] = (fitted, profile)
@@ -194,7 +194,8 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, polic
 
 
 def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:
-    """From afar again for as long as that pays: a friction that went astray comes back in more than one go."""
+    """From the initial guess again for as long as that pays: a friction in the wrong minimum may need to restart more
+    than once."""
     for _ in range(_ROUNDS):
         further = judge(finish(candidate.fitted), split)
         fruitful = candidate.cost - further.cost > max(policy.promising * candidate.excess, _LEAST)

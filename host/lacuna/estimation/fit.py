@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lacuna.estimation.afar import solve_from_afar
+from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.problem import PLAIN, Point, Problem
 from lacuna.estimation.solve import ENOUGH, RELATIVE, Solution, cost_of, solve
@@ -84,15 +84,15 @@ def fit(
     starts: Sequence[np.ndarray] = (),
     max_iterations: int = 20,
     relative: float = RELATIVE,
-    from_afar: bool = False,
+    graduated: bool = False,
 ) -> Fit:
-    """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best. `from_afar`:
-    see `solve_from_afar`."""
+    """Fit all parameters of `structure` from each of `starts` (vectors; default its own); keep the best. `graduated`:
+    see `solve_graduated`."""
     problem = Problem(structure, trials, floor)
     vectors = list(starts) or [structure.start()]
     options = {"max_iterations": max_iterations, "relative": relative}
-    if from_afar:
-        solutions = [solve_from_afar(problem, v, **options) for v in vectors]
+    if graduated:
+        solutions = [solve_graduated(problem, v, **options) for v in vectors]
     else:
         solutions = [solve(problem, problem.start(v), **options) for v in vectors]
     return best_of(problem, solutions)
@@ -216,7 +216,7 @@ def fit_base(
         floor,
         starts=spread_starts(structure, structure.start(), starts, seed),
         max_iterations=max_iterations,
-        from_afar=True,
+        graduated=True,
     )
     sharper = estimate_noise(system, trials, first.residuals())
     again = fit(structure, trials, sharper, starts=[first.solution.point.values], max_iterations=10)

@@ -12,8 +12,8 @@ from bifa.identify.start import prepare
 from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.library import engine_effects
 from bifa.robot import ModelParameterError
-from lacuna.estimation.afar import solve_from_afar
 from lacuna.estimation.fit import spread_starts
+from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
@@ -61,7 +61,7 @@ def test_a_fit_finds_the_robot_from_anywhere_plausible(system, lab, seed):
     structure = Structure(system)
     problem = Problem(structure, system.trials, estimate_noise(system, system.trials))
     _, start = spread_starts(structure, structure.start(), 2, seed)
-    found = structure.theta(solve_from_afar(problem, start, max_iterations=20, relative=1e-3).point.values)
+    found = structure.theta(solve_graduated(problem, start, max_iterations=20, relative=1e-3).point.values)
     truth = {
         "body_damping_Ns_m": (lab.large.damping, 0.02),
         "body_alpha_n_per_s": (lab.large.fast, 0.02),

@@ -247,7 +247,9 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
         listener.bind((HOST, port))
         listener.listen()  # who comes before the server is up waits
     except OSError as error:
-        raise ServerError(f"port {port} of this computer cannot be had ({error}); choose another: --web-port") from None
+        raise ServerError(
+            f"port {port} of this computer cannot be opened ({error}); choose another: --web-port"
+        ) from None
     config = uvicorn.Config(
         live.app(), log_level="error", lifespan="off", ws="wsproto", timeout_graceful_shutdown=1, access_log=False
     )

@@ -5,8 +5,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from lacuna.estimation.afar import solve_from_afar
 from lacuna.estimation.fit import converged, fit, spread_starts
+from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.problem import PLAIN, Problem, View
 from lacuna.estimation.solve import solve
@@ -60,7 +60,7 @@ def problem_of(system: Jumping) -> Problem:
 def test_fits_end_at_the_truth_wherever_they_begin(seed):
     problem = problem_of(Jumping(seed, elsewhere=(1.0, 3.0)))
     for start in spread_starts(problem.structure, problem.structure.start(), 6, seed):
-        found = problem.structure.theta(solve_from_afar(problem, start, max_iterations=20).point.values)
+        found = problem.structure.theta(solve_graduated(problem, start, max_iterations=20).point.values)
         assert found == pytest.approx(TRUTH, abs=0.05)
 
 
@@ -69,7 +69,7 @@ def test_at_full_sharpness_a_jump_at_another_time_is_not_found():
     start = problem.structure.values(TRUTH | {"jump_s": 7.0})
     lost = solve(problem, problem.start(start), max_iterations=40).point.values[0]
     assert abs(lost - TRUTH["jump_s"]) > 0.1
-    assert solve_from_afar(problem, start, max_iterations=20).point.values[0] == pytest.approx(4.0, abs=0.01)
+    assert solve_graduated(problem, start, max_iterations=20).point.values[0] == pytest.approx(4.0, abs=0.01)
 
 
 def test_of_places_that_isolated_trials_cannot_tell_apart_all_together_choose():
@@ -77,17 +77,17 @@ def test_of_places_that_isolated_trials_cannot_tell_apart_all_together_choose():
     for elsewhere, place_m in (((3.2,), 3.0), ((), 1.0)):
         problem = problem_of(Jumping(1, elsewhere))
         isolated = problem.over(problem.trials[:1])
-        found = solve_from_afar(isolated, problem.structure.values(start), max_iterations=20)
+        found = solve_graduated(isolated, problem.structure.values(start), max_iterations=20)
         assert found.point.values[2] == pytest.approx(1.0, abs=0.02)  # alike: the start's own side stays
         if place_m == 3.0:
-            together = solve_from_afar(problem, problem.structure.values(start), max_iterations=20)
+            together = solve_graduated(problem, problem.structure.values(start), max_iterations=20)
             assert together.point.values[2] == pytest.approx(place_m, abs=0.02)
 
 
 def test_a_start_that_cannot_be_simulated_begins_from_what_was_known():
     problem = problem_of(Jumping(2, elsewhere=(1.0, 3.0)))
     start = problem.structure.values(TRUTH | {"shape": 15.0})
-    found = solve_from_afar(problem, start, max_iterations=20)
+    found = solve_graduated(problem, start, max_iterations=20)
     assert found.point.values[3] == pytest.approx(TRUTH["shape"], abs=0.1)
 
 

@@ -1,4 +1,4 @@
-"""Fits that begin far away: residuals are first looked at from a distance, and closer from view to view.
+"""Graduated fits, for starts that are far off: residuals are first smoothed and weighed loosely, then ever closer.
 
 A record that jumps (a snap-through, a foot that slips) and a prediction that jumps at another time differ by the whole
 jump until the two meet, and nothing says which way to go. Low-passed, the two overlap, and with a raised floor what is
@@ -27,34 +27,34 @@ _BETTER = 0.9  # of the cost that the start leads to, what one from elsewhere mu
 _ENOUGH, _HOPEFUL = 0.02, 3.0  # log-likelihood, and times the least cost: what leaves more is not followed any closer
 
 
-def solve_from_afar(
+def solve_graduated(
     problem: Problem, values: np.ndarray, *, max_iterations: int, relative: float = RELATIVE
 ) -> Solution:
     """Minimise the cost from `values`, wherever they are. Parameters of which something was known beforehand begin
     there, and stay until the others are near."""
-    return go_on(problem, begin(problem, values), max_iterations=max_iterations, relative=relative)
+    return fit_together(problem, fit_isolated(problem, values), max_iterations=max_iterations, relative=relative)
 
 
-class Begun(NamedTuple):
+class Isolated(NamedTuple):
     """Where the trials that isolate parameters lead, and what they then cost; 0 where there are none."""
 
     values: np.ndarray
     cost: float
 
 
-def begin(problem: Problem, values: np.ndarray) -> Begun:
+def fit_isolated(problem: Problem, values: np.ndarray) -> Isolated:
     """Fit the trials that isolate parameters, from `values`: a small part of the whole work."""
     free = _free(problem)
     values = np.where(np.isin(np.arange(len(values)), free), values, problem.structure.prior_mean())
     isolated = _isolated(problem)
     if not isolated.trials:
-        return Begun(values, 0.0)
+        return Isolated(values, 0.0)
     values = _followed(isolated, values, _ISOLATED, free).point.values
     found = _followed(isolated, values, (SHARP,), range(len(values)))
-    return Begun(found.point.values, found.cost)
+    return Isolated(found.point.values, found.cost)
 
 
-def go_on(problem: Problem, begun: Begun, *, max_iterations: int, relative: float = RELATIVE) -> Solution:
+def fit_together(problem: Problem, begun: Isolated, *, max_iterations: int, relative: float = RELATIVE) -> Solution:
     """Minimise the cost of all trials from where those that isolate parameters led."""
     values, every = begun.values, range(len(begun.values))
     isolated = _isolated(problem)
