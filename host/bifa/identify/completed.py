@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bifa.identify.robust import with_uncertainty
-from bifa.pipe_robot.learnt_terms import learnt_curves
+from bifa.pipe_robot.sites import learnt_curves
 from bifa.robot import Model
 from bifa.simulate import plant
 from lacuna.estimation.clustered import clustered_covariance

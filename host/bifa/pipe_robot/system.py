@@ -15,7 +15,7 @@ import numpy as np
 from bifa import robot
 from bifa.data import Dataset, Trial
 from bifa.errors import BifaError
-from bifa.pipe_robot import candidates, learnt_terms, regressors, sites
+from bifa.pipe_robot import candidates, regressors, sites
 from bifa.pipe_robot.accuracy import accuracy_of
 from bifa.pipe_robot.curves import FittedCurve
 from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK, Case, Inputs, inputs_of
@@ -151,12 +151,12 @@ class RobotSystem(System):
     def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record) -> Case | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
         place = self._place_in_session(trial)
-        inputs: Inputs = learnt_terms.corrected_inputs(trial.payload, learnt, place)
         try:
             plant, zeros = self._plant(self._key(theta, effects))
-            plant = learnt_terms.corrected(plant, learnt, place)
+            plant = sites.corrected(plant, learnt, place)
         except BifaError:
             return None
+        inputs: Inputs = sites.corrected_inputs(trial.payload, learnt, plant, place)
         return Case(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
 
     def _place_in_session(self, trial: Record) -> float:
@@ -220,7 +220,7 @@ class RobotSystem(System):
 
     @property
     def correction_sites(self) -> Mapping[str, CorrectionSite]:
-        return sites.sites(self.model, self.curves)
+        return sites.declared(self.model, self.curves)
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
         return tuple(
@@ -312,7 +312,7 @@ def _nothing(trial: Record) -> Channels:
 
 def _seen(channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case, trial: Record) -> Channels:
     """What the instruments show of a simulation."""
-    channels = learnt_terms.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
+    channels = sites.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
     return {name: channels[name] for name in trial.channels}
 
 

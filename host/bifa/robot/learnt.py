@@ -42,6 +42,10 @@ class LearntCurve:
             raise ModelParameterError("a learnt curve needs lower below upper, and rows of two finite values or more")
         object.__setattr__(self, "values", values)
 
+    def at(self, where, row: int = 0):
+        """What is added at `where`, a number or an array, by one of the rows."""
+        return np.interp(where, np.linspace(self.lower, self.upper, self.values.shape[1]), self.values[row])
+
 
 def check(name: str, curve: LearntCurve) -> None:
     """Raise ModelParameterError where there is no such term or the curve is not of its shape."""

@@ -8,7 +8,8 @@ from independent_lab import BASELINE, Lab
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
-from bifa.pipe_robot.learnt_terms import corrected, learnt_curves
+from bifa.pipe_robot.sites import corrected, learnt_curves, modules
+from bifa.robot.learnt import ROWS
 from bifa.simulate import plant
 from lacuna.system import Correction
 
@@ -42,6 +43,19 @@ def trial_of(system, experiment):
 
 def predict(system, theta, experiment, *corrections, effects=()):
     return system.predict(theta, effects, trial_of(system, experiment), corrections=corrections)
+
+
+def test_a_site_s_file_has_its_name_and_the_equations_have_its_rows():
+    assert all(module.SITE.name == name for name, module in modules().items())
+    in_equations = {name: len(module.SITE.rows) for name, module in modules().items() if module.SITE.equation}
+    assert in_equations == ROWS
+
+
+def test_a_curve_outside_the_equations_acts_somewhere():
+    hooks = ("plant", "inputs", "readings")
+    for name, module in modules().items():
+        own = [hook for hook in hooks if hasattr(module, hook)]
+        assert len(own) == (0 if module.SITE.equation else 1), name
 
 
 def test_a_damper_learnt_as_a_straight_line_is_more_damping(system, theta):

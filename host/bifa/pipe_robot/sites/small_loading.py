@@ -1,0 +1,23 @@
+"""The force of the small actuator's spring while it is loaded slowly, by direction: what it remembers of its way."""
+
+from bifa.pipe_robot.inputs import STATIC, Inputs, StaticInputs
+from bifa.pipe_robot.sites.site import Site, loading
+from bifa.robot.learnt import LearntCurve
+from bifa.simulate import Plant
+from lacuna.system import Channels
+
+SITE = Site(
+    "small_loading",
+    "force of the small actuator's spring while it is loaded slowly, by direction",
+    "small",
+    "N",
+    1.0,
+    rows=("extending", "contracting"),
+    experiments=(STATIC,),
+)
+
+
+def readings(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    if not isinstance(inputs, StaticInputs) or inputs.actuator != "small":
+        return {}
+    return loading(channels, curve, inputs)
