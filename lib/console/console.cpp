@@ -35,6 +35,16 @@ bool takes_words(uint8_t command, uint8_t count) {
 void print_word(const char* list, uint8_t index) { print(flash_text(list, index)); }
 uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
 void print_number_of(ParameterId id, uint32_t value) { print_decimal(value, decimals_of(id)); }
+/// With three decimals at least, so that two values read alike.
+void print_places(ParameterId id, uint32_t value) {
+  const uint8_t kLeast = 3;
+  print_decimal(value, decimals_of(id), kLeast);
+}
+void print_unit(ParameterId id) {
+  const FlashText unit = text_of(id, ParameterText::kUnit);
+  if (flash_byte(unit) != 0) print(' ');
+  print(unit);
+}
 void print_name(ParameterId id) {
   print('[');
   print(name_of(id));
@@ -197,9 +207,7 @@ void Console::help_on(const char* name) {
 
 void Console::print_value(ParameterId id, uint32_t value) {
   print_number_of(id, value);
-  const FlashText unit = text_of(id, ParameterText::kUnit);
-  if (flash_byte(unit) != 0) print(' ');
-  print(unit);
+  print_unit(id);
 }
 
 void Console::print_range(ParameterId id) {
@@ -314,9 +322,10 @@ void Console::set() {
   switch (parse_decimal(words_[2], decimals_of(id), minimum_of(id), maximum_of(id), value)) {
     case DecimalResult::kOk:
       print_name(id);
-      print_number_of(id, value_of(commands_.wanted(), id));
+      print_places(id, value_of(commands_.wanted(), id));
       print(BIFA_TEXT(" -> "));
-      print_value(id, value);
+      print_places(id, value);
+      print_unit(id);
       print_line_end();
       return answer(commands_.set(id, value));
     case DecimalResult::kNotANumber:

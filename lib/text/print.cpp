@@ -14,7 +14,7 @@ inline uint32_t flash_number(const uint32_t* address) { return flash_long(addres
 inline uint16_t flash_number(const uint16_t* address) { return flash_word(address); }
 
 template <typename Number, uint8_t kPlaces>
-void print_digits(Number value, uint8_t decimals, const Number (&powers)[kPlaces]) {
+void print_digits(Number value, uint8_t decimals, uint8_t last, const Number (&powers)[kPlaces]) {
   bool leading = true;
   uint8_t place = kPlaces;
   do {
@@ -24,8 +24,8 @@ void print_digits(Number value, uint8_t decimals, const Number (&powers)[kPlaces
     for (; value >= one; value -= one) ++digit;
     if (digit != '0' || place == decimals) leading = false;
     if (!leading) print(digit);
-    if (place == decimals && value != 0) print('.');
-  } while (place > decimals || value != 0);
+    if (place == decimals && (place > last || value != 0)) print('.');
+  } while (place > last || value != 0);
 }
 
 /// Prints what stands in flash up to the next phrase or the end, and returns where that is.
@@ -55,11 +55,12 @@ void print(const char* text) {
   for (; *text != '\0'; ++text) print(*text);
 }
 
-void print_decimal(uint32_t value, uint8_t decimals) {
+void print_decimal(uint32_t value, uint8_t decimals, uint8_t least) {
+  const uint8_t last = decimals - least;  // the place that is printed even if only zeros follow
   if (value <= UINT16_MAX && decimals < sizeof kShort / sizeof *kShort) {
-    print_digits(static_cast<uint16_t>(value), decimals, kShort);
+    print_digits(static_cast<uint16_t>(value), decimals, last, kShort);
   } else {
-    print_digits(value, decimals, kLong);
+    print_digits(value, decimals, last, kLong);
   }
 }
 

@@ -11,8 +11,9 @@ void print(const char* text);
 /// A carriage return as well: bare terminals begin the next line at the margin then. Texts with line ends have both too.
 void print_line_end();
 
-/// Prints value / 10^decimals without trailing zeros: (5700000, 6) -> "5.7".
-void print_decimal(uint32_t value, uint8_t decimals);
+/// Prints value / 10^decimals without trailing zeros: (5700000, 6) -> "5.7"; but `least` decimals (at most `decimals`)
+/// in any case: (5700000, 6, 3) -> "5.700".
+void print_decimal(uint32_t value, uint8_t decimals, uint8_t least = 0);
 void print_signed(int32_t value, uint8_t decimals);
 
 inline void print_number(uint32_t value) { print_decimal(value, 0); }

@@ -14,7 +14,7 @@ void tearDown() {}
 
 namespace {
 
-char printed[40];
+char printed[64];
 uint8_t length;
 
 /// From here on `printed` holds what is printed.
@@ -65,6 +65,31 @@ static void test_numbers_as_text() {
   expect_printed("-2147483648", INT32_MIN, 0);
 }
 
+static void expect_places(const char* text, uint32_t value, uint8_t decimals) {
+  begin_line();
+  print_decimal(value, decimals, 3);
+  TEST_ASSERT_EQUAL_STRING(text, printed);
+}
+
+static void test_numbers_with_three_decimals_at_least() {
+  expect_places("5.700", 5700000, 6);
+  expect_places("2.720001", 2720001, 6);
+  expect_places("60.000", 60000000, 6);
+  expect_places("0.000", 0, 4);
+  expect_places("0.6535", 6535, 4);
+  expect_places("0.650", 6500, 4);
+  expect_places("360.000", 360000, 3);
+}
+
+static void test_phrases_are_put_in_where_their_codes_stand() {
+  begin_line();
+  print(text_of(ParameterId::kPsi12Deg, ParameterText::kHelp));
+  TEST_ASSERT_EQUAL_STRING("phase of the head ahead of the body (psi_12)", printed);
+  begin_line();
+  print(text_of(ParameterId::kHostTimeoutS, ParameterText::kHelp));
+  TEST_ASSERT_EQUAL_STRING("vent after such silence of the host; 0 = never", printed);
+}
+
 static void test_texts_in_flash() {
   begin_line();
   print(BIFA_TEXT("a text in flash"));
@@ -97,6 +122,8 @@ static void test_parameters_and_presets() {
 static void run() {
   RUN_TEST(test_decimals);
   RUN_TEST(test_numbers_as_text);
+  RUN_TEST(test_numbers_with_three_decimals_at_least);
+  RUN_TEST(test_phrases_are_put_in_where_their_codes_stand);
   RUN_TEST(test_texts_in_flash);
   RUN_TEST(test_parameters_and_presets);
 }

@@ -62,7 +62,8 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
             progress.console.print(f"walk {repeat}: {uno.counters.text()}")
     writer.finish()
     console.print(
-        f"{out}: {repeats} walks of {cycles} cycles, firmware {hello.firmware}; look at it with: bifa check {out}"
+        f"{out}: {repeats} walk{'' if repeats == 1 else 's'} of {cycles} cycles, firmware {hello.firmware}; "
+        f"look at it with: bifa check {out}"
     )
 
 

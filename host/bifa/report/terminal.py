@@ -12,6 +12,7 @@ from bifa.report.words import NBSP
 from bifa.screen import Console
 
 _BETWEEN = 3  # spaces between columns
+_NARROWEST = 8  # characters of a column of figures, where its heading needs more than that
 
 
 def print_table(console: Console, content: Table) -> None:
@@ -26,7 +27,7 @@ def print_table(console: Console, content: Table) -> None:
         if not i or (content.words and i == len(content.columns) - 1):
             table.add_column(heading)
         else:  # rather the heads of figures in several lines than what they are of
-            most = max(map(len, [*heading.split(), *cells[i]])) if is_wide else None
+            most = max(_NARROWEST, *map(len, [*heading.split(), *cells[i]])) if is_wide else None
             table.add_column(heading, justify="right", max_width=most)
     for row in content.rows:
         table.add_row(*(plain_spaces(cell) for cell in row))

@@ -79,8 +79,8 @@ def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(be
 
 
 def test_answers_have_units_ranges_and_marks(bench):
-    assert bench.say("set period_s 2.72") == "[period_s 5.7 -> 2.72 s\r\nok\r\n"
-    assert bench.say("set duty_body 0.6535") == "[duty_body 0.5 -> 0.6535\r\nok\r\n"
+    assert bench.say("set period_s 2.72") == "[period_s 5.700 -> 2.720 s\r\nok\r\n"
+    assert bench.say("set duty_body 0.6535") == "[duty_body 0.500 -> 0.6535\r\nok\r\n"
     marked = [line for line in bench.say("show").split("\r\n") if "*" in line]
     assert marked == [
         "[period_s 2.72 s (0.5 to 60 s, default 5.7 s) * power-up 5.7 s",

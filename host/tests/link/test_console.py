@@ -24,6 +24,12 @@ def shown(name: str, value: str, at_power_up: str | None = None) -> str:
     return f"[{name} {with_unit(value)} ({range_text(BY_NAME[name])}, default {with_unit(default)}){mark}"
 
 
+def places(value: str) -> str:
+    """With three decimals at least, as `set` has them."""
+    whole, _, decimals = value.partition(".")
+    return f"{whole}.{decimals:0<3}"
+
+
 SHOWN = [shown(p.name, f"{from_wire(p.name, p.default):g}") for p in PARAMETERS]
 PERIOD = shown("period_s", "5.7")
 
@@ -66,7 +72,7 @@ def test_set_says_the_old_and_the_new_value_and_show_what_is_now(board):
         ("duty_body", "0.5", "0.6535", ""),
         ("coupling_per_s", "10", "0", " 1/s"),
     ]:
-        assert board.type(f"set {name} {new}") == [f"[{name} {old} -> {new}{unit}", "ok"]
+        assert board.type(f"set {name} {new}") == [f"[{name} {places(old)} -> {places(new)}{unit}", "ok"]
         assert board.type(f"show {name}") == [shown(name, new, old), "ok"]
 
 
@@ -115,7 +121,7 @@ def test_a_bare_terminal_begins_every_line_at_its_margin(board):
         stream.feed(board.receive())
     rows = [*screen.history.top, *(screen.buffer[y] for y in range(screen.lines))]
     lines = ["".join(row[x].data for x in range(120)).rstrip() for row in rows]
-    assert "[period_s 5.7 -> 4 s" in lines
+    assert "[period_s 5.700 -> 4.000 s" in lines
     assert not [line for line in lines if line.startswith(" ")]
 
 
@@ -227,7 +233,7 @@ def test_lines_sent_at_once_are_answered_in_order(board):
     board.write(b"save one\nfly\nset period_s 3\nsave two\nshow period_s\n")
     board.sleep(3)
     assert board.receive().decode().splitlines() == [
-        "ok", "error no such command; type help", "[period_s 5.7 -> 3 s", "ok", "ok",
+        "ok", "error no such command; type help", "[period_s 5.700 -> 3.000 s", "ok", "ok",
         shown("period_s", "3", "5.7"), "ok"]  # fmt: skip
 
 

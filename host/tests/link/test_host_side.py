@@ -149,7 +149,7 @@ def test_upload_and_console_on_the_virtual_robot(tmp_path):
     done = runner.invoke(app, ["console", "--port", "virtual"], input="show period_s\nset period_s 4\nshow period_s\n")
     period = "s (0.5 to 60 s, default 5.7 s)"
     assert done.output.splitlines() == [
-        f"[period_s 5.7 {period}", "ok", "[period_s 5.7 -> 4 s", "ok", f"[period_s 4 {period} * power-up 5.7 s",
+        f"[period_s 5.7 {period}", "ok", "[period_s 5.700 -> 4.000 s", "ok", f"[period_s 4 {period} * power-up 5.7 s",
         "ok"]  # fmt: skip
     assert runner.invoke(app, ["console", "--port", "virtual"], input="fly\n").exit_code == 1
 

@@ -50,7 +50,7 @@ def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
     console.presses("help" + ENTER)
     console.sees("[save [NAME]  keep", "[load PRESET", "[parameters: period_s", "[try: set period_s 6, run")
     enters(console, "help period_s", "[period_s  time of one cycle (1/f)", f"[period_s 5.7 {PERIOD}")
-    enters(console, "set period_s 4", "[period_s 5.7 -> 4 s", "ok")
+    enters(console, "set period_s 4", "[period_s 5.700 -> 4.000 s", "ok")
     enters(console, "run", "ok")
     console.sees(" running  psi: body", "vacuum    tail", "positive")
     enters(console, "set period_s 400", "error out of range; period_s is 0.5 to 60 s")
@@ -68,10 +68,10 @@ def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
 def test_completion_shows_what_a_parameter_means_and_what_it_is_now(console, uno):
     console.presses("set per")
     console.sees("period_s  time of one cycle (1/f); 0.5 to 60 s, now 5.7")
-    enters(console, "set period_s 3", "[period_s 5.7 -> 3 s", "ok", keys=TAB + " 3")
+    enters(console, "set period_s 3", "[period_s 5.700 -> 3.000 s", "ok", keys=TAB + " 3")
     console.presses("set period_s ")
     console.sees("3      now; 0.5 to 60 s")
-    enters(console, "set period_s 7", "[period_s 3 -> 7 s", "ok", keys="7")
+    enters(console, "set period_s 7", "[period_s 3.000 -> 7.000 s", "ok", keys="7")
     enters(console, "save slow-one", "ok")
     enters(console, "load baseline", "ok")
     console.presses("load slo")
@@ -94,7 +94,7 @@ def test_completion_knows_the_grammar():
 
 
 def test_history_outlasts_the_program(console, uno, tmp_path):
-    enters(console, "set period_s 9", "[period_s 5.7 -> 9 s", "ok")
+    enters(console, "set period_s 9", "[period_s 5.700 -> 9.000 s", "ok")
     console.presses(CTRL_D)
     assert console.exit_status() == 0
     with Terminal(tmp_path, "console", "--port", uno.device) as again:
@@ -148,7 +148,7 @@ def test_unplugged_is_said_at_once(console, uno):
 
 
 def test_a_restarted_uno_is_said_and_the_conversation_goes_on(console, uno):
-    enters(console, "set period_s 4", "[period_s 5.7 -> 4 s", "ok")
+    enters(console, "set period_s 4", "[period_s 5.700 -> 4.000 s", "ok")
     uno.board.reset()
     console.sees("-- the Uno restarted, all valves off; connected again, with its start preset")
     enters(console, "show period_s", f"[period_s 5.7 {PERIOD}", "ok")
@@ -156,7 +156,7 @@ def test_a_restarted_uno_is_said_and_the_conversation_goes_on(console, uno):
 
 
 def test_an_open_console_keeps_host_timeout_s_from_venting_and_its_end_does_not(console, uno):
-    enters(console, "set host_timeout_s 0.4", "[host_timeout_s 0 -> 0.4 s", "ok")
+    enters(console, "set host_timeout_s 0.4", "[host_timeout_s 0.000 -> 0.400 s", "ok")
     enters(console, "run", "ok")
     uno.wait(1.5)
     assert uno.board.state == "running"
@@ -179,7 +179,7 @@ def test_pyserials_miniterm_shows_answers_from_the_margin_on(uno, tmp_path):
         terminal.sees_line("ok")
         terminal.presses("set period_s 4" + ENTER)
         terminal.sees_line("set period_s 4")
-        terminal.sees_line("[period_s 5.7 -> 4 s")
+        terminal.sees_line("[period_s 5.700 -> 4.000 s")
         terminal.presses("show period_s" + ENTER)
         terminal.sees_line(f"[period_s 4 {PERIOD} * power-up 5.7 s")
         assert not [line for line in terminal.look() if line.startswith(" ")]
