@@ -84,8 +84,8 @@ def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = ()
     is there, by full parameter name; `withheld`: effects that nobody is offered."""
     draw = np.random.default_rng(seed)
     shapes = ("steps", "sweep")
-    fitted = [_measured(draw, hidden, s, size, run) for s in shapes for size in (1.0, 2.0) for run in (1, 2, 3)]
-    held_out = [_measured(draw, hidden, s, size, 1) for s in shapes for size in (1.5, 3.0)]
+    fitted = [measured(draw, hidden, s, size, run) for s in shapes for size in (1.0, 2.0) for run in (1, 2, 3)]
+    held_out = [measured(draw, hidden, s, size, 1) for s in shapes for size in (1.5, 3.0)]
     here = sys.modules[__name__]
     there = frozenset(name.split(".")[0] for name in hidden)
     case = ", nothing hidden" if not there else ", what it hides not on offer" if withheld else ""
@@ -109,7 +109,8 @@ def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = ()
     )
 
 
-def _measured(draw: np.random.Generator, hidden: Mapping[str, float], shape: str, size_N: float, run: int) -> Record:
+def measured(draw: np.random.Generator, hidden: Mapping[str, float], shape: str, size_N: float, run: int) -> Record:
+    """One record of `steps` or a `sweep` of so many newtons."""
     time_s = np.arange(0.0, 6.0, SAMPLE_S)
     if shape == "steps":
         force_N = size_N * (((time_s > 0.5) & (time_s < 2)).astype(float) - ((time_s > 3) & (time_s < 4.5)))
