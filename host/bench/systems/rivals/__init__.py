@@ -1,0 +1,1 @@
+"""What people use, one way a file, each with `solve(problem) -> Answer`."""
