@@ -46,13 +46,13 @@ def learn_correction(
     best: Candidate | None = None
     sites = list(candidates[0].fitted.structure.system.correction_sites)
     while best is None or len(best.fitted.structure.sites) < _MOST:
-        parents = [best] if best else candidates
-        promises = sorted((p for c in parents for p in _promises(c, sites, split, crew)), key=lambda p: p.cost)
+        parents, promises = [best] if best else candidates, []
+        for parent in parents:
+            promises = sorted([*promises, *_promises(parent, sites, split, crew)], key=lambda p: p.cost)
+            sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
         grown = _best_grown(parents, promises[:_FITTED], split, policy, crew)
         if grown is None:
             break
-        if best is None:
-            sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
         best = grown
         if enough(best):
             break

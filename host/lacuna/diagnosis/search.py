@@ -31,7 +31,7 @@ from lacuna.estimation.uncertainty import effective_samples
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 8, 3: 6}  # sets refitted, by their size: roughly,
-_SKETCHED_TWICE = {1: 4, 2: 3, 3: 2}  # the best of these from the initial guess as well,
+_SKETCHED_TWICE = {1: 4, 2: 1, 3: 1}  # the best of these from the initial guess as well,
 _FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
 _ROUNDS = 4  # of finishing at most
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
