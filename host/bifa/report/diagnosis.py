@@ -16,6 +16,7 @@ from bifa.report.words import (
     spoken,
     unit_of,
 )
+from lacuna.report import sentence
 
 BASE_MODEL = "The base model is the paper's, with its parameters fitted to this robot."
 COMPLETED_MODEL = "The completed model has what was found added to it, and was fitted anew."
@@ -28,15 +29,10 @@ Labels = Mapping[str, str]
 
 
 def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
-    """The verdict of `bifa diagnose --json` in one sentence."""
-    if verdict == "none":
-        return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
-    if verdict == "unexplained":
-        return "The base model lacks something that no effect of the library accounts for."
-    names = " and ".join(effect_words(effect["name"], effect["parameters"]) for effect in effects)
-    closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap to the noise floor"
-    rest = "what is left still matters" if remainder["matters"] else "nothing that matters is left"
-    return f"What the base model lacks is {names}: that closes {closed}, and {rest}."
+    """The engine's sentence on a verdict of `bifa diagnose --json`, effects in words and with their sizes."""
+    return sentence.verdict_sentence(
+        verdict, effects, remainder, lambda effect: effect_words(effect["name"], effect["parameters"])
+    )
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], labels: Labels | None = None) -> Page:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bifa.link.table import CHAMBERS
-from bifa.report.page import environment, template_file
+from bifa.report.page import environment, page_style, template_file
 from bifa.report.plot import library_script
 from bifa.report.style import DARK, LIGHT
 
@@ -27,7 +27,7 @@ def live_page() -> str:
             palettes=palettes,
             chambers=CHAMBERS,
             sliders=_SLIDERS,
-            style=template_file("page.css") + template_file("live.css"),
+            style=page_style() + template_file("live.css"),
             script=template_file("live.js"),
             library=library_script(),
         )

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 
+from lacuna.report.page import COLOURS
 from lacuna.report.style import LOOK
 
 CHAMBERS = ("body", "head", "tail")
@@ -28,8 +29,8 @@ class Palette:
         return asdict(self) | CHAMBER_COLOURS
 
 
-LIGHT = Palette("#ffffff", "#1d1f23", "#5d636d", "#d9dce1", "#1d1f23", "#8a7000", "#a3308f")
-DARK = Palette("#16181c", "#e6e6e6", "#a2a8b2", "#33373e", "#e6e6e6", "#d6b656", "#ee9fd8")
+LIGHT = Palette(**COLOURS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
+DARK = Palette(**COLOURS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
 
 _RC = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -10,18 +10,7 @@ from lacuna.report.evidence import draw_errors, draw_learnt, draw_probabilities
 from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.overview import draw_held_out, draw_tried
 from lacuna.report.page import Page, Section, Table, both_palettes
-
-
-def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
-    """A verdict (of `as_record`) in one sentence."""
-    if verdict == "none":
-        return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
-    if verdict == "unexplained":
-        return "The base model lacks something that no effect of the library accounts for."
-    names = _names([effect["name"] for effect in effects])
-    closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap"
-    rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
-    return f"What the base model lacks is {names}, which closes {closed}{rest}."
+from lacuna.report.sentence import verdict_sentence
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
@@ -69,7 +58,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
             "An explanation is rejected where it predicts conditions that were never fitted no better than a smaller"
             " one, where it closes too little of the gap, or where a rival explains the same and more."
         )
-        sections.append(Section("Also tried, and rejected", (why,), (table,), (tried,)))
+        sections.append(Section("Also tried, and rejected", (why,), (table,), figures=(tried,)))
     if record["warnings"]:
         sections.append(Section("Before you believe it", tuple(record["warnings"])))
     for curve in record["learnt"]:
@@ -89,7 +78,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
         settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
         text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
         sections.append(Section("Next experiment", (text,)))
-    return Page(f"Diagnosis of {name}", lead, facts, sections)
+    return Page(f"Diagnosis of {name}", lead, sections, facts=facts)
 
 
 def _measured(found: Diagnosis) -> Section:
@@ -100,7 +89,3 @@ def _measured(found: Diagnosis) -> Section:
 def _sized(effect: Mapping[str, Any]) -> str:
     ends = effect["interval_90"]
     return ", ".join(f"{k} = {v:g} ({ends[k][0]:g} to {ends[k][1]:g})" for k, v in effect["parameters"].items())
-
-
-def _names(effects: Sequence[str]) -> str:
-    return " and ".join(effects).replace("_", " ")

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.report.diagnosis import verdict_sentence
 from lacuna.report.measured import floor_sentence
+from lacuna.report.sentence import verdict_sentence
 
 _WIDTH, _LINES = 100, 40
 _WARNINGS, _TRIED = 6, 4
