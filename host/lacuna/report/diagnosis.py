@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -16,69 +16,98 @@ from lacuna.report.sentence import verdict_sentence
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
     """The page for a `record` (of `as_record`); with the diagnosis itself also what was measured, and traces."""
     error, effects = record["error"], record["effects"]
-    lead = verdict_sentence(record["verdict"], effects, record["remainder"])
     facts = [
         (f"{error['before']['held_out']:.2f}", "error of the base model on trials not fitted, in units of the noise"),
         (f"{error['after']['held_out']:.2f}", "after"),
         (f"{error['noise_floor']['held_out']:.2f}", "noise floor"),
     ]
-    errors = both_palettes(
+    sections = [
+        *_evidence(effects),
+        *([_measured(found)] if found else []),
+        Section("Where the residual lives", (record["signature"]["text"],)),
+        _errors(error),
+        *([_held_out(found)] if found else []),
+        *([Section("What the named effects leave", (record["remainder"]["text"],))] if effects else []),
+        *_rejected(record),
+        *_warnings(record["warnings"]),
+        *(_learnt(curve) for curve in record["learnt"]),
+        *_open(record),
+        *_next(record["next_experiment"]),
+    ]
+    lead = verdict_sentence(record["verdict"], effects, record["remainder"])
+    return Page(f"Diagnosis of {name}", lead, sections, facts=facts)
+
+
+def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
+    if not effects:
+        return []
+    figure = both_palettes(
+        lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
+    )
+    rows = [(_words(e["name"]), _sized(e), f"{100 * e['share_of_gap']:.0f} %") for e in effects]
+    table = Table(("effect", "parameters, with 90 % intervals", "of the gap"), rows)
+    return [Section("Evidence", tables=(table,), figures=(figure,))]
+
+
+def _errors(error: Mapping[str, Any]) -> Section:
+    figure = both_palettes(
         lambda stream, dark: draw_errors(error, stream, dark), "error before and after by experiment, on a log axis"
     )
-    sections = [
-        Section("Where the residual lives", (record["signature"]["text"],)),
-        Section("Error before and after", figures=(errors,)),
-    ]
-    if found is not None:
-        sections[:0] = [_measured(found)]
-        figure = both_palettes(
-            lambda stream, dark: draw_held_out(found, stream, dark),
-            "measured and predicted, before and after, on records that were not fitted",
-            "The records predicted worst by the model as it is. Left: measured and predicted; right: the residual.",
-        )
-        sections.append(Section("On records that were not fitted", figures=(figure,)))
-    if effects:
-        evidence = both_palettes(
-            lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
-        )
-        rows = [
-            (effect["name"].replace("_", " "), _sized(effect), f"{100 * effect['share_of_gap']:.0f} %")
-            for effect in effects
-        ]
-        table = Table(("effect", "parameters, with 90 % intervals", "of the gap"), rows)
-        sections.insert(0, Section("Evidence", tables=(table,), figures=(evidence,)))
-        sections.append(Section("What the named effects leave", (record["remainder"]["text"],)))
-    if record["nearest"]:
-        rows = [
-            (" + ".join(r["effects"]).replace("_", " "), f"{100 * r['share_of_gap']:.0f} %") for r in record["nearest"]
-        ]
-        table = Table(("explanation", "of the gap that it would close"), rows)
-        tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
-        why = (
-            "An explanation is rejected where it predicts conditions that were never fitted no better than a smaller"
-            " one, where it closes too little of the gap, or where a rival explains the same and more."
-        )
-        sections.append(Section("Also tried, and rejected", (why,), (table,), figures=(tried,)))
-    if record["warnings"]:
-        sections.append(Section("Before you believe it", tuple(record["warnings"])))
-    for curve in record["learnt"]:
-        text = f"Added to the model: a curve for {curve['term']}."
-        figure = both_palettes(
-            lambda stream, dark, curve=curve: draw_learnt(curve, stream, dark), f"the curve over {curve['variable']}"
-        )
-        sections.append(Section("Learnt from the data", (text,), figures=(figure,)))
-    hidden = record["not_detectable_here"]
-    if hidden:
+    return Section("Error before and after", figures=(figure,))
+
+
+def _held_out(found: Diagnosis) -> Section:
+    figure = both_palettes(
+        lambda stream, dark: draw_held_out(found, stream, dark),
+        "measured and predicted, before and after, on records that were not fitted",
+        "The records predicted worst by the model as it is. Left: measured and predicted; right: the residual.",
+    )
+    return Section("On records that were not fitted", figures=(figure,))
+
+
+def _rejected(record: Mapping[str, Any]) -> list[Section]:
+    if not record["nearest"]:
+        return []
+    rows = [(_words(" + ".join(r["effects"])), f"{100 * r['share_of_gap']:.0f} %") for r in record["nearest"]]
+    table = Table(("explanation", "of the gap that it would close"), rows)
+    tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
+    why = (
+        "An explanation is rejected where it predicts conditions that were never fitted no better than a smaller"
+        " one, where it closes too little of the gap, or where a rival explains the same and more."
+    )
+    return [Section("Also tried, and rejected", (why,), (table,), figures=(tried,))]
+
+
+def _warnings(warnings: Sequence[str]) -> list[Section]:
+    return [Section("Before you believe it", tuple(warnings))] if warnings else []
+
+
+def _learnt(curve: Mapping[str, Any]) -> Section:
+    text = f"Added to the model: a curve for {curve['term']}."
+    figure = both_palettes(lambda stream, dark: draw_learnt(curve, stream, dark), f"the curve over {curve['variable']}")
+    return Section("Learnt from the data", (text,), figures=(figure,))
+
+
+def _open(record: Mapping[str, Any]) -> list[Section]:
+    """What the data do not show, or cannot tell apart."""
+    sections = []
+    if hidden := record["not_detectable_here"]:
         sections.append(Section("Not detectable in this data", (", ".join(hidden),)))
-    indistinct = [(e["name"], ", ".join(e["confusable_with"])) for e in effects if e["confusable_with"]]
-    if indistinct:
+    if indistinct := [(e["name"], ", ".join(e["confusable_with"])) for e in record["effects"] if e["confusable_with"]]:
         sections.append(Section("What this data cannot tell", tables=(Table(("named", "could be"), indistinct),)))
-    coming = record["next_experiment"]
-    if coming["experiment"]:
-        settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
-        text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
-        sections.append(Section("Next experiment", (text,)))
-    return Page(f"Diagnosis of {name}", lead, sections, facts=facts)
+    return sections
+
+
+def _next(coming: Mapping[str, Any]) -> list[Section]:
+    if not coming["experiment"]:
+        return []
+    settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
+    text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
+    return [Section("Next experiment", (text,))]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _measured(found: Diagnosis) -> Section:
