@@ -71,7 +71,9 @@ def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
         return choice
     least = min(idle, key=lambda e: choice.probability[e])
     rest = tuple(e for e in choice.candidate.effects if e != least)
-    smaller = found.with_effects(rest) or _refitted_without(case, choice.candidate, rest)
+    refitted = _refitted_without(case, choice.candidate, rest)
+    # what was tried of these effects may have ended in another minimum than they have in company
+    smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
     return drop_absent(case, found, weigh(found, smaller, case.policy))
 
 

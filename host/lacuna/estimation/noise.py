@@ -65,8 +65,9 @@ class NoiseFloor:
 
     def lowered_by(self, other: NoiseFloor) -> NoiseFloor:
         """The lower of two floors for each channel: both are upper bounds, since a model that does not fit
-        adds its own differences to those between runs."""
-        return NoiseFloor({k: min(n, other.channels[k], key=lambda c: c.per_piece) for k, n in self.channels.items()})
+        adds its own differences to those between runs. A channel of which the other knows nothing stays."""
+        known = other.channels
+        return NoiseFloor({k: min(n, known.get(k, n), key=lambda c: c.per_piece) for k, n in self.channels.items()})
 
     def share_of(self, other: NoiseFloor) -> float:
         """The smallest ratio of this floor to `other` among the channels."""

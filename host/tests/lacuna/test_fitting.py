@@ -9,7 +9,7 @@ from toy import SENSOR_SD_MM, hide
 
 from lacuna.estimation.autocorrelation import correlation_samples
 from lacuna.estimation.fit import fit_base
-from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
@@ -150,3 +150,10 @@ def test_parameters_are_checked():
         Parameter("k", "N/m", 1.0, 2.0, 1.0)
     with pytest.raises(ValueError, match="outside"):
         Parameter("k", "N/m", 3.0, 0.0, 1.0)
+
+
+def test_a_floor_keeps_the_channels_that_another_does_not_know():
+    known = ChannelNoise(2.0, 0.0, 1.0, 3)
+    lower = NoiseFloor({("steps", "y"): ChannelNoise(1.0, 0.0, 1.0, 3)})
+    floor = NoiseFloor({("steps", "y"): known, ("sweep", "y"): known}).lowered_by(lower)
+    assert floor.channels == {("steps", "y"): lower.channels["steps", "y"], ("sweep", "y"): known}

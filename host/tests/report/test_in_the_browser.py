@@ -74,6 +74,7 @@ def opened(tabs):
         tab = found[name]
         tab.set_viewport_size({"width": width, "height": 900})
         tab.emulate_media(color_scheme=scheme, reduced_motion=motion)
+        tab.wait_for_function("!document.querySelector('.notifier-note')")  # plotly's hint after a zoom fades slowly
         tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         return tab
 

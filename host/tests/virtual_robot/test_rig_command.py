@@ -1,5 +1,6 @@
 """`bifa rig` as a person uses it: it says where the port is, serves it, and Ctrl-C leaves nothing behind."""
 
+import shlex
 import signal
 import sys
 from pathlib import Path
@@ -44,7 +45,7 @@ def test_serve_and_stop(image, tmp_path, ending):
 def test_what_cannot_be_done_is_said_in_a_line(arguments, message, image):
     firmware = [] if "--firmware" in arguments else ["--firmware", str(image(GREET))]
     output, status = pexpect.run(
-        " ".join([BIFA, "rig", *arguments, *firmware]), withexitstatus=True, encoding="utf-8", timeout=60
+        shlex.join([BIFA, "rig", *arguments, *firmware]), withexitstatus=True, encoding="utf-8", timeout=60
     )
     assert status == 2
     assert message in output
