@@ -1,4 +1,4 @@
-"""`bifa demo`: the whole story without hardware, the real firmware in a simulated chip."""
+"""`bifa demo`: the whole loop without hardware, with the real firmware in a simulated chip."""
 
 from pathlib import Path
 from typing import Annotated
