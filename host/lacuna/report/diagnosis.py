@@ -15,9 +15,9 @@ from lacuna.report.page import Page, Section, Table, both_palettes
 def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
     """A verdict (of `as_record`) in one sentence."""
     if verdict == "none":
-        return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
+        return "Nothing that matters is missing from the base model: it predicts these data to within the noise."
     if verdict == "unexplained":
-        return "The base model lacks something that no effect of the library accounts for."
+        return "The base model lacks something that no effect of the library explains."
     names = _names([effect["name"] for effect in effects])
     closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap"
     rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
@@ -37,7 +37,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
         lambda stream, dark: draw_errors(error, stream, dark), "error before and after by experiment, on a log axis"
     )
     sections = [
-        Section("Where the residual lives", (record["signature"]["text"],)),
+        Section("Where the residual is", (record["signature"]["text"],)),
         Section("Error before and after", figures=(errors,)),
     ]
     if found is not None:
@@ -45,7 +45,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
         figure = both_palettes(
             lambda stream, dark: draw_held_out(found, stream, dark),
             "measured and predicted, before and after, on records that were not fitted",
-            "The records predicted worst by the model as it is. Left: measured and predicted; right: the residual.",
+            "The records that the base model predicts worst. Left: measured and predicted; right: the residual.",
         )
         sections.append(Section("On records that were not fitted", figures=(figure,)))
     if effects:
@@ -66,8 +66,8 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
         table = Table(("explanation", "of the gap that it would close"), rows)
         tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
         why = (
-            "An explanation is rejected where it predicts conditions that were never fitted no better than a smaller"
-            " one, where it closes too little of the gap, or where a rival explains the same and more."
+            "An explanation is rejected if it predicts conditions that were never fitted no better than a smaller one,"
+            " if it closes too little of the gap, or if a rival explains the same and more."
         )
         sections.append(Section("Also tried, and rejected", (why,), (table,), (tried,)))
     if record["warnings"]:
@@ -93,7 +93,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
 
 
 def _measured(found: Diagnosis) -> Section:
-    columns = ("channel", "records in conditions", "floor (standard deviation)", "samples to a piece", "from")
+    columns = ("channel", "records in conditions", "floor (standard deviation)", "samples per observation", "from")
     return Section("What was measured", (floor_sentence(found),), (Table(columns, measured_rows(found)),))
 
 

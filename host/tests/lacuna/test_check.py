@@ -81,8 +81,8 @@ def test_refuses_a_prediction_of(name):
 
 Y = Line().trials[0].channels["y"]
 REFUSED_RECORDS = {
-    "times that fall": ({"time_s": np.where(T == 0.5, 0.2, T)}, "run 0: time does not rise from sample 49"),
-    "times that stand": ({"time_s": np.minimum(T, 0.9)}, "run 0: time does not rise from sample 90"),
+    "times that fall": ({"time_s": np.where(T == 0.5, 0.2, T)}, "run 0: time does not increase from sample 49"),
+    "times that stand": ({"time_s": np.minimum(T, 0.9)}, "run 0: time does not increase from sample 90"),
     "a time that is missing": ({"time_s": np.where(T == 0.5, np.nan, T)}, "run 0: time at sample 50 is not a number"),
     "another length": ({"channels": {"y": Y[1:]}}, r"run 0, channel y: shape \(100,\) measured, \(101,\) times"),
     "text": ({"channels": {"y": np.full(101, "1.0")}}, "run 0, channel y: measured values are <U3"),
@@ -112,9 +112,9 @@ def test_takes_a_channel_that_rests_in_one_trial_only():
 
 def test_refuses_an_effect_under_another_key():
     effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0))
-    with pytest.raises(MisuseError, match="effect bend stands under the key curve"):
+    with pytest.raises(MisuseError, match="effect bend is listed under the key curve"):
         diagnose(Line(effects={"curve": effect}), progress=pytest.fail)
-    with pytest.raises(DeclarationError, match="effect bend stands under the key curve"):
+    with pytest.raises(DeclarationError, match="effect bend is listed under the key curve"):
         lacuna.System(heater.simulate, heater.PARAMETERS, {"curve": effect})
 
 
@@ -138,7 +138,7 @@ def test_refuses_names_that_are_used_twice():
 def test_refuses_repeats_of_different_inputs():
     records = heater.records(repeats=2)
     records["steps_4W_2"]["power_W"] = -records["steps_4W_2"]["power_W"]
-    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are called repeats.*power_W differs"):
+    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are declared as repeats.*power_W differs"):
         lacuna.diagnose(heater.system(), records, progress=pytest.fail)
 
 

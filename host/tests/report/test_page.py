@@ -70,7 +70,7 @@ def test_the_first_screen_answers_and_says_what_its_words_mean(html):
         "bifa campaign --port virtual --seed 0",
         "noise floor is",
         "base model is",
-        "completed model has",
+        "completed model includes",
         "Held-out trials",
     ):
         assert said in first, said
