@@ -64,7 +64,7 @@ REFUSED_PREDICTIONS = {
     "NaN always": (lambda t, p: {"y": np.full(101, np.nan)}, "run 0, channel y: the prediction is NaN, as in every"),
     "NaN in a sample": (lambda t, p: {"y": np.where(T == 0.5, np.nan, T)}, "run 0, channel y: the prediction is NaN"),
     "a constant": (lambda t, p: {"y": np.ones(101)}, "run 0, channel y: no parameter changes the prediction"),
-    "chance": (lambda t, p: {"y": p["slope"] * T + DRAW.standard_normal(101)}, "run 0, channel y: predicted twice"),
+    "chance": (lambda t, p: {"y": p["slope"] * T + DRAW.standard_normal(101)}, "run 0, channel y: two predictions"),
     "an effect when off": (
         lambda t, p: {"y": p["slope"] * T + T**2 * ("bend.by" in p)},
         "run 0, channel y: effect bend changes the prediction although its size is 0",
@@ -84,10 +84,13 @@ REFUSED_RECORDS = {
     "times that fall": ({"time_s": np.where(T == 0.5, 0.2, T)}, "run 0: time does not increase from sample 49"),
     "times that stand": ({"time_s": np.minimum(T, 0.9)}, "run 0: time does not increase from sample 90"),
     "a time that is missing": ({"time_s": np.where(T == 0.5, np.nan, T)}, "run 0: time at sample 50 is not a number"),
-    "another length": ({"channels": {"y": Y[1:]}}, r"run 0, channel y: shape \(100,\) measured, \(101,\) times"),
+    "another length": (
+        {"channels": {"y": Y[1:]}},
+        r"run 0, channel y: measured with shape \(100,\), but the times have \(101,\)",
+    ),
     "text": ({"channels": {"y": np.full(101, "1.0")}}, "run 0, channel y: measured values are <U3"),
     "an infinity": ({"channels": {"y": np.where(T == 0.5, np.inf, Y)}}, "run 0, channel y: infinite at sample 50"),
-    "nothing": ({"channels": {"y": np.full(101, np.nan)}}, "run 0, channel y: fewer than 8 samples"),
+    "nothing": ({"channels": {"y": np.full(101, np.nan)}}, "run 0, channel y: fewer than 8 valid samples"),
     "no channel": ({"channels": {}}, "run 0 has no channel"),
     "another's name": ({"name": "run 1"}, "trial run 1: more than one trial has this name"),
 }
@@ -205,7 +208,7 @@ def test_warns_of_a_direction_that_the_data_leave_open():
 
     parameters = (*heater.PARAMETERS, Parameter("volts", "", 1.0, 0.01, 100.0))
     said = warned(lacuna.System(simulate, parameters), heater.records(repeats=2, seed=3))
-    assert "do not determine gain_K_W, volts" in said
+    assert "do not determine a combination of gain_K_W, volts" in said
 
 
 def test_warns_of_a_nuisance_at_its_limit():
@@ -229,7 +232,7 @@ def test_warns_of_an_effect_that_would_need_the_opposite_sign():
 
 def test_warns_of_a_parameter_that_changes_nothing():
     idle = (*heater.PARAMETERS, Parameter("unused", "", 1.0, 0.1, 10.0))
-    assert "unused changes no prediction" in warned(
+    assert "unused does not affect any prediction" in warned(
         lacuna.System(heater.simulate, idle, _all()), heater.records(repeats=2, seed=3)
     )
 
