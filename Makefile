@@ -14,7 +14,7 @@ ARGS ?=
 
 .PHONY: help
 help:
-	@echo "make demo     the whole story on a virtual robot with an undeclared effect, and its report"
+	@echo "make demo     the whole loop on a virtual robot with an undeclared effect, and its report"
 	echo "make test     every test: native, sanitized, in the simulated ATmega328P, Python"
 	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
 	echo "make soak     the long proofs and fuzzers"

@@ -1,4 +1,4 @@
-"""What would mislead a diagnosis is refused before the search, by the name of its trial and channel."""
+"""Rejects misleading input before the search, naming the trial and the channel."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from lacuna.system import Channels, Record, System, Theta
 
 _FEWEST_TRIALS, _FEWEST_SAMPLES = 3, 8
 _SAME = 1e-9  # of a channel's spread: what differs by less does not differ
-_NEUTRAL = 1e-3  # of a channel's spread, RMS, that an effect may change at the size at which it is absent
-_OTHER = 0.5  # of an input's spread, RMS, by which what are called repeats may not differ
+_NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent
+_OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
 
 
 class MisuseError(LacunaError):
@@ -25,7 +25,7 @@ class TooLittleDataError(MisuseError):
 
 
 def check(system: System) -> tuple[str, ...]:
-    """Refuse what cannot be diagnosed; return warnings, a sentence each, of what can be with care. Costs a few
+    """Reject what cannot be diagnosed; return warnings, one sentence each, about what needs care. Costs a few
     simulations of every trial. Raises MisuseError."""
     trials = tuple(system.trials)
     _check_names(system, trials)
@@ -42,17 +42,17 @@ def check(system: System) -> tuple[str, ...]:
 def _check_names(system: System, trials: Sequence[Record]) -> None:
     if len(trials) < _FEWEST_TRIALS:
         raise TooLittleDataError(
-            f"{_counted(len(trials), 'trial')} given: a diagnosis needs at least {_FEWEST_TRIALS}, two to fit and one"
-            " to choose by. One long record can be cut into windows."
+            f"{_counted(len(trials), 'trial')} given: a diagnosis needs at least {_FEWEST_TRIALS}, two for fitting and"
+            " one for selection. One long record can be cut into windows."
         )
     for name in _repeated(t.name for t in trials):
-        raise MisuseError(f"trial {name}: more than one trial has this name; give each its own.")
+        raise MisuseError(f"trial {name}: more than one trial has this name; names must be unique.")
     for key, effect in system.effects.items():
         if key != effect.name:
-            raise MisuseError(f"effect {effect.name} stands under the key {key}: give it its own name as key.")
+            raise MisuseError(f"effect {effect.name} is listed under the key {key}: use its name as the key.")
     effects = [e.full_name(p) for e in system.effects.values() for p in (*e.parameters, *e.own)]
     for name in _repeated([p.name for p in system.parameters] + effects):
-        raise MisuseError(f"parameter {name}: more than one has this name; give each its own.")
+        raise MisuseError(f"parameter {name}: more than one has this name; names must be unique.")
     for trial in trials:
         names = [p.name for p in system.nuisances(trial)]
         for name in _repeated(names + [p.name for p in system.parameters]):
@@ -62,14 +62,14 @@ def _check_names(system: System, trials: Sequence[Record]) -> None:
 def _check_trial(trial: Record) -> None:
     time = np.asarray(trial.time_s)
     if time.ndim != 1 or time.dtype.kind not in "fiu" or len(time) < _FEWEST_SAMPLES:
-        raise MisuseError(f"trial {trial.name}: its times are no sequence of at least {_FEWEST_SAMPLES} numbers.")
+        raise MisuseError(f"trial {trial.name}: its times are not a sequence of at least {_FEWEST_SAMPLES} numbers.")
     if not np.isfinite(time).all():
         raise MisuseError(f"trial {trial.name}: time at sample {_first(~np.isfinite(time))} is not a number.")
     falls = np.diff(time) <= 0
     if falls.any():
         at = _first(falls)
         raise MisuseError(
-            f"trial {trial.name}: time does not rise from sample {at} ({time[at]:g} s) to the next"
+            f"trial {trial.name}: time does not increase from sample {at} ({time[at]:g} s) to the next"
             f" ({time[at + 1]:g} s)."
         )
     if not trial.channels:
@@ -80,11 +80,11 @@ def _check_trial(trial: Record) -> None:
         if column.dtype.kind not in "fiu":
             raise MisuseError(f"{where}: measured values are {column.dtype}, not real numbers.")
         if column.shape != time.shape:
-            raise MisuseError(f"{where}: shape {column.shape} measured, {time.shape} times.")
+            raise MisuseError(f"{where}: measured with shape {column.shape}, but the times have {time.shape}.")
         if np.isinf(column).any():
-            raise MisuseError(f"{where}: infinite at sample {_first(np.isinf(column))}; missing samples are NaN.")
+            raise MisuseError(f"{where}: infinite at sample {_first(np.isinf(column))}; mark missing samples as NaN.")
         if np.isfinite(column).sum() < _FEWEST_SAMPLES:
-            raise MisuseError(f"{where}: fewer than {_FEWEST_SAMPLES} samples are there.")
+            raise MisuseError(f"{where}: fewer than {_FEWEST_SAMPLES} valid samples.")
 
 
 def _check_constant(trials: Sequence[Record]) -> None:
@@ -104,7 +104,7 @@ def _check_constant(trials: Sequence[Record]) -> None:
 
 
 def _check_repeats(trials: Sequence[Record]) -> None:
-    """Repeats are runs of the same thing: what they differ by becomes the noise floor."""
+    """Repeats are runs of the same condition: their differences become the noise floor."""
     groups: dict[Hashable, list[Record]] = defaultdict(list)
     for trial in trials:
         groups[trial.experiment, trial.condition].append(trial)
@@ -130,8 +130,8 @@ def _check_same_input(first: Record, other: Record, name: str, spread: float) ->
     a, b = np.asarray(a, float), np.interp(first.time_s - first.time_s[0], other.time_s - other.time_s[0], b)
     if spread > 0 and np.sqrt(np.nanmean((a - b) ** 2)) > _OTHER * spread:
         raise MisuseError(
-            f"trials {first.name} and {other.name} are called repeats (condition {first.condition}), but their input"
-            f" {name} differs: what they differ by would pass for noise. Give them different conditions."
+            f"trials {first.name} and {other.name} are declared as repeats (condition {first.condition}), but their"
+            f" input {name} differs: the difference would pass for noise. Give them different conditions."
         )
 
 
@@ -145,25 +145,27 @@ def _check_model(system: System, trials: Sequence[Record]) -> tuple[str, ...]:
     if len(failed) == len(trials):
         raise MisuseError(
             f"trial {failed[0]}, channel {_failing(trials[0], predictions[failed[0]])}: the prediction is NaN, as in"
-            " every trial, with the parameters at their starts. Start where the model can be simulated."
+            " every trial, with the parameters at their initial values. Choose values that can be simulated."
         )
     good = [t for t in trials if t.name not in failed]
     _check_deterministic(system, start, good[0], predictions)
     _check_effects(system, start, good, predictions)
-    warnings = [f"With its parameters at their starts the model cannot predict {_listed(failed)}."] if failed else []
+    warnings = (
+        [f"With its parameters at their initial values the model cannot predict {_listed(failed)}."] if failed else []
+    )
     idle = _idle(system, start, good, predictions)
     if idle and len(idle) == len(system.parameters):
         raise MisuseError(
             f"trial {good[0].name}, channel {next(iter(good[0].channels))}: no parameter changes the prediction; does"
-            " the model use them?"
+            " the model use any of them?"
         )
     if idle:
-        warnings.append(f"{_listed(idle)} change{'s' if len(idle) == 1 else ''} no prediction.")
+        warnings.append(f"{_listed(idle)} {'does' if len(idle) == 1 else 'do'} not affect any prediction.")
     return tuple(warnings)
 
 
 def _predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
-    """A prediction, looked at. Raises MisuseError."""
+    """A prediction, checked. Raises MisuseError."""
     theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
     with_effects = f" with effect {effects[0]}" if effects else ""
     try:
@@ -195,13 +197,13 @@ def _check_deterministic(system: System, start: Theta, trial: Record, prediction
     for name in trial.channels:
         if _differ(again[name], predictions[trial.name][name], _SAME * _spread(trial.channels[name])):
             raise MisuseError(
-                f"trial {trial.name}, channel {name}: predicted twice with the same parameters, it comes out different."
-                " The model may not draw random numbers nor remember its last call."
+                f"trial {trial.name}, channel {name}: two predictions with the same parameters differ."
+                " The model must not draw random numbers or keep state between calls."
             )
 
 
 def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:
-    """An effect at the size at which it is absent leaves the base model's prediction as it is."""
+    """An effect at the size at which it is absent leaves the base model's prediction unchanged."""
     firsts = {t.experiment: t for t in reversed(trials)}
     for name, effect in system.effects.items():
         off = {effect.full_name(p): p.value for p in effect.parameters} | dict.fromkeys(
@@ -217,7 +219,7 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
                 if _differ(found[channel], predictions[trial.name][channel], limit):
                     raise MisuseError(
                         f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although its size"
-                        f" is {effect.absent:g}, at which it is said to be absent."
+                        f" is {effect.absent:g}, at which it is declared absent."
                     )
 
 
@@ -249,7 +251,7 @@ def _fails(trial: Record, prediction: Channels) -> bool:
 
 
 def _failing(trial: Record, prediction: Channels) -> str | None:
-    """The first channel that is not predicted everywhere where it was measured."""
+    """The first channel whose prediction is missing where it was measured."""
     return next((c for c, p in prediction.items() if not np.isfinite(p[np.isfinite(trial.channels[c])]).all()), None)
 
 

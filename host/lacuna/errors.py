@@ -2,6 +2,6 @@
 
 
 class LacunaError(Exception):
-    """Meant for the person: one sentence, to be shown without a traceback."""
+    """An error meant for the user: one sentence, to be shown without a traceback."""
 
     for_the_user = True

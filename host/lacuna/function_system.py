@@ -30,11 +30,11 @@ Simulate = Callable[[Record, Values], Any]
 
 
 class DeclarationError(LacunaError):
-    """What was said of a system contradicts itself; the text says where."""
+    """The declaration of a system contradicts itself; the text says where."""
 
 
 class Curve:
-    """What is learnt at a site, as a function of its variable: 0 everywhere until something is."""
+    """The curve learnt at a site, as a function of its variable: 0 everywhere until something has been learnt."""
 
     def __init__(self, site: CorrectionSite, table: np.ndarray | None = None):
         self._at = np.linspace(site.lower, site.upper, 2 if table is None else table.shape[1])
@@ -45,30 +45,30 @@ class Curve:
 
 
 class FunctionSystem(System):
-    """A model as a function, with what it may lack.
+    """A model as a function, with candidate effects that it may lack.
 
-    `simulate(record, theta)` simulates one record freely: from its initial state and its inputs, never from measured
+    `simulate(record, theta)` is a free run of one record: from its initial state and its inputs, never from measured
     outputs. `record["force_N"]` is a column, shape (n,), or a single value of the record, `record.time_s` its times.
-    `theta.mass_kg` is a parameter, `theta.coulomb.force_N` one of an effect, which stands at its absent value while
-    the effect is off; `theta` holds them in the order in which they are declared here. It returns the predicted
-    outputs by name, shape (n,) each; if there is one, the array alone will do. It is called from several threads.
+    `theta.mass_kg` is a parameter, `theta.coulomb.force_N` one of an effect, which has its absent value while
+    the effect is off; `theta` holds them in the order in which they are declared here. `simulate` returns the predicted
+    outputs by name, shape (n,) each; a single output may be a bare array. It is called from several threads.
 
-    `parameters`: `Parameter`s of the model as it is. `effects`: `Effect`s that it may lack. All else is optional:
+    `parameters`: `Parameter`s of the base model. `effects`: `Effect`s that it may lack. The rest is optional:
 
-    - `outputs`: names of the columns that `simulate` predicts; all others are its inputs. Needed where it returns bare
+    - `outputs`: names of the columns that `simulate` predicts; all others are its inputs. Needed if it returns bare
       arrays and records have more than one column besides time.
     - `nuisances`: what differs from run to run, as `Parameter`s or as a function of the record that returns them; in
       `theta` under their own names. An initial state that is not exactly known is one.
-    - `regressors`: on what a residual may depend: a function of (record, prediction) that returns arrays by name.
+    - `regressors`: what a residual may depend on: a function of (record, prediction) that returns arrays by name.
       By default the outputs, their rates and directions, and the inputs.
     - `sensor_noise`, `accuracy`: by output, in its unit: the instrument's standard deviation; the RMS error up to which
       a prediction is good enough whatever the noise.
-    - `noise_time_s`: for records without repeats, how long the noise remembers itself, by output or for all; or
-      "estimated", from what a first diagnosis leaves. By default only the fast noise of a record counts as noise.
+    - `noise_time_s`: for records without repeats, the correlation time of the noise, by output or for all; or
+      "estimated", from the residual of a first diagnosis. By default only the fast noise of a record counts as noise.
     - `curves`: `CorrectionSite`s at which a curve may be learnt if no effect explains the records; `theta.NAME(x)`.
     - `experiments`: `CandidateExperiment`s that could be run next. `spare`: conditions that are never fitted.
 
-    Raises DeclarationError where names contradict one another.
+    Raises DeclarationError if names conflict.
     """
 
     def __init__(
@@ -126,13 +126,13 @@ class FunctionSystem(System):
         return other
 
     def with_floor(self, least: Mapping[tuple[str, str], float]) -> FunctionSystem:
-        """The same system, with noise floors of at least so much, by experiment and output."""
+        """The same system, with lower bounds on its noise floors, by experiment and output."""
         other = copy(self)
         other._raised = dict(least)
         return other
 
     def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
-        """The same system, told how long the noise of each output remembers itself."""
+        """The same system, with a declared correlation time of the noise of each output."""
         other = copy(self)
         other._noise_time_s, other.estimates_noise_time = dict(seconds), False
         return other
@@ -140,14 +140,14 @@ class FunctionSystem(System):
     # -- in the person's parameters ---------------------------------------------------------------------------
 
     def coordinate(self, name: str) -> Coordinate:
-        """What parameter `name` is fitted in."""
+        """The coordinate in which parameter `name` is fitted."""
         return self._coordinates.get(name, PLAIN)
 
     def told(self, parameter: str, value: float) -> float:
         return self.coordinate(parameter).told(value)
 
     def values(self, theta: Theta, corrections: Sequence[Correction] = ()) -> Values:
-        """What `simulate` gets for a fitted `theta`: told parameters, effects that it lacks off, curves."""
+        """The values passed to `simulate` for a fitted `theta`: the user's parameters, curves, absent effects off."""
         found = Values({p.name: 0.0 for p in self.parameters} | self._off)
         for name, value in theta.items():
             found[name] = self.told(name, value)
@@ -157,7 +157,7 @@ class FunctionSystem(System):
         return found
 
     def run(self, record: Record, values: Values) -> Channels:
-        """`simulate`, whatever it returns, as channels by name."""
+        """The result of `simulate`, in whatever form, as channels by name."""
         whole = record.payload if isinstance(record.payload, Stretch) else None
         found = self.simulate(whole.run if whole else record, values)
         if not isinstance(found, Mapping):
@@ -214,11 +214,11 @@ class FunctionSystem(System):
 
 
 def _library(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """`effects` as a sequence, or as the mapping that the engine has them in."""
+    """`effects` given as a sequence, or as the mapping that the engine uses."""
     if isinstance(effects, Mapping):
         for key, effect in effects.items():
             if key != effect.name:
-                raise DeclarationError(f"effect {effect.name} stands under the key {key}: give it its own name as key.")
+                raise DeclarationError(f"effect {effect.name} is listed under the key {key}: use its name as the key.")
         effects = effects.values()
     found = tuple(effects)
     _all_different([e.name for e in found], "effect")

@@ -1,4 +1,4 @@
-"""Measured records from what people have: arrays, pandas, xarray, a folder of CSV; and stretches of one long record."""
+"""Measured records from common formats: arrays, pandas, xarray, a folder of CSV; and stretches of one long record."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ def read(data: Any) -> list[Record | Table]:
     - one record or a sequence of them, or a mapping from names to them, each a mapping from columns to arrays, a pandas
       DataFrame, an xarray Dataset (one dimension), or a `Record`,
     - a DataFrame with a column `name`, or an xarray Dataset with a second dimension, for many in one,
-    - a folder: one record a CSV file, columns in its first line. Files that differ only by a number at the end
+    - a folder: one CSV file per record, column names in its first line. Files that differ only by a number at the end
       (`step_1.csv`, `step_2.csv`) are repeats of one condition.
 
     A column `time_s` (or `time`, `t`; the index in pandas and xarray) holds seconds. Single values per record, and what
     is called `condition` (records with an equal one are repeats), `experiment`, `order` (its place in the day), may
-    stand among the columns or in `attrs`. Raises RecordError.
+    be among the columns or in `attrs`. Raises RecordError.
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
@@ -206,11 +206,11 @@ class Stretch:
 def windows(
     data: Any, seconds: float, *, every: float | None = None, period: float | None = None, skip: float = 0.0
 ) -> list[Table]:
-    """One long record cut into windows of `seconds`, each a record with times from 0, so with an initial state of its
-    own: let `simulate` take it from the window's first samples or from nuisances.
+    """One long record cut into windows of `seconds`, each a record with times from 0, and so with its own initial
+    state: let `simulate` take it from the window's first samples or from nuisances.
 
-    A window begins `every` so many seconds (default: where the last ended) after the first `skip`. Windows at the same
-    place of each `period` of a periodic input are repeats of one another; without it there are none. Raises
+    A window starts every `every` seconds (default: where the last ended) after the first `skip`. Windows at the same
+    phase of each `period` of a periodic input are repeats of one another; without it there are none. Raises
     RecordError.
     """
     (table,) = _tables(data)
@@ -235,7 +235,7 @@ def windows(
 
 def segments(data: Any, count: int = 10) -> list[Table]:
     """One long record as `count` stretches of one free run: each is simulated from the run's beginning to its own end
-    and compared on its own samples. For where the initial state is only known at the beginning; costs about half of
+    and compared on its own samples. For records whose initial state is known only at the start; costs about half of
     `count` times a simulation of the whole. Raises RecordError."""
     (table,) = _tables(data)
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)

@@ -38,14 +38,15 @@ def diagnose(
 ) -> Verdict:
     """What the model of `system` lacks, judged by `records`.
 
-    `records`: arrays, pandas, xarray, a folder of CSV (see `lacuna.records.read`), or None for a system that has its
-    trials. `seed`: the same one gives the same verdict. `starts` of the base model's fit. `n_jobs`: so many processes
-    try explanations, -1 one for each core; by default one process with a thread for each core, which suits a `simulate`
-    that releases the GIL (NumPy, numba). `executor` in their place: any of `concurrent.futures`, or dask's. `progress`:
-    a function that is told what begins, or False for silence.
+    `records`: arrays, pandas, xarray, a folder of CSV (see `lacuna.records.read`), or None for a system that already
+    has trials. `seed`: the same seed gives the same verdict. `starts`: number of initial points of the base model's
+    fit. `n_jobs`: number of processes that try explanations, -1 for one per core; by default one process with a thread
+    per core, which suits a `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any
+    from `concurrent.futures`, or dask's. `progress`: a function called with a description of each step, or False for
+    silence.
 
-    Ctrl-C during the search ends it with the best so far. Raises MisuseError, RecordError and DeclarationError before
-    the search, naming trial and channel.
+    Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
+    before the search, naming trial and channel.
     """
     if records is not None:
         system = with_records(system, records)
@@ -70,17 +71,17 @@ def diagnose(
 
 
 def _cautioned(found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float]) -> Diagnosis:
-    """With a word on what is left: where it is far above the floor, and where only a repeat, or the person, can say
+    """With warnings about the residual: where it is far above the floor, and where only a repeat, or the user, can tell
     whether it is noise."""
     levels = found.search.floor.channels
     said = [
         f"No explanation comes near the floor of {channel} in {experiment} ({floor:.3g}): they were compared at a floor"
-        f" of {levels[experiment, channel].sd:.3g}, a fraction of what the best of them leaves."
+        f" of {levels[experiment, channel].sd:.3g}, a fraction of the best one's residual."
         for (experiment, channel), floor in raised.items()
     ]
     left_s = {} if raised else left_over_s(found)
     said += [
-        f"What is left of {channel} remembers itself for about {seconds:.2g} s. If that is noise, say so:"
+        f"The residual of {channel} has a correlation time of about {seconds:.2g} s. If it is noise, declare it:"
         f' noise_time_s={{"{channel}": {seconds:.2g}}}, or "estimated".'
         for channel, seconds in left_s.items()
         if seconds > 0.0 and found.left.matters and not any(system.noise_time_s(*k) for k in _keys(found, channel))
@@ -95,7 +96,7 @@ def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:
 def with_records(system: System, records: Any) -> FunctionSystem:
     """`system` with these records as its trials. Raises MisuseError, RecordError."""
     if not isinstance(system, FunctionSystem):
-        raise MisuseError(f"{type(system).__name__} has trials of its own: call diagnose(system) without records.")
+        raise MisuseError(f"{type(system).__name__} already has trials: call diagnose(system) without records.")
     given = read(records)
     tables = [one for one in given if isinstance(one, Table)]
     outputs = system.outputs or (_outputs(system, tables[0]) if tables else ())

@@ -1,8 +1,8 @@
-"""What a system has to say about itself so that it can be fitted and diagnosed.
+"""What a system must declare so that it can be fitted and diagnosed.
 
 A `System` is a model with named parameters, a library of effects that the model may lack, and trials:
-measured records with the experiment that made them. The engine knows nothing else; the robot is one system. Who has
-a plain function need not derive from it: `lacuna.System` (`function_system.py`) makes one of that.
+measured records with the experiment that produced them. The engine knows nothing else; the robot is one system. For a
+plain function there is no need to derive from it: `lacuna.System` (`function_system.py`) wraps the function.
 
 Every parameter of the base model has a plain name (`body_damping_Ns_m`), every parameter of an effect the
 name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping of both.
@@ -24,13 +24,13 @@ Channels = dict[str, np.ndarray]
 class Parameter:
     """One number to be estimated.
 
-    `value` is where the search starts; `lower` and `upper` bound it. `plausible` is the narrower range in
-    which a sane value lies (None: nothing is known): a fit that leaves it is evidence against the model,
+    `value` is where the search starts; `lower` and `upper` bound it. `plausible` is the narrower range of
+    reasonable values (None: not known): a fit that leaves it is evidence against the model,
     not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
     a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
-    deviation of its spread. `prior_sd`: standard deviation of what was known about it beforehand, around
-    `value`; None: nothing was. `at_least` names another parameter that it cannot be below. `elsewhere`: values at
-    which graduated fits begin as well, where trials that isolate the parameter fit at several places alike.
+    deviation of its spread. `prior_sd`: standard deviation of its prior, around `value`; None: no prior.
+    `at_least` names another parameter that it cannot be below. `elsewhere`: further initial values for graduated
+    fits, for a parameter whose isolating trials fit equally well at several values.
     """
 
     name: str
@@ -61,17 +61,17 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """Something real that the base model leaves out.
+    """A real mechanism that the base model leaves out.
 
-    The first `sizes` of `parameters` size the effect: it vanishes where all of them equal `absent` (0
-    unless said otherwise); the others only shape it. They have local names (`force_N`); in `theta` they
-    appear as `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits begin at the typical
+    The first `sizes` of `parameters` size the effect: it vanishes if all of them equal `absent` (0
+    by default); the others only shape it. They have local names (`force_N`); in `theta` they
+    appear as `hysteresis.force_N`. A parameter's `value` is a typical magnitude. Fits start at the typical
     sizes times each of `start_factors` (and with the other sign, where the bounds allow it). `enters` names
     the term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it
-    can show at all (empty: all). `own` are parameters that every trial has its own value of (a phase): they
+    can be visible (empty: all). `own` are parameters with a separate value in every trial (a phase): they
     are fitted trial by trial, from the best of several values over their range. `frequency` names the
-    parameter that is one, in Hz: fits begin at the peaks of the residual's spectrum, since from anywhere else
-    they would not find it.
+    parameter that is a frequency, in Hz: fits start at the peaks of the residual's spectrum, since from
+    anywhere else they would not converge to it.
     """
 
     name: str
@@ -109,8 +109,9 @@ class Record:
 
     `channels` maps a channel's name to its samples, shape (n,), unit in the name; NaN where a sample is
     missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise
-    floor comes from them. `session_order` is the trial's place in the day, None if not known. `inputs`: what was given
-    and not measured, by name: arrays of shape (n,) and single values. `payload` is the system's own.
+    floor comes from them. `session_order` is the trial's position in the day, None if not known. `inputs`: quantities
+    that were applied rather than predicted, by name: arrays of shape (n,) and single values. `payload` is for the
+    system's own use.
     """
 
     name: str
@@ -169,8 +170,8 @@ class Correction:
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """An experiment that could be run next: `trial` is what `predict` gets; its channels hold NaN, one for
-    each sample that would be taken. `settings` is what a person or a rig needs to run it."""
+    """An experiment that could be run next: `trial` is passed to `predict`; its channels hold NaN, one for
+    each sample that would be taken. `settings` is what an operator or a rig needs to run it."""
 
     experiment: str
     settings: Mapping[str, Any]
@@ -178,7 +179,7 @@ class CandidateExperiment:
 
 
 class System(Protocol):
-    """Derive from this class and fill in the first five; the rest have defaults that say "nothing special".
+    """Derive from this class and define the first five members; the rest have neutral defaults.
 
     `predict` is called from several threads at once: it must not change the system, and is fast when it
     releases the GIL.
@@ -198,7 +199,7 @@ class System(Protocol):
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
     ) -> Channels:
-        """Simulate a trial freely (from its initial state and inputs, never from measured outputs).
+        """Free run of a trial (from its initial state and inputs, never from measured outputs).
 
         `theta` holds every base parameter, those of the active `effects`, and this trial's nuisances under
         their own names. Returns the same channels and shapes as `trial.channels`; NaN where the simulation
@@ -217,9 +218,9 @@ class System(Protocol):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        """`predict` for each of `thetas`, with its own `corrections` where there are some. Derive it where simulating
+        """`predict` for each of `thetas`, with its own `corrections` if any. Override it if simulating
         many at once is cheaper. `alike`: all are near the first and are to be compared with it, as for derivatives; so
-        let errors of the integrator be alike, too, where that can be had."""
+        let errors of the integrator be alike, too, if possible."""
         corrections = corrections or [()] * len(thetas)
         return [
             self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)
@@ -241,13 +242,13 @@ class System(Protocol):
         return True
 
     def isolates(self, trial: Record) -> bool:
-        """Whether a trial shows a few parameters by themselves. Graduated fits begin with such trials: in one where
-        everything acts together, and small errors add up, they would lose their way."""
+        """Whether a trial isolates a few parameters. Graduated fits start with such trials: in one where everything
+        acts together, and small errors accumulate, they would end in a wrong minimum."""
         return True
 
     def spare(self) -> Collection[tuple[str, Hashable]]:
         """(experiment, condition) of trials that are never fitted: explanations are judged by how well they predict
-        them. Choose conditions between others, so that what is fitted still shows every parameter."""
+        them. Choose conditions between others, so that the fitted ones still determine every parameter."""
         return ()
 
     def accuracy(self, experiment: str, channel: str) -> float:
@@ -261,12 +262,12 @@ class System(Protocol):
         return 0.0
 
     def told(self, parameter: str, value: float) -> float:
-        """A parameter's fitted value as a person knows it, where the two are not the same (a logarithm)."""
+        """A parameter's fitted value in the user's terms, if the two differ (a logarithm)."""
         return value
 
     def noise_time_s(self, experiment: str, channel: str) -> float:
-        """Correlation time of the noise, where no repeats show it. 0: only the fast noise of a record counts as
-        noise, whatever is slower as structure."""
+        """Correlation time of the noise, if there are no repeats to show it. 0: only the fast noise of a record counts
+        as noise, anything slower as structure."""
         return 0.0
 
     @property

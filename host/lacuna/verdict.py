@@ -16,7 +16,7 @@ from lacuna.values import Values
 
 
 class Model:
-    """The completed model: called like `simulate`, as `model(record)` or `model(record, theta)`.
+    """The completed model, called like `simulate`: `model(record)` or `model(record, theta)`.
 
     `record` is anything that `diagnose` takes as one record, `theta` a mapping of values that differ from the fitted
     ones, `model.theta`. Returns what `simulate` returns.
@@ -53,12 +53,12 @@ def _one(record: Any, outputs: tuple[str, ...]) -> Record:
 
 
 class Verdict:
-    """The engine's answer. `verdict`: "none", "identified" or "unexplained"; `effects`: what was named, with sizes,
+    """The engine's result. `verdict`: "none", "identified" or "unexplained"; `effects`: the effects named, with sizes,
     intervals and probabilities; `error`: of the model before and after and of the floor, RMS in units of the noise, on
     records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call.
 
     `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws. `record` is all of it in plain types
-    for JSON, `diagnosis` everything that the engine has kept.
+    for JSON, `diagnosis` the engine's complete result.
     """
 
     def __init__(self, system: System, diagnosis: Diagnosis):

@@ -102,8 +102,8 @@ def _found(summary: Mapping, diagnosis: Mapping) -> Section:
         said.append(f"To tell {apart}, the bench ran a further experiment: {settings_words(experiment)}.")
     if truth is not None:
         said.append(
-            "The virtual robot draws its effect itself and keeps it sealed: it was written down before anything was "
-            "measured, and was opened only after the verdict."
+            "The virtual robot draws its own effect and keeps it sealed: it was recorded before any measurement and "
+            "opened only after the verdict."
         )
     return Section("What was found", said, [effects_table(effects, truth)])
 
@@ -115,7 +115,7 @@ def _off(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping], labels
         [
             RESIDUAL,
             spoken(diagnosis["signature"]["text"], labels),
-            "Millimetres, psi and newtons do not add up, so errors of several quantities are put together in units of "
+            "Millimetres, psi and newtons cannot be added, so errors of several quantities are combined in units of "
             "the noise floor: 1 is as good as a repeat.",
         ],
         [prediction_table(summary["prediction_error"]), noise_table(diagnosis["error"])],
@@ -127,12 +127,12 @@ def walking(walks: Mapping[str, Walk]) -> Section:
     """The walk that the base model misses by most, as predicted and as measured."""
     walk = most_missed(walks)
     svg, seconds, rate = motion_of(walk)
-    how_fast = "as fast as it walked" if round(rate, 1) == 1.0 else f"{rate:.1f} times as fast as it walked"
+    how_fast = "in real time" if round(rate, 1) == 1.0 else f"at {rate:.1f} times real time"
     return Section(
         "The robot, walking",
         [
-            f"The {walk.title}, which the base model misses by most: as the base model predicts it, as the motion "
-            "capture saw it, and as the completed model predicts it."
+            f"The {walk.title}, for which the base model has the largest error: as the base model predicts it, as the "
+            "motion capture measured it, and as the completed model predicts it."
         ],
         motion=Motion(svg, seconds, f"To scale, {how_fast}; blue body, orange head, green tail. The dot is the clock."),
     )
@@ -170,11 +170,11 @@ def _gaits(summary: Mapping, walks: Mapping[str, Walk]) -> Section:
     robots = len(next(iter(summary["robustness"].values())))
     standing = {name: standing_share(speeds) for name, speeds in summary["robustness"].items()}
     said = [
-        "What a gait asks of the three chambers (filled: the positive supply; blank: vacuum), the pressures that come "
-        "of it and the way of the head, over the same time for every gait.",
+        "The commands of each gait to the three chambers (filled: positive supply; blank: vacuum), the resulting "
+        "pressures and the displacement of the head, over the same time for every gait.",
     ]
     said += [
-        f"On robots that are all but equal to this one the {walks[name].title} often does not walk at all: "
+        f"On robots almost identical to this one the {walks[name].title} often does not walk at all: "
         f"{100 * share:.0f} % of {robots} robots whose parameters differ by 2 % stay below {STANDING_MM_S} mm/s."
         for name, share in standing.items()
         if share >= _MANY
@@ -191,16 +191,16 @@ def _gaits(summary: Mapping, walks: Mapping[str, Walk]) -> Section:
     table = Table(
         ["gait", "median, mm/s", "nine in ten reach, mm/s", "do not walk"],
         rows,
-        f"Each gait on {robots} robots as the completed model has them, every parameter off by 2 % (one standard "
-        "deviation).",
+        f"Each gait on {robots} variants of the completed model, every parameter with 2 % relative spread (one "
+        "standard deviation).",
     )
     charts: list[Chart] = [walks_chart(list(walks.values())), robustness_chart(summary["robustness"], GAIT_NAMES)]
     return Section("The gaits", said, [table], charts)
 
 
 _ENDED = {
-    Ending.PREDICTED: "the speed of its gait is predicted to within what repeats differ by, or to half a per cent",
-    Ending.UNCHANGED: "its model names the same as the one before, its gait is as fast, and is predicted no better",
+    Ending.PREDICTED: "the speed of its gait is predicted to within the scatter of repeats, or to half a per cent",
+    Ending.UNCHANGED: "it names the same effects as the round before; its gait is as fast and predicted no better",
     Ending.MOST: f"there are at most {ROUNDS} rounds, and the speed of its gait is still not predicted",
 }
 
@@ -219,12 +219,12 @@ def rounds_section(rounds: Sequence[Mapping]) -> Section:
     ]
     columns = ["round", "predicted, mm/s", "measured, mm/s", "RMS error, mm", "noise floor, mm"]
     caption = (
-        "Each gait as the model of its round predicts it: its speed, and where head and tail are all along the walk."
+        "Each gait as predicted by the model of its round: its speed, and the positions of head and tail over the walk."
     )
     said = [
-        "A model is worth what it predicts of a gait that no fit has seen. Round 1 is the gait found with the "
-        "completed model; where its speed is not predicted, its walks become data, the diagnosis is made anew from "
-        "all data, and the next round walks the gait of that model.",
+        "A model is judged by its prediction of a gait that no fit has seen. Round 1 is the gait found with the "
+        "completed model; if its speed is not predicted, its walks become data, the diagnosis is repeated with all "
+        "data, and the next round walks the gait of that model.",
         *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
         f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
     ]

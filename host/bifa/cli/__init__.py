@@ -1,4 +1,4 @@
-"""The command `bifa`: one command a file; each file offers `register(app)`.
+"""The command `bifa`: one file per command; each file has `register(app)`.
 
 Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, so that `bifa --help` is instant.
 """
@@ -17,7 +17,7 @@ from bifa.printable import printable
 
 
 class _Commands(typer.core.TyperGroup):
-    """Ctrl-C ends each command with a line that says what became of its work."""
+    """Ctrl-C ends each command with a line that says what was kept."""
 
     def invoke(self, ctx):
         try:

@@ -53,7 +53,7 @@ def stages(incomplete: str = "") -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def port_option(text: str = "Serial port, `virtual`, or a rig by its name; detected if left out."):
+def port_option(text: str = "Serial port, `virtual`, or the name of a rig; detected if left out."):
     """The option --port."""
     return typer.Option(help=text, metavar="PORT", autocompletion=ports)
 

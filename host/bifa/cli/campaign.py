@@ -20,14 +20,14 @@ def register(app: typer.Typer) -> None:
 
 
 def campaign(
-    out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/campaign"),
-    port: Annotated[str, port_option("`virtual`, a serial port, or a rig of your own by its name.")] = "virtual",
+    out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/campaign"),
+    port: Annotated[str, port_option("`virtual`, a serial port, or the name of your own rig.")] = "virtual",
     seed: Annotated[int, typer.Option(min=0, help="Of the virtual robot, its undisclosed effect, all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Each condition twice, not three times; faster.")] = False,
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path,
-        typer.Option(help="File of what is known of the bench; you are asked once (serial port).", show_default=True),
+        typer.Option(help="File of values measured on the bench; you are asked once (serial port).", show_default=True),
     ] = Path("bench.toml"),
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     profile: Annotated[Profile, PROFILE] = "realistic",
@@ -35,13 +35,13 @@ def campaign(
 ) -> None:
     """Run the whole loop on a robot; a virtual one has an undisclosed effect.
 
-    On a serial port your own camera and testing machine measure: the campaign says what to mount and to start, takes
-    the CSV that they save, lines it up with the Uno by the strobe, shows it, and repeats it if you like: docs/bench.md.
+    On a serial port your own camera and testing machine measure: the campaign says what to mount and start, reads the
+    CSV that they save, aligns it with the Uno by the strobe, shows it, and repeats the trial on request: docs/bench.md.
 
-    Every stage can be interrupted and resumed, days later as well, and is run again only when something that it
-    depends on has changed. Only the stages that measure need the robot. What you have weighed or gauged yourself is
-    declared in the bench's file or with --known; everything else is fitted, or stands at the nominal value where no
-    experiment can tell it. A virtual robot comes with its masses and its supply pressure.
+    Every stage can be interrupted and resumed, even days later, and is rerun only when something that it depends on
+    has changed. Only the stages that measure need the robot. What you have weighed or measured yourself is declared in
+    the bench file or with --known; everything else is fitted, or kept at its nominal value where no experiment
+    determines it. A virtual robot declares its masses and its supply pressure.
     """
     _check(out, port)
 
@@ -61,7 +61,7 @@ def run_campaign(
     watch: Path | None = None,
     bench_file: Path | None = None,
 ) -> None:
-    """Bring all stages up to date with progress on the terminal, then print what came of it."""
+    """Bring all stages up to date with progress on the terminal, then print the results."""
     _check(out, port)
 
     import json
@@ -71,7 +71,7 @@ def run_campaign(
 
     console = Console()
     bench = Bench(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
-    with stoppable(lambda: f"{_kept(out)}. The same command goes on there"):
+    with stoppable(lambda: f"{_kept(out)}. The same command resumes there"):
         if bench.is_by_hand:
             bench = _attended(console, bench, watch, bench_file)
 

@@ -21,8 +21,8 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """List what is in a data set, warn of what looks wrong, and plot it with --pictures.
 
-        A malformed data set ends with status 2 and names file, line and column. What is well-formed but
-        doubtful (a clipped sensor, a clock that jumps, missing repeats) is listed as a warning, status 0.
+        A malformed data set gives status 2 and an error with file, line and column. Data that are well-formed but
+        doubtful (a clipped sensor, a clock that jumps, missing repeats) are listed as warnings, status 0.
         """
         from bifa.files import check_targets, written_into
 

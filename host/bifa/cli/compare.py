@@ -17,7 +17,7 @@ def compare(
     runs: Annotated[list[Path], typer.Argument(help="Folders of finished campaigns, two or more.", show_default=False)],
     report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with all of it.")] = None,
 ) -> None:
-    """Put models, verdicts and gaits of several campaigns side by side."""
+    """Compare the models, verdicts and gaits of several campaigns."""
     from bifa.campaign.side_by_side import (
         compare_page,
         error_table,

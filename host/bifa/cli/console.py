@@ -22,8 +22,7 @@ def console(
 ) -> None:
     """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D or Ctrl-C leaves, with all valves off.
 
-    With its input from a pipe it sends the lines one by one, prints the answers, and ends with status 1 if one was an
-    error.
+    With piped input it sends the lines one by one, prints the answers, and exits with status 1 if any was an error.
     """
     from bifa.link import Uno
     from bifa.link.terminal import settle

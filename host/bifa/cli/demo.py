@@ -1,4 +1,4 @@
-"""`bifa demo`: the whole story without hardware, the real firmware in a simulated chip."""
+"""`bifa demo`: the whole loop without hardware, with the real firmware in a simulated chip."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,7 +18,7 @@ def register(app: typer.Typer) -> None:
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder of all artefacts; name it again to resume.")] = Path("out/demo"),
+    out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/demo"),
     seed: Annotated[int, typer.Option(min=0, help="Of the robot, its undisclosed effect and all noise.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Only walk two gaits and compare their speeds.")] = False,
     profile: Annotated[Profile, PROFILE] = "realistic",
@@ -29,7 +29,7 @@ def demo(
     With --quick: walk the paper's baseline gait and an optimised one on the nominal robot.
     """
     if quick:
-        with stoppable(lambda: f"nothing is kept of the walks under way; what was finished before is in {out}"):
+        with stoppable(lambda: f"the current walks were discarded; those finished before are in {out}"):
             _walk_two_gaits(out, seed, rerun)
     else:
         from bifa.cli.campaign import run_campaign

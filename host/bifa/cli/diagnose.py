@@ -48,7 +48,7 @@ def diagnose(
     dask_cert: Annotated[Path | None, typer.Option(help=cluster.CERT_HELP)] = None,
     dask_key: Annotated[Path | None, typer.Option(help=cluster.KEY_HELP)] = None,
 ) -> None:
-    """Fit the base model, find what repeats agree on but the model does not, name its cause, add it, and
+    """Fit the base model, find the residual that repeats share, name its cause, add it to the model, and
     report the error before and after on trials that were not fitted. Exit status 0 for any verdict."""
     from contextlib import nullcontext
 

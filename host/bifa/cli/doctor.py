@@ -15,7 +15,7 @@ def register(app: typer.Typer) -> None:
 
 
 def doctor(
-    port: Annotated[str | None, port_option("Ask the board at this port as well (it restarts).")] = None,
+    port: Annotated[str | None, port_option("Also query the board at this port (it restarts).")] = None,
 ) -> None:
     """Say what is installed, which port and firmware there are, what is missing and how to get it.
 

@@ -55,15 +55,15 @@ def experiment(
     watch: Annotated[Path | None, WATCH] = None,
     instrument: Annotated[Path | None, file_option("CSV of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[
-        Path | None, typer.Option(help="The Uno's telemetry of the same time (bifa record).", exists=True)
+        Path | None, typer.Option(help="The Uno's telemetry from the same time (bifa record).", exists=True)
     ] = None,
 ) -> None:
-    """Run a characterisation experiment and write what it measured as a data set.
+    """Run a characterisation experiment and write the measurements as a data set.
 
-    Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments have
-    clocks of their own and are synchronised with the Uno's by its sampling strobe (D10); each trial notes how well.
-    On a serial port your own instruments measure: what to mount and start is said, trial by trial, and the CSV that
-    they save is the record (docs/bench.md).
+    Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments
+    have their own clocks, synchronised with the Uno's by its sampling strobe (D10); each trial records how well.
+    On a serial port your own instruments measure: you are told what to mount and start, trial by trial, and the
+    CSV that they save is the record (docs/bench.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
     from bifa.files import check_targets

@@ -1,4 +1,4 @@
-"""`bifa flash`: build the firmware, write it to the Uno, and see it answer."""
+"""`bifa flash`: build the firmware, write it to the Uno, and check that it answers."""
 
 from typing import Annotated
 
@@ -19,7 +19,7 @@ def flash(
     build_only: Annotated[bool, typer.Option("--build-only", help="Build the image, write nothing.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show PlatformIO's whole output.")] = False,
 ) -> None:
-    """Build the firmware with PlatformIO, write it to the Uno, and see it answer.
+    """Build the firmware with PlatformIO, write it to the Uno, and check that it answers.
 
     Vent the supplies first: while the bootloader runs, the valve pins float, and only the gates' pull-downs
     keep the valves off.

@@ -26,7 +26,7 @@ def gaits(
     ] = [],  # noqa: B006
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches.")] = 0,
 ) -> None:
-    """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or make them anew."""
+    """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or recompute them."""
     from rich.table import Table
 
     from bifa.files import check_targets

@@ -21,14 +21,16 @@ def monitor(
     gait: Annotated[Path | None, file_option("Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
     web: Annotated[bool, typer.Option("--web", help="On a page in the browser, with sliders for the gait.")] = False,
-    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any that is free.")] = 8765,
-    model: Annotated[Path | None, typer.Option(help="What predicts on the page; the nominal one if left out.")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="End after so long; otherwise Ctrl-C.")] = None,
+    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = 8765,
+    model: Annotated[
+        Path | None, typer.Option(help="Model for the page's predictions; the nominal one if left out.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this time; otherwise Ctrl-C.")] = None,
 ) -> None:
-    """Watch the robot: pressures with their last seconds, valves, phases, and what the link has lost.
+    """Watch the robot: pressures over the last seconds, valves, phases, and samples lost on the link.
 
-    With --web the page is served on this computer only, at an address that is printed; who has it can change the gait,
-    walk and stop. There is a stop button, which says when the Uno has confirmed.
+    With --web the page is served on this computer only, at the printed address; whoever has it can change the gait,
+    walk and stop. There is a stop button, which shows when the Uno has confirmed.
 
     Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
     """

@@ -31,7 +31,7 @@ def optimize(
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="Of the search and of the draws.")] = 0,
     evaluations: Annotated[
-        int | None, typer.Option(min=20, help="Gaits to evaluate in a run; 1000 for bo.", show_default=False)
+        int | None, typer.Option(min=20, help="Gaits to evaluate per run; 1000 for bo.", show_default=False)
     ] = None,
     runs: Annotated[
         int | None,
@@ -51,8 +51,8 @@ def optimize(
 ) -> None:
     """Find the gait that maximises the settled speed: periodic, without slip, verified with a finer step.
 
-    By default what is maximised is the speed at the 10th percentile over the model's uncertainty, since the fastest
-    nominal gait collapses under a 1 % change. Pictures go to a folder beside the gait if nothing else is said.
+    By default the 10th percentile of the speed over the model's uncertainty is maximised, since the fastest nominal
+    gait collapses under a 1 % change. Pictures go to a folder next to the gait file by default.
     """
     from bifa.files import check_targets
 

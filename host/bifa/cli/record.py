@@ -26,11 +26,11 @@ def record(
     repeats: Annotated[int, typer.Option(min=1, help="Walks (with instruments).")] = 1,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="Length (without instruments); else Ctrl-C.")] = None,
 ) -> None:
-    """Record walks. On a rig with a motion capture: a data set that `bifa check` and `bifa diagnose` read.
+    """Record walks. On a rig with motion capture: a data set for `bifa check` and `bifa diagnose`.
 
     On a bare Uno: a folder with telemetry (pressures, commands, phases, the Uno's and the computer's time), written as
-    it comes. If the port vanishes, what was recorded is kept, and recording resumes when it is back. A command that is
-    interrupted is resumed by giving it again.
+    it arrives. If the port vanishes, the data recorded so far are kept, and recording resumes when the port is back.
+    An interrupted command is resumed by running it again.
     """
     from bifa.files import check_targets
     from bifa.rig import check_port

@@ -12,7 +12,7 @@ EPILOG = """[bold]Examples[/bold]
 
 bifa rig                              offer a pty and print its path; Ctrl-C ends
 
-bifa rig --link /tmp/uno              the same under a lasting name
+bifa rig --link /tmp/uno              the same under a fixed name
 
 bifa console --port /tmp/uno          in another terminal (or picocom -b 250000 /tmp/uno)
 

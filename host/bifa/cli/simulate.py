@@ -34,7 +34,7 @@ def simulate(
         bool,
         typer.Option(
             "--paper",
-            help="Compare the paper's figures and obstacles with the model's; --gait: its fastest gait.",
+            help="Compare the paper's figures and obstacles with the model's; --gait: the model's fastest gait.",
         ),
     ] = False,
 ) -> None:

@@ -130,7 +130,7 @@ def _clock(trial: Trial) -> Iterator[Finding]:
 def _no_motion(trial: Trial) -> Iterator[Finding]:
     for name, values in trial.columns.items():
         if name.startswith("displacement") and np.ptp(values) < MOTION_MM:
-            text = f"moves by {np.ptp(values):.3f} mm only: nothing happened in this trial"
+            text = f"moves by only {np.ptp(values):.3f} mm: nothing happened in this trial"
             yield Finding("no motion", text, trial.file, column=name)
 
 
@@ -197,7 +197,7 @@ def _session_order(dataset: Dataset) -> Iterator[Finding]:
     known = [order for order in orders if order is not None]
     if known and len(known) < len(orders):
         text = f"{len(orders) - len(known)} of {len(orders)} trials have no session_order"
-        yield Finding("session order", f"{text}: a drift over the session shows only in part")
+        yield Finding("session order", f"{text}: a drift over the session is only partly visible")
     twice = sorted(order for order, count in Counter(known).items() if count > 1)
     if twice:
         yield Finding("session order", f"session_order {', '.join(map(str, twice))} is given to several trials")

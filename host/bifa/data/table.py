@@ -151,7 +151,9 @@ def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
     close = np.flatnonzero(np.diff(time_s) < SHORTEST_STEP_S)
     if close.size:
         row = int(close[0]) + 1
-        problem = f"time advances by {time_s[row] - time_s[row - 1]:g} s only (least: {SHORTEST_STEP_S:g} s)"
+        problem = (
+            f"time advances by {time_s[row] - time_s[row - 1]:g} s, less than the minimum of {SHORTEST_STEP_S:g} s"
+        )
         raise DatasetError(problem, file=file, line=row + 2, column="time_s")
     for name, values in columns.items():
         if is_command(name):

@@ -76,7 +76,7 @@ class DatasetWriter:
         for what, old, new in (("name", earlier.name, head.name), ("known", earlier.known, head.known)):
             if old != new:
                 raise DatasetError(
-                    f"{self.partial} was begun with {what} = {old!r}, not {new!r}; "
+                    f"{self.partial} was started with {what} = {old!r}, not {new!r}; "
                     f"resume it with the same settings, or move it away"
                 )
         return earlier

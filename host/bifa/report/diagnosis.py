@@ -19,10 +19,10 @@ from bifa.report.words import (
 from lacuna.report import sentence
 
 BASE_MODEL = "The base model is the paper's, with its parameters fitted to this robot."
-COMPLETED_MODEL = "The completed model has what was found added to it, and was fitted anew."
-RMS = "Errors are measured minus predicted, the root of their mean square (RMS)."
-RESIDUAL = "A residual is what is left of a measurement once the prediction is taken away."
-NOISE_FLOOR = "The noise floor is how far two runs of the same condition are apart anyway: no model can be nearer."
+COMPLETED_MODEL = "The completed model includes the effects that were found, and was refitted."
+RMS = "Errors are measured minus predicted, as root mean square (RMS)."
+RESIDUAL = "A residual is the measurement minus the prediction."
+NOISE_FLOOR = "The noise floor is how much runs of the same condition differ: no model can predict better."
 HELD_OUT = "Held-out trials were measured, but neither model was fitted to them."
 
 Labels = Mapping[str, str]
@@ -60,7 +60,7 @@ def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[Sec
 
 def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
     """How much each effect explains, how probable it is, and what else it could be."""
-    said = ["The gap is what the base model is further off than the noise floor, on held-out trials."]
+    said = ["The gap is the base model's error beyond the noise floor, on held-out trials."]
     for effect in effects:
         name = effect_words(effect["name"])
         sentence = f"{name[:1].upper()}{name[1:]} closes {_percent(effect['share_of_gap'])} of it"
@@ -104,8 +104,8 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
             meaning, unit = effect_parameter(name, key)
             value, ends = ("not found", "") if mine is None else _sized(mine, key, unit)
             row = [f"{effect_words(name)}: {meaning}", value, ends]
-            rows.append(row + ([quantity(true[key], unit, 3) if key in true else "not in it"] if truth else []))
-    columns = ["", "found", "90 % interval", *(["in the seal"] if truth is not None else [])]
+            rows.append(row + ([quantity(true[key], unit, 3) if key in true else "absent"] if truth else []))
+    columns = ["", "found", "90 % interval", *(["sealed value"] if truth is not None else [])]
     return Table(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
 
 

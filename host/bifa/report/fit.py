@@ -1,4 +1,4 @@
-"""The page of one fit: parameters with their intervals, how well the model describes the data, what it leaves open."""
+"""The page of one fit: parameters with intervals, how well the model describes the data, what is not determined."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def fit_page(found: Identification) -> Page:
     dataset = found.system.dataset
     worst = max(found.error.values())
     says = (
-        "The base model describes this data to within its noise."
+        "The base model describes these data to within its noise."
         if worst <= AS_NOISE
-        else f"The base model does not describe this data: where it is furthest off, its error is {worst:.1f} times "
+        else f"The base model does not describe this data: in the worst case its error is {worst:.1f} times "
         "the noise floor."
     )
     counted = f"{len(found.intervals)} parameters were fitted to {len(dataset.trials)} trials."
@@ -58,7 +58,7 @@ def parameters_and_remarks(found: Identification) -> list[Section]:
     """Every parameter with its interval, and what there is to know about them."""
     return [
         Section("Parameters", tables=[_parameters(found)]),
-        Section("What to know about them", [spoken(line) for line in remarks(found)]),
+        Section("Notes", [spoken(line) for line in remarks(found)]),
     ]
 
 

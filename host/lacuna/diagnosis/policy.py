@@ -1,8 +1,8 @@
-"""Every rule by which the engine decides, in one place: its unit, its reason, and where it comes from.
+"""Every decision rule of the engine, in one place: its unit, its reason, and its origin.
 
-Constants of numerics (steps, tolerances, iterations) stay where they are used. What follows changes answers. `origin`
-is "derivation" (it follows from something else), "simulation" (tried on the toy system and on robots whose truth is
-known) or "convention" (a choice that a person may make otherwise; pass another `Policy` to `diagnose`).
+Numerical constants (steps, tolerances, iterations) stay where they are used. These rules change verdicts. `origin`
+is "derivation" (it follows from something else), "simulation" (tuned on the toy system and on robots with known
+truth) or "convention" (a choice that others may make differently; pass another `Policy` to `diagnose`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Policy:
     chance: float = _rule(
         0.005,
         "probability",
-        "so much shared by repeats by chance in any channel counts as structure: one false alarm in 200 data sets",
+        "a shared residual less likely by chance in any channel is structure: one false alarm in 200 data sets",
         "convention",
     )
     relevance: float = _rule(
@@ -42,20 +42,20 @@ class Policy:
     gain: float = _rule(
         8.0,
         "log-likelihood over dispersion",
-        "what one more effect must bring beyond its parameters' cost: odds of 3000 to 1",
+        "what one more effect must gain beyond the cost of its parameters: odds of 3000 to 1",
         "convention",
     )
     gain_per_piece: float = _rule(
         5e-4,
         "log-likelihood over dispersion, a piece",
-        "with many pieces any small misfit pays for a parameter",
+        "with many pieces of data, any small misfit would justify a parameter",
         "simulation",
     )
     unseen_gain: float = _rule(
-        0.25, "of the gain asked for", "part of it must come from trials that were not fitted", "simulation"
+        0.25, "of the gain required", "part of it must come from trials that were not fitted", "simulation"
     )
     share: float = _rule(
-        0.15, "of what is left", "an effect more must close this share of what the smaller set leaves", "simulation"
+        0.15, "of what is left", "one more effect must close this share of what the smaller set leaves", "simulation"
     )
     share_of_gap: float = _rule(
         0.03,
@@ -66,7 +66,7 @@ class Policy:
     )
     half: float = _rule(0.5, "of the gap", "mechanisms that together close less do not explain the data", "convention")
     confusable: float = _rule(
-        0.05, "probability", "an exchange of effects at least so probable is not ruled out", "convention"
+        0.05, "probability", "swapping in an effect at least this probable is not ruled out", "convention"
     )
     supported: float = _rule(
         0.5, "probability", "a named effect is at least as likely as not, against everything tried", "convention"
@@ -77,28 +77,34 @@ class Policy:
 
     # How far is the search worth its time?
     promising: float = _rule(
-        0.05, "of what is left", "an effect that takes away less in a quick fit is not fitted to the end", "simulation"
+        0.05, "of what is left", "an effect that removes less in a quick fit is not fitted to convergence", "simulation"
     )
     hopeful: float = _rule(
-        3.0, "times the least excess of the beam", "sets that leave more are not grown further", "simulation"
+        3.0, "times the least excess of the beam", "sets that leave more are not extended", "simulation"
     )
     hopeless: float = _rule(
-        10.0, "times the least excess finished", "a sketch that leaves more is not finished", "simulation"
+        10.0,
+        "times the least excess finished",
+        "a rough fit that leaves more is not fitted to convergence",
+        "simulation",
     )
     reach: float = _rule(
-        3.0, "times the cost of a set that suffices", "rivals beyond are not pursued: they cannot win", "derivation"
+        3.0,
+        "times the cost of a set that suffices",
+        "rivals beyond this are not pursued: they cannot win",
+        "derivation",
     )
     lost: float = _rule(
         2.0,
         "floors, RMS",
-        "where the base leaves more, and no effect explains enough from there, its fit may be so wrong that what is"
-        " missing does not help it: effects are begun anew",
+        "if the base model leaves more, and no effect explains enough from there, its fit may be so wrong that the"
+        " missing effect does not improve it: effects are fitted again from the initial values",
         "simulation",
     )
 
     # What is learnt?
     curve: float = _rule(
-        0.1, "of what is left on unseen trials beyond noise", "what one more curve must take away", "simulation"
+        0.1, "of what is left on unseen trials beyond noise", "what one more curve must remove", "simulation"
     )
 
     @classmethod

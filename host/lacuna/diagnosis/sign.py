@@ -1,4 +1,4 @@
-"""Effects that would explain something if their size had the sign that their bounds forbid."""
+"""Effects that would explain part of the residual if their bounds allowed the other sign."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _STEP = 0.1  # of the typical size: as far as a derivative at the absent size lo
 
 
 def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
-    """A sentence for each effect of one size, absent at a bound, that what `fitted` leaves asks the other side of: by a
-    linear regression that would take away its share of what is left."""
+    """A sentence for each effect with one size, absent at a bound, that the residual of `fitted` would push beyond that
+    bound: if a linear regression on it removes more than the policy's share of the residual."""
     system, problem = fitted.structure.system, fitted.problem
     basis, remaining = remaining_after(fitted)
     reference = problem.residuals(fitted.solution.point)

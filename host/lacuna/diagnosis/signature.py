@@ -1,4 +1,4 @@
-"""Where a residual lives and what it depends on, in words and numbers."""
+"""Where the residual is and what it depends on, in words and numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SHARE_OF_LARGEST = 0.05
 
 @dataclass(frozen=True)
 class Dependence:
-    """`share` of the residual's square that a curve over these quantities predicts in other runs."""
+    """`share` of the residual variance that a curve over these quantities predicts in other runs."""
 
     experiment: str
     channel: str
@@ -41,7 +41,7 @@ class Signature:
 
 
 def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = ()) -> Signature:
-    """The signature of what `fitted` leaves, given the test of it and what drifts over the session."""
+    """The signature of the residual of `fitted`, given its test for structure and the drifts over the session."""
     top = remainder.largest
     places = sorted(
         (key for key, z in remainder.z.items() if z > _VISIBLE and remainder.shared[key] > _SHARE_OF_LARGEST * top),
@@ -131,14 +131,14 @@ def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
 
 def _sentence(places, remainder: Remainder, dependences, drifts) -> str:
     if not places and not drifts:
-        return "Nothing is left in the residual but what repeats of a run differ by."
+        return "The residual contains nothing beyond the differences between repeats."
     parts = []
     if places:
         listed = ", ".join(
             f"{channel} in {experiment} ({np.sqrt(max(remainder.shared[experiment, channel], 0)):.1f} x the floor)"
             for experiment, channel in places[:4]
         )
-        parts.append(f"Repeats share a residual that the model does not predict: {listed}.")
+        parts.append(f"Repeats share a residual that the model does not explain: {listed}.")
     for d in dependences[:2]:
         parts.append(
             f"In {d.experiment}, {' and '.join(d.quantities)} explain{'s' if len(d.quantities) == 1 else ''} "

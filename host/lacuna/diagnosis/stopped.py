@@ -1,4 +1,4 @@
-"""A search that is stopped by hand (Ctrl-C) still answers, from what it had finished by then."""
+"""A search that is interrupted (Ctrl-C) still gives a verdict, from what it had finished by then."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.search import Search, reweighed, screen
 from lacuna.diagnosis.split import Split
 
-STOPPED = "The search was stopped by hand: the verdict is the best that had been found until then."
+STOPPED = "The search was stopped by hand: the verdict is based on the best result found so far."
 
 
 class Finished:
-    """Keeps every explanation that the search has fitted to the end, as it asks whether that is enough."""
+    """Keeps every explanation that the search has fitted to convergence, each time it asks whether that is enough."""
 
     def __init__(self, enough: Callable[[Candidate], bool]):
         self._enough, self.candidates, self.stopped = enough, [], False
@@ -22,7 +22,7 @@ class Finished:
         return self._enough(candidate)
 
     def search(self, base: Candidate, split: Split) -> Search:
-        """What a search would have returned: the best of each set, all against the latest floor."""
+        """What the search would have returned: the best candidate for each set, all against the latest floor."""
         self.stopped = True
         floor = (self.candidates[-1] if self.candidates else base).fitted.problem.floor
         found: dict[frozenset[str], Candidate] = {}

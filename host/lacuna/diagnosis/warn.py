@@ -1,4 +1,4 @@
-"""What a person should know before believing a fit: bounds, open directions, predictions that failed."""
+"""Reasons to doubt a fit: parameters at bounds, undetermined directions, failed predictions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.uncertainty import uncertainty
 
-_NEAR_LIMIT = 3.5  # standard deviations that a nuisance strayed: it stands in for something
+_NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably absorbs model error
 
 
 def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
-    """One sentence each, the gravest first."""
+    """One sentence each, the most serious first."""
     held_out = evaluate_on(fitted, split.held_out) if split.held_out else None
     fits = [fitted, held_out] if held_out else [fitted]
     return (*_failed(fits), *_parameters(fitted), *_strayed(fits))
@@ -33,7 +33,7 @@ def _parameters(fitted: Fit) -> list[str]:
     known = uncertainty(fitted)
     told = fitted.structure.system.told
     found = [
-        f"{e.name} is at its bound ({_quantity(told(e.name, e.value), e.unit)}): the data ask for more than it allows."
+        f"{e.name} is at its bound ({_quantity(told(e.name, e.value), e.unit)}): the data call for a value beyond it."
         for e in known.estimates
         if e.at_bound
     ]
@@ -43,7 +43,7 @@ def _parameters(fitted: Fit) -> list[str]:
         if e.implausible and not e.at_bound
     ]
     for direction in known.undetermined:
-        found.append(f"The data do not determine {_listed(list(direction))}: a combination of them is open.")
+        found.append(f"The data do not determine a combination of {_listed(list(direction))}.")
     return found
 
 
@@ -56,7 +56,9 @@ def _strayed(fits: list[Fit]) -> list[str]:
             for value, parameter in zip(values, parameters, strict=True):
                 if "." not in parameter.name and abs(value - parameter.value) > _NEAR_LIMIT * parameter.step_scale:
                     far.setdefault(parameter.name, []).append(trial.name)
-    return [f"{name} is at its limit in {_listed(trials)}: it stands in for something." for name, trials in far.items()]
+    return [
+        f"{name} is at its limit in {_listed(trials)}: it probably absorbs model error." for name, trials in far.items()
+    ]
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -24,7 +24,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
     sections = [
         *_evidence(effects),
         *([_measured(found)] if found else []),
-        Section("Where the residual lives", (record["signature"]["text"],)),
+        Section("Where the residual is", (record["signature"]["text"],)),
         _errors(error),
         *([_held_out(found)] if found else []),
         *([Section("What the named effects leave", (record["remainder"]["text"],))] if effects else []),
@@ -60,7 +60,7 @@ def _held_out(found: Diagnosis) -> Section:
     figure = both_palettes(
         lambda stream, dark: draw_held_out(found, stream, dark),
         "measured and predicted, before and after, on records that were not fitted",
-        "The records predicted worst by the model as it is. Left: measured and predicted; right: the residual.",
+        "The records that the base model predicts worst. Left: measured and predicted; right: the residual.",
     )
     return Section("On records that were not fitted", figures=(figure,))
 
@@ -72,8 +72,8 @@ def _rejected(record: Mapping[str, Any]) -> list[Section]:
     table = Table(("explanation", "of the gap that it would close"), rows)
     tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
     why = (
-        "An explanation is rejected where it predicts conditions that were never fitted no better than a smaller"
-        " one, where it closes too little of the gap, or where a rival explains the same and more."
+        "An explanation is rejected if it predicts conditions that were never fitted no better than a smaller one,"
+        " if it closes too little of the gap, or if a rival explains the same and more."
     )
     return [Section("Also tried, and rejected", (why,), (table,), figures=(tried,))]
 
@@ -111,7 +111,7 @@ def _words(name: str) -> str:
 
 
 def _measured(found: Diagnosis) -> Section:
-    columns = ("channel", "records in conditions", "floor (standard deviation)", "samples to a piece", "from")
+    columns = ("channel", "records in conditions", "floor (standard deviation)", "samples per observation", "from")
     return Section("What was measured", (floor_sentence(found),), (Table(columns, measured_rows(found)),))
 
 

@@ -19,9 +19,9 @@ def verdict_sentence(
 ) -> str:
     """A verdict (of `as_record`) in one sentence; `words`: what an effect is called."""
     if verdict == "none":
-        return "Nothing that matters is missing from the base model: it predicts this data to within the noise."
+        return "Nothing that matters is missing from the base model: it predicts these data to within the noise."
     if verdict == "unexplained":
-        return "The base model lacks something that no effect of the library accounts for."
+        return "The base model lacks something that no effect of the library explains."
     names = " and ".join(words(effect) for effect in effects)
     closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap"
     rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"

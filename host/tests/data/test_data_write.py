@@ -106,9 +106,9 @@ def test_a_session_grows_is_interrupted_and_goes_on(tmp_path):
 
     with pytest.raises(DatasetError, match="interrupted session"):
         DatasetWriter(*arguments)
-    with pytest.raises(DatasetError, match="was begun with name"):
+    with pytest.raises(DatasetError, match="was started with name"):
         DatasetWriter(tmp_path / "day", "another", dataset.known, resume=True)
-    with pytest.raises(DatasetError, match="was begun with known"):
+    with pytest.raises(DatasetError, match="was started with known"):
         DatasetWriter(tmp_path / "day", dataset.name, {"head_mass_kg": 1.0}, resume=True)
 
     again = DatasetWriter(*arguments, resume=True)

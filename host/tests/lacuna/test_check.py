@@ -64,7 +64,7 @@ REFUSED_PREDICTIONS = {
     "NaN always": (lambda t, p: {"y": np.full(101, np.nan)}, "run 0, channel y: the prediction is NaN, as in every"),
     "NaN in a sample": (lambda t, p: {"y": np.where(T == 0.5, np.nan, T)}, "run 0, channel y: the prediction is NaN"),
     "a constant": (lambda t, p: {"y": np.ones(101)}, "run 0, channel y: no parameter changes the prediction"),
-    "chance": (lambda t, p: {"y": p["slope"] * T + DRAW.standard_normal(101)}, "run 0, channel y: predicted twice"),
+    "chance": (lambda t, p: {"y": p["slope"] * T + DRAW.standard_normal(101)}, "run 0, channel y: two predictions"),
     "an effect when off": (
         lambda t, p: {"y": p["slope"] * T + T**2 * ("bend.by" in p)},
         "run 0, channel y: effect bend changes the prediction although its size is 0",
@@ -81,13 +81,16 @@ def test_refuses_a_prediction_of(name):
 
 Y = Line().trials[0].channels["y"]
 REFUSED_RECORDS = {
-    "times that fall": ({"time_s": np.where(T == 0.5, 0.2, T)}, "run 0: time does not rise from sample 49"),
-    "times that stand": ({"time_s": np.minimum(T, 0.9)}, "run 0: time does not rise from sample 90"),
+    "times that fall": ({"time_s": np.where(T == 0.5, 0.2, T)}, "run 0: time does not increase from sample 49"),
+    "times that stand": ({"time_s": np.minimum(T, 0.9)}, "run 0: time does not increase from sample 90"),
     "a time that is missing": ({"time_s": np.where(T == 0.5, np.nan, T)}, "run 0: time at sample 50 is not a number"),
-    "another length": ({"channels": {"y": Y[1:]}}, r"run 0, channel y: shape \(100,\) measured, \(101,\) times"),
+    "another length": (
+        {"channels": {"y": Y[1:]}},
+        r"run 0, channel y: measured with shape \(100,\), but the times have \(101,\)",
+    ),
     "text": ({"channels": {"y": np.full(101, "1.0")}}, "run 0, channel y: measured values are <U3"),
     "an infinity": ({"channels": {"y": np.where(T == 0.5, np.inf, Y)}}, "run 0, channel y: infinite at sample 50"),
-    "nothing": ({"channels": {"y": np.full(101, np.nan)}}, "run 0, channel y: fewer than 8 samples"),
+    "nothing": ({"channels": {"y": np.full(101, np.nan)}}, "run 0, channel y: fewer than 8 valid samples"),
     "no channel": ({"channels": {}}, "run 0 has no channel"),
     "another's name": ({"name": "run 1"}, "trial run 1: more than one trial has this name"),
 }
@@ -112,9 +115,9 @@ def test_takes_a_channel_that_rests_in_one_trial_only():
 
 def test_refuses_an_effect_under_another_key():
     effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0))
-    with pytest.raises(MisuseError, match="effect bend stands under the key curve"):
+    with pytest.raises(MisuseError, match="effect bend is listed under the key curve"):
         diagnose(Line(effects={"curve": effect}), progress=pytest.fail)
-    with pytest.raises(DeclarationError, match="effect bend stands under the key curve"):
+    with pytest.raises(DeclarationError, match="effect bend is listed under the key curve"):
         lacuna.System(heater.simulate, heater.PARAMETERS, {"curve": effect})
 
 
@@ -138,7 +141,7 @@ def test_refuses_names_that_are_used_twice():
 def test_refuses_repeats_of_different_inputs():
     records = heater.records(repeats=2)
     records["steps_4W_2"]["power_W"] = -records["steps_4W_2"]["power_W"]
-    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are called repeats.*power_W differs"):
+    with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are declared as repeats.*power_W differs"):
         lacuna.diagnose(heater.system(), records, progress=pytest.fail)
 
 
@@ -205,7 +208,7 @@ def test_warns_of_a_direction_that_the_data_leave_open():
 
     parameters = (*heater.PARAMETERS, Parameter("volts", "", 1.0, 0.01, 100.0))
     said = warned(lacuna.System(simulate, parameters), heater.records(repeats=2, seed=3))
-    assert "do not determine gain_K_W, volts" in said
+    assert "do not determine a combination of gain_K_W, volts" in said
 
 
 def test_warns_of_a_nuisance_at_its_limit():
@@ -229,7 +232,7 @@ def test_warns_of_an_effect_that_would_need_the_opposite_sign():
 
 def test_warns_of_a_parameter_that_changes_nothing():
     idle = (*heater.PARAMETERS, Parameter("unused", "", 1.0, 0.1, 10.0))
-    assert "unused changes no prediction" in warned(
+    assert "unused does not affect any prediction" in warned(
         lacuna.System(heater.simulate, idle, _all()), heater.records(repeats=2, seed=3)
     )
 

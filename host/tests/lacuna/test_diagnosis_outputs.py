@@ -15,7 +15,7 @@ def test_page_says_the_effect_and_loads_nothing():
     record = as_record(diagnose(hide({"delay.delay_s": 0.02}, seed=30)))
     page = render(diagnosis_page("toy", record))
     assert "delay" in page
-    assert "that the model does not predict: position_mm in sweep" in page
+    assert "that the model does not explain: position_mm in sweep" in page
     assert 'src="http' not in page
 
 

@@ -67,7 +67,7 @@ def test_rejects_the_decoy_where_the_pulses_were_applied(emps):
 def test_a_cycle_of_another_length_is_refused(emps):
     """Taken for 6.249 s (it is 6.240 s), windows drift apart, and what they differ by would pass for noise."""
     tables = lacuna.windows(emps.read(DATA / "DATA_EMPS.mat"), 1.0, every=6.249 / 6, period=6.249)
-    with pytest.raises(lacuna.LacunaError, match="called repeats"):
+    with pytest.raises(lacuna.LacunaError, match="declared as repeats"):
         lacuna.diagnose(emps.system, tables, progress=False)
 
 

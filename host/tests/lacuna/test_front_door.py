@@ -73,7 +73,7 @@ def test_a_verdict_is_short_in_a_line_and_one_screen_in_print(verdict):
 def test_report_and_plot_show_what_was_not_fitted(verdict, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     page = verdict.report(tmp_path / "report.html").read_text()
-    for heading in ("What was measured", "Where the residual lives", "Error before and after", "not fitted"):
+    for heading in ("What was measured", "Where the residual is", "Error before and after", "not fitted"):
         assert heading in page
     assert 'src="http' not in page
     assert "<script" not in page

@@ -101,7 +101,7 @@ def test_windows_begin_in_states_of_their_own():
 def test_slow_noise_without_an_effect_is_said_to_be_either():
     left = lacuna.diagnose(heater.system(), lacuna.segments(record(3, slow_K=0.3)), progress=False)
     assert left.verdict == "unexplained"
-    (said,) = [w for w in left.warnings if "remembers itself" in w]
+    (said,) = [w for w in left.warnings if "correlation time" in w]
     seconds = float(said.split("about ")[1].split(" s")[0])
     assert 5.0 < seconds < 15.0  # 10 s in truth
 

@@ -56,7 +56,7 @@ DIAGNOSIS = {
         "experiments": ["locomotion"],
         "depends_on": ["pressure of the body"],
         "learnt": ["filling"],
-        "text": "Repeats share a residual that the model does not predict: pressure_body_psi in locomotion (0.6 x the "
+        "text": "Repeats share a residual that the model does not explain: pressure_body_psi in locomotion (0.6 x the "
         "floor).",
     },
     "nearest": [
@@ -69,7 +69,7 @@ DIAGNOSIS = {
     "signature": {
         "experiments": ["static_loading"],
         "depends_on": ["direction of motion"],
-        "text": "Repeats share a residual that the model does not predict: force_N in static_loading (15.1 x the floor)"
+        "text": "Repeats share a residual that the model does not explain: force_N in static_loading (15.1 x the floor)"
         ", as in static_large_0psi_2mm_s_1.csv.",
     },
     "learnt": [CURVE],

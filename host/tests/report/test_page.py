@@ -70,7 +70,7 @@ def test_the_first_screen_answers_and_says_what_its_words_mean(html):
         "bifa campaign --port virtual --seed 0",
         "noise floor is",
         "base model is",
-        "completed model has",
+        "completed model includes",
         "Held-out trials",
     ):
         assert said in first, said
@@ -88,7 +88,7 @@ def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
     assert "Round 1: the model has hysteresis added to it, its gait is 2.80 s, head 204° and tail 332° ahead" in section
     assert "Round 2: the model has hysteresis and valve latency added to it, its gait is 2.61 s" in section
     assert "1 21.40 20.60 ± 0.01 2.31 0.104 2 20.87 20.88 ± 0.02 0.117" in section
-    assert "It ended after round 2: the speed of its gait is predicted to within what repeats differ by" in section
+    assert "It ended after round 2: the speed of its gait is predicted to within the scatter of repeats" in section
 
 
 @pytest.mark.parametrize(("ended", "why"), [("unchanged", "predicted no better"), ("most", "at most 3 rounds")])
