@@ -101,10 +101,12 @@ def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray) -> Timeline | N
     for chamber in range(3):
         seen = recorded.time_s[recorded.chamber == chamber][1:]
         due = ideal.time_s[ideal.chamber == chamber][1:]
+        states, begins = recorded.command[recorded.chamber == chamber], ideal.command[ideal.chamber == chamber][0]
+        if states[0] != begins and len(seen) and seen[0] <= sample_s + _SPARE_S:
+            states, due = states[1:], np.append(0.0, due)  # a switch at time 0: the first sample does not see it yet
         if len(due) and len(due) == len(seen) + 1:  # one due between the last two samples, or at the very start
             due = due[:-1] if due[-1] > time_s[-1] - sample_s else due[1:]
-        states = recorded.command[recorded.chamber == chamber]
-        if len(due) != len(seen) or (len(due) and states[0] != ideal.command[ideal.chamber == chamber][0]):
+        if len(due) != len(seen) or (len(due) and states[0] != begins):
             return None
         if len(due):
             low, high = max(low, (seen - sample_s - due).max()), min(high, (seen - due).min())

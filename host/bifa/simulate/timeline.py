@@ -133,7 +133,7 @@ def gait_switches(gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: fl
     phase = first_phase_rad / _TWO_PI + np.pad(gaits[:, 1:3], ((0, 0), (1, 0))) / 360.0
     phase = phase - np.floor(phase)
     always, never = duty <= 0.0, duty >= 1.0
-    first = np.where(always | never, always, phase > duty)  # (n, 3): positive to begin with
+    first = np.where(always | never, always, phase >= duty)  # (n, 3): positive from time 0 on, a switch at 0 included
     cycles = int(np.max(duration_s / gaits[:, 0])) + 3
     edge = np.stack([np.zeros_like(duty), duty], axis=-1)[:, :, None, :]
     time = (np.arange(cycles)[None, None, :, None] + edge - phase[:, :, None, None]) * period[:, :, None, None]

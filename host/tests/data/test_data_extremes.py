@@ -43,7 +43,7 @@ def test_a_number_beyond_any_measurement_is_refused_with_its_place(folder, text)
 def test_a_time_that_hardly_advances_is_refused_with_its_place(folder):
     put(folder, WALK, 1, 0, "0")
     put(folder, WALK, 2, 0, "5e-324")
-    with pytest.raises(DatasetError, match=f"{WALK}, line 3, column time_s: time advances by 4.94066e-324 s only"):
+    with pytest.raises(DatasetError, match=f"{WALK}, line 3, column time_s: time advances by 4.94066e-324 s, less"):
         read_dataset(folder)
 
 

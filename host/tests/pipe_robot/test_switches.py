@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bifa.data import Trial
@@ -56,6 +56,7 @@ GAIT = {"period_s": 3.0, "psi12_deg": 200.0, "psi13_deg": 100.0, "duty_body": 0.
 
 @settings(max_examples=60, deadline=None)
 @given(gait=gaits)
+@example(GAIT | {"period_s": 2.0, "psi13_deg": 120.0, "duty_tail": 1 / 3})  # the tail switches at time 0
 def test_a_walk_switches_when_its_gait_says_not_when_the_sample_shows_it(gait):
     timeline = walk_timeline(walk(gait))
     for chamber in CHAMBERS:
