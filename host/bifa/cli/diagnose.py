@@ -68,7 +68,7 @@ def diagnose(
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     found = _found(console, measured, robot, good_enough, seed, folder, port, watch, workers)
-    _report(console, measured.name, found, json, out, report)
+    _report(console, measured, found, json, out, report)
 
 
 def _found(console, measured, robot, good_enough, seed: int, resolved: Path | None, port, watch, workers):

@@ -173,3 +173,10 @@ def test_half_a_csv_is_never_left(tmp_path, monkeypatch):
     result = invoke("simulate", "--cycles", 1, "--out", tmp_path / "walk.csv")
     assert "No space left on device" in str(result.exception)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_is_written_need_not_be_there(command):
+    written = {"out", "report", "json", "csv", "pictures", "plot"}
+    options = typer.main.get_command(app).commands[command].params
+    assert not [o.name for o in options if o.name in written and getattr(o.type, "exists", False)]

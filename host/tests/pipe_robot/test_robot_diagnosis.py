@@ -3,6 +3,7 @@
 `make test` runs a robot without an effect and one with one; the demo's test names another, through the firmware.
 """
 
+import json
 import subprocess
 import sys
 import tomllib
@@ -12,6 +13,7 @@ import pytest
 from bifa.data import read_dataset
 from bifa.identify.completed import completed_model
 from bifa.identify.start import prepare
+from bifa.robot import load_model
 from lacuna.diagnosis.diagnose import diagnose
 
 
@@ -29,10 +31,21 @@ def sealed(tmp_path):
     return draw
 
 
-def test_finds_nothing_in_a_robot_without_an_effect(sealed):
-    found, _ = sealed("--seed", "41", "--none")
-    assert found.verdict == "none"
-    assert found.after.held_out < 1.1 * found.floor.held_out
+def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
+    folder, record, page, model = (tmp_path / name for name in ("set", "found.json", "found.html", "model.toml"))
+    subprocess.run(
+        [sys.executable, "-m", "virtual_robot.sealed", "--out", folder, "--seed", "41", "--none"], check=True
+    )
+    written = ["--json", record, "--report", page, "--out", model]
+    command = [sys.executable, "-m", "bifa", "diagnose", folder, *written]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    found = json.loads(record.read_text())
+    assert found["verdict"] == "none"
+    assert found["error"]["after"]["held_out"] < 1.1 * found["error"]["noise_floor"]["held_out"]
+    assert "none" in said.splitlines()
+    assert "Nothing that matters is missing" in said
+    assert "Nothing that matters is missing" in page.read_text(encoding="utf-8")
+    assert load_model(model).effects == {}
 
 
 @pytest.mark.parametrize(
