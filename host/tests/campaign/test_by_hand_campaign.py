@@ -16,20 +16,6 @@ pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 HOST = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def lab(tmp_path):
-    """(pty, watched folder) of a bench served by another process."""
-    link, files = tmp_path / "uno", tmp_path / "files"
-    files.mkdir()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "harness.lab", str(link), str(files)], cwd=HOST, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout.readline() == "ready\n"
-    yield link, files
-    process.terminate()
-    process.wait(10)
-
-
 def begin(lab, folder, command, *options):
     link, files = lab
     return subprocess.Popen(

@@ -4,8 +4,6 @@ What computes between them is given: the gaits, and a diagnosis that errs at fir
 """
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -31,20 +29,6 @@ SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * 
 FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
 FASTER = Gait(2.6, 204.5, 331.7, 0.6535, 0.439, 0.439)
 EFFORT = Effort(quick=True, cycles=4, repeats=1)
-
-
-@pytest.fixture
-def lab(tmp_path):
-    """(pty, watched folder) of a bench served by another process."""
-    link, files = tmp_path / "uno", tmp_path / "files"
-    files.mkdir()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "harness.lab", str(link), str(files)], cwd=HOST, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout.readline() == "ready\n"
-    yield link, files
-    process.terminate()
-    process.wait(10)
 
 
 @pytest.fixture

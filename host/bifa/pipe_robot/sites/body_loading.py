@@ -1,6 +1,6 @@
 """The force of the large actuator's spring while it is loaded slowly, by direction: what it remembers of its way."""
 
-from bifa.pipe_robot.inputs import STATIC, Inputs, StaticInputs
+from bifa.pipe_robot.inputs import STATIC, Inputs
 from bifa.pipe_robot.sites.site import Site, loading
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant
@@ -18,6 +18,4 @@ SITE = Site(
 
 
 def readings(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
-    if not isinstance(inputs, StaticInputs) or inputs.actuator != "large":
-        return {}
-    return loading(channels, curve, inputs)
+    return loading(channels, curve, inputs, "large")

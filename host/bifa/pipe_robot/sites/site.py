@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.pipe_robot.inputs import Inputs
+from bifa.pipe_robot.inputs import Inputs, StaticInputs
 from bifa.robot.learnt import LearntCurve
 from lacuna.system import Channels, CorrectionSite
 
@@ -78,7 +78,9 @@ def row_of(channel: str, inputs: Inputs) -> int:
     return 0 if inputs.actuator == "large" or channel == "pressure_body_psi" else 1
 
 
-def loading(channels: Channels, curve: LearntCurve, inputs: Inputs) -> Channels:
-    """The force of a static loading with what a curve adds by direction, extending first."""
+def loading(channels: Channels, curve: LearntCurve, inputs: Inputs, actuator: str) -> Channels:
+    """The force of a static loading of `actuator` with what a curve adds by direction, extending first."""
+    if not isinstance(inputs, StaticInputs) or inputs.actuator != actuator:
+        return {}
     extending, contracting = (curve.at(inputs.displacement_m, row) for row in (0, 1))
     return {"force_N": channels["force_N"] + np.where(inputs.direction > 0, extending, contracting)}
