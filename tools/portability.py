@@ -196,7 +196,8 @@ def settings(environment: Environment) -> tuple[dict[str, str], set[int]]:
             raise RefusedError(f"this machine has no {needed}, which BLAS's {environment.kernel} needs")
         variables["OPENBLAS_CORETYPE"] = environment.kernel
     if environment.plain:
-        variables["NPY_DISABLE_CPU_FEATURES"] = " ".join(n for n in here["dispatched"] if n in here["features"])
+        known = os.environ.get("NPY_DISABLE_CPU_FEATURES", "").split()  # as they are where this is run by itself
+        variables["NPY_DISABLE_CPU_FEATURES"] = " ".join([*known, *(set(here["dispatched"]) & set(here["features"]))])
     language = environment.variables.get("LC_ALL", "C")
     if language != "C":
         variables["LOCPATH"] = str(_locale(language))

@@ -17,6 +17,8 @@ def test_notebook_runs(name, tmp_path, monkeypatch):
     if name == "emps" and not (EMPS / "DATA_EMPS.mat").exists():
         pytest.skip(f"the EMPS benchmark's records are not in {EMPS.relative_to(ROOT.parent)} beside the checkout")
     monkeypatch.setenv("EMPS_DATA", str(EMPS))
+    for own in ("IPYTHONDIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR"):  # else in a home that one may not have
+        monkeypatch.setenv(own, str(tmp_path / own))
     monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'host'}:{ROOT / 'docs' / 'examples'}")
     notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
     NotebookClient(notebook, timeout=LONGEST_S, resources={"metadata": {"path": str(tmp_path)}}).execute()

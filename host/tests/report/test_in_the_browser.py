@@ -122,11 +122,12 @@ def test_a_plot_zooms_and_comes_back(opened):
     page.mouse.down()
     page.mouse.move(spot["x"] + 0.6 * spot["width"], y, steps=5)
     page.mouse.up()
-    zoomed = plot.evaluate(reach)
-    assert zoomed[0] > whole[0]
-    assert zoomed[1] < whole[1]
+    both = [plot.element_handle(), whole]
+    nearer = f"([box, whole]) => {{ const [from, to] = ({reach})(box); return from > whole[0] && to < whole[1]; }}"
+    page.wait_for_function(nearer, arg=both)
     area.dblclick()
-    assert plot.evaluate(reach) == pytest.approx(whole)
+    back = f"([box, whole]) => ({reach})(box).every((end, k) => Math.abs(end - whole[k]) < 1e-6)"
+    page.wait_for_function(back, arg=both)
 
 
 def test_a_plot_says_under_the_pointer_what_is_there(opened):
