@@ -54,11 +54,11 @@ def convergence(q, block, x, inlet):
 
 
 @merged
-def pressure_after(plant, block, actuator, z, z_new, x, pressure, source, h):
+def pressure_after(plant, rig, block, actuator, z, z_new, x, pressure, source, h):
     """Eq. (2) over a step: exact for the inlet and the convergence factor as they are at its ends."""
     q, active = plant.q, plant.active
     inlet = chains.line(active, q, z, actuator, z_new, source, h)
-    rate = chains.filling(active, q, convergence(q, block, x, inlet), inlet - pressure)
+    rate = chains.filling(active, q, convergence(q, block, x, inlet), pressure, inlet, rig.share[actuator])
     total = rate + chains.loss(active, q)
     settled = inlet * rate / total
     after = settled + (pressure - settled) * math.exp(-total * h)

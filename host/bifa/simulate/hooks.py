@@ -10,7 +10,7 @@ the active effects in alphabetical order; an effect costs one test of a bit whil
 | `supply` | supply pressure now | `supply_psi`, `now_s` |
 | `load` | supply pressure under load | `supply_psi`, `conductance_per_s`, `pull_psi_per_s`, `positive` |
 | `line` | chamber's inlet pressure after the step, kept as `state` | `source_psi`, `step_s` |
-| `filling` | convergence factor alpha of (2) | `rate_per_s`, `difference_psi` |
+| `filling` | convergence factor alpha of (2) | `rate_per_s`, `pressure_psi`, `inlet_psi`, `volume_share` |
 | `loss` | 1/s of pressure lost | |
 | `area` | factor of the area a | `stroke_share` |
 | `play` | position of the spring | `position_m` |
@@ -44,7 +44,7 @@ _HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "supply": (("supply_psi", "now_s"), "replace"),
     "load": (("supply_psi", "conductance_per_s", "pull_psi_per_s", "positive"), "replace"),
     "line": ((*_STATEFUL, "z_new", "source_psi", "step_s"), "keep"),
-    "filling": (("rate_per_s", "difference_psi"), "replace"),
+    "filling": (("rate_per_s", "pressure_psi", "inlet_psi", "volume_share"), "replace"),
     "loss": ((), "sum"),
     "area": (("stroke_share",), "product"),
     "play": ((*_STATEFUL, "position_m"), "replace"),

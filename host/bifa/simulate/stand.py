@@ -132,7 +132,7 @@ def static_rows(plant, rig, run, displacement, sample_times, out):
             for s in range(steps):
                 reached = before + (target - before) * (s + 1) / steps
                 sources(plant, rig, run.command, y, now + (s + 1) * h, run.source)
-                y[p] = pressure_after(plant, block, actuator, z, z, y[x], y[p], run.source[actuator], h)
+                y[p] = pressure_after(plant, rig, block, actuator, z, z, y[x], y[p], run.source[actuator], h)
                 remember(plant, actuator, z, z, reached, reached - y[x], h)
                 y[x] = reached
                 if plant.active & chains.SENSOR:

@@ -150,7 +150,7 @@ def _small(plant, rig, actuator, source, y, z, h, y_new, z_new, narrower):
     q = plant.q
     at = X_SMALL_HEAD + 3 * (actuator - 1)
     x, v, pressure = y[at], y[at + 1], y[at + 2]
-    p_new = pressure_after(plant, layout.SMALL, actuator, z, z_new, x, pressure, source, h)
+    p_new = pressure_after(plant, rig, layout.SMALL, actuator, z, z_new, x, pressure, source, h)
     force, growth = resistance(plant, plant.small_curve, layout.SMALL, actuator, z, x, v, h)
     inertia = q[layout.SMALL + layout.MASS] / h
     drive = inertia * v - force + area_at(plant, layout.SMALL, x) * p_new
@@ -221,7 +221,7 @@ def _body(plant, rig, gravity, source, y, z, h, y_new, z_new):
     q = plant.q
     x = y[X_HEAD] - y[X_TAIL]
     v_h, v_t = y[V_HEAD], y[V_TAIL]
-    p_new = pressure_after(plant, layout.BODY, 0, z, z_new, x, y[P_BODY], source, h)
+    p_new = pressure_after(plant, rig, layout.BODY, 0, z, z_new, x, y[P_BODY], source, h)
     force, growth = resistance(plant, plant.body_curve, layout.BODY, 0, z, x, v_h - v_t, h)
     tension = force - area_at(plant, layout.BODY, x) * p_new
     if rig.free:
