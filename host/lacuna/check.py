@@ -50,6 +50,9 @@ def _check_names(system: System, trials: Sequence[Record]) -> None:
     for key, effect in system.effects.items():
         if key != effect.name:
             raise MisuseError(f"effect {effect.name} is listed under the key {key}: use its name as the key.")
+        for site in effect.freed_at:
+            if site not in system.correction_sites:
+                raise MisuseError(f"effect {effect.name} is freed at {site}, which is no correction site.")
     effects = [e.full_name(p) for e in system.effects.values() for p in (*e.parameters, *e.own)]
     for name in _repeated([p.name for p in system.parameters] + effects):
         raise MisuseError(f"parameter {name}: more than one has this name; names must be unique.")

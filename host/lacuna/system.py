@@ -71,7 +71,8 @@ class Effect:
     can be visible (empty: all). `own` are parameters with a separate value in every trial (a phase): they
     are fitted trial by trial, from the best of several values over their range. `frequency` names the
     parameter that is a frequency, in Hz: fits start at the peaks of the residual's spectrum, since from
-    anywhere else they would not converge to it.
+    anywhere else they would not converge to it. `freed_at`: correction sites where this mechanism may act in another
+    form than its formula's; a curve there is tried before another effect is called in.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Effect:
     start_factors: tuple[float, ...] = (0.1, 0.4, 1.2)
     own: tuple[Parameter, ...] = ()
     frequency: str | None = None
+    freed_at: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for each in ("parameters", "own"):

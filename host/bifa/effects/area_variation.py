@@ -11,6 +11,7 @@ EFFECT = PhysicalEffect(
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
     confusable_with=("sensor_calibration",),
     parameters=(EffectParameter("slope", "", -0.6, 0.6, 0.1, "relative change over the stroke", size=True),),
+    freed_at=("area_stroke",),
 )
 
 

@@ -38,7 +38,8 @@ class PhysicalEffect:
     """A physical cause that the paper's model lacks.
 
     `enters`: the equation and the place in it; `experiments`: where it can be seen at all;
-    `confusable_with`: effects whose signature is alike; `states`: numbers remembered for each actuator.
+    `confusable_with`: effects whose signature is alike; `states`: numbers remembered for each actuator; `freed_at`:
+    where its form may differ from the formula, by the names in `bifa.pipe_robot.sites`.
     """
 
     name: str
@@ -50,6 +51,7 @@ class PhysicalEffect:
     confusable_with: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
     states: int = 0
+    freed_at: tuple[str, ...] = ()
 
     @property
     def sizes(self) -> tuple[EffectParameter, ...]:

@@ -11,6 +11,7 @@ EFFECT = PhysicalEffect(
     experiments=("anchor_pull", "locomotion"),
     confusable_with=("inclination", "tether_drag"),
     parameters=(EffectParameter("asymmetry", "", -0.8, 0.8, 0.15, "half the relative difference", size=True),),
+    freed_at=("friction_speed", "grip_speed"),
 )
 
 

@@ -18,6 +18,7 @@ EFFECT = PhysicalEffect(
         EffectParameter("small_share", "", 0.0, 1.5, 0.225, "half width of a small actuator's loop over the body's"),
     ),
     states=1,
+    freed_at=("body_loading", "small_loading"),
 )
 
 

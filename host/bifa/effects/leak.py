@@ -13,6 +13,7 @@ EFFECT = PhysicalEffect(
     parameters=(
         EffectParameter("rate_per_s", "1/s", 0.0, 2.0, 0.05, "share of the pressure lost in a second", size=True),
     ),
+    freed_at=("filling",),
 )
 
 

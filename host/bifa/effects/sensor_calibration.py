@@ -14,6 +14,7 @@ EFFECT = PhysicalEffect(
         EffectParameter("gain", "", -0.4, 0.4, 0.03, "relative error of the gain", size=True),
         EffectParameter("offset_psi", "psi", -3.0, 3.0, 0.2, "reading at 0 psi", size=True),
     ),
+    freed_at=("pressure_sensor",),
 )
 
 

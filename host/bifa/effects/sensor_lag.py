@@ -14,6 +14,7 @@ EFFECT = PhysicalEffect(
     confusable_with=("instrument_shift",),
     parameters=(EffectParameter("time_s", "s", 0.0, 0.5, 0.05, "time constant", size=True),),
     states=1,
+    freed_at=("pressure_sensor_memory",),
 )
 
 

@@ -11,6 +11,7 @@ EFFECT = PhysicalEffect(
     experiments=("step_response", "locomotion"),
     confusable_with=(),
     parameters=(EffectParameter("share", "", 0.0, 1.0, 0.05, "share of the line's drop that is seen", size=True),),
+    freed_at=("pressure_sensor_inflow",),
 )
 
 

@@ -23,6 +23,7 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
         source=effect.source,
         sizes=len(effect.sizes),
         own=tuple(_engine_parameter(p) for p in effect.parameters if p.own),
+        freed_at=effect.freed_at,
         frequency=next((p.name for p in effect.parameters if p.frequency), None),
     )
 

@@ -7,13 +7,14 @@ from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, evaluate_on, fit, refit_on, spread_starts
+from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, spread_starts
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.structure import Structure
 from lacuna.system import System
 
 _ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another follows, and one that is reported
-_HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away
+_HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away,
+_DOUBTFUL = 1.5  # and no last digits of it so much
 
 
 class Case:
@@ -22,6 +23,7 @@ class Case:
     def __init__(self, system: System, split: Split, policy: Policy, seed: int):
         self.system, self.split, self.policy, self.seed = system, split, policy, seed
         self._refitted: dict[Candidate, Fit] = {}
+        self._converged: dict[Candidate, Fit] = {}
         self._sufficient: dict[Candidate, bool] = {}
 
     def fit_base(self, starts: int) -> Fit:
@@ -46,6 +48,12 @@ class Case:
             self._refitted[candidate] = refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
         return self._refitted[candidate]
 
+    def converged(self, candidate: Candidate) -> Fit:
+        """The same to the end of plain least squares: what a verdict rests on."""
+        if candidate not in self._converged:
+            self._converged[candidate] = converged(self.on_known(candidate))
+        return self._converged[candidate]
+
     def remainder(self, fitted: Fit) -> Remainder:
         """What a fit leaves, on its own trials and on the others that may inform a choice."""
         names = {t.name for t in fitted.problem.trials}
@@ -53,12 +61,13 @@ class Case:
         return self._tested(fitted, evaluate_on(fitted, others)) if others else self._tested(fitted)
 
     def suffices(self, candidate: Candidate) -> bool:
-        """Whether an explanation leaves nothing that matters, if need be once it is fitted to all known trials."""
+        """Whether an explanation leaves nothing that matters once it is fitted to all known trials."""
         if candidate not in self._sufficient:
-            worst = self._tested(candidate.fitted, candidate.checked).worst
-            if 1.0 <= worst < _HOPELESS:
-                worst = self.remainder(self.on_known(candidate)).worst
-            self._sufficient[candidate] = worst < 1.0
+            self._sufficient[candidate] = (
+                self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
+                and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
+                and not self.remainder(self.converged(candidate)).matters
+            )
         return self._sufficient[candidate]
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:

@@ -20,32 +20,41 @@ _COMPARED = 16  # explanations, the best first
 class Choice:
     """The chosen explanation, the base if nothing is worth adding.
 
-    `probability` of each of its effects; `confusable_with`: by effect, those that it could be exchanged for;
-    `weights`: probability of every explanation compared, by its effects.
+    `freed`: the same effects in a form of their own, if that explains more; `probability` of each of the effects;
+    `confusable_with`: by effect, those that it could be exchanged for; `weights`: probability of every explanation
+    compared, by its effects.
     """
 
     candidate: Candidate
+    freed: Candidate | None
     probability: dict[str, float]
     confusable_with: dict[str, tuple[str, ...]]
     weights: dict[tuple[str, ...], float]
 
+    @property
+    def explanation(self) -> Candidate:
+        """The chosen effects, in the form in which they explain most."""
+        return self.freed or self.candidate
+
 
 def choose(search: Search, split: Split, policy: Policy, suffices: Callable[[Candidate], bool]) -> Choice:
-    """The set that explains best, no larger than the evidence carries; nothing is added to one that `suffices`."""
+    """The set that explains best, no larger than the evidence carries; nothing is added to one that `suffices`. Another
+    effect must explain more than the chosen ones do in a form of their own."""
     dispersion = dispersion_of(search.tried)
-    chosen = search.base
-    while not suffices(chosen):
+    chosen = held = search.base
+    while not suffices(held):
         larger = [
             c
             for c in search.tried
             if len(c.effects) > len(chosen.effects)
-            and worth_adding(chosen, c, dispersion, policy)
-            and (_share(chosen, c, search.base) > policy.share_of_gap or suffices(c))
+            and worth_adding(held, c, dispersion, policy)
+            and (_share(held, c, search.base) > policy.share_of_gap or suffices(c))
         ]
         if not larger:
             break
         size = min(len(c.effects) for c in larger)
         chosen = min((c for c in larger if len(c.effects) == size), key=lambda c: c.cost)
+        held = search.freed_form(chosen) or chosen
     return weigh(search, _supported(chosen, search, split, dispersion, policy), policy)
 
 
@@ -54,7 +63,7 @@ def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
     weights = _weights(search, chosen, dispersion_of(search.tried))
     probability = {e: sum(w for effects, w in weights.items() if e in effects) for e in chosen.effects}
     confusable = {e: _exchanges(e, chosen.effects, weights, policy) for e in chosen.effects}
-    return Choice(chosen, probability, confusable, weights)
+    return Choice(chosen, search.freed_form(chosen), probability, confusable, weights)
 
 
 def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:

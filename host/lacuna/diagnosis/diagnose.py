@@ -23,7 +23,7 @@ from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Finished
 from lacuna.diagnosis.warn import warnings_of
-from lacuna.estimation.fit import Fit, converged
+from lacuna.estimation.fit import Fit
 from lacuna.system import Correction, CorrectionSite, System
 
 
@@ -123,8 +123,7 @@ class _Judged:
 
 
 def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
-    base = converged(case.on_known(found.base))
-    chosen = converged(case.on_known(choice.candidate)) if choice.candidate.effects else base
+    base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
     verdict = _verdict(case, choice, found, remainder, drifts)
     explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
@@ -184,7 +183,7 @@ def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, dr
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
     if not choice.probability or min(choice.probability.values()) < case.policy.supported:
         return "unexplained"
-    return "identified" if case.closed(choice.candidate, found.base) >= case.policy.half else "unexplained"
+    return "identified" if case.closed(choice.explanation, found.base) >= case.policy.half else "unexplained"
 
 
 def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew: Crew | None) -> Fit:
@@ -192,15 +191,15 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew:
     are learnt. Where nothing is supported, the best of everything tried stands beside them, so that what is reported is
     never worse than that."""
     split, unexplained = case.split, judged.verdict == "unexplained"
-    parents = list(dict.fromkeys((found.base, choice.candidate))) if unexplained else [choice.candidate]
+    parents = list(dict.fromkeys((found.base, choice.explanation))) if unexplained else [choice.explanation]
     learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew) if crew else None
     offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
     if unexplained:
-        offered += found.tried
+        offered += (*found.tried, *found.freed)
     best = min(offered, key=lambda c: rms(c.checked.scaled_residuals()), default=None)
     if best is None:
         return judged.explained
-    final = converged(case.on_known(best))
+    final = case.converged(best)
     return final if not split.final or holds(final, judged.explained, split) else judged.explained
 
 

@@ -37,6 +37,17 @@ class _Promise:
     cost: float
 
 
+def free_form(candidate: Candidate, split: Split, *, policy: Policy, crew: Crew) -> Candidate | None:
+    """`candidate` with the curve that helps most where one of its effects may act in another form than its formula's,
+    since no real mechanism follows the formula exactly. None if none helps."""
+    structure = candidate.fitted.structure
+    sites = {site: None for effect in structure.effects for site in structure.system.effects[effect].freed_at}
+    if not sites:
+        return None
+    promises = sorted(_promises(candidate, list(sites), split, crew), key=lambda p: p.cost)
+    return _best_grown([candidate], promises[:_FITTED], split, policy, crew)
+
+
 def learn_correction(
     candidates: Sequence[Candidate], split: Split, *, enough, policy: Policy, crew: Crew
 ) -> Candidate | None:

@@ -26,7 +26,8 @@ _NEAREST = 5
 @dataclass(frozen=True)
 class Named:
     """One effect of the verdict. `interval`: 90 % for each parameter. `share_of_gap`: of the base model's gap on
-    held-out trials, what it closes on top of those named before it. `form`: how it acts, "as in the library" or freed.
+    held-out trials, what it closes on top of those named before it. `form`: "as in the library", or where it is freed;
+    parameters are then those of the library's form that comes nearest.
     """
 
     name: str
@@ -83,12 +84,12 @@ def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, 
     fitted = case.on_known(candidate)
     within = intervals(fitted)
     named = []
-    for effect, share in _shares(case, found, candidate):
+    for effect, share in _shares(case, found, choice):
         described = fitted.structure.system.effects[effect]
         named.append(
             Named(
                 effect,
-                "as in the library",
+                _form(described, choice),
                 {p.name: fitted.theta[described.full_name(p)] for p in described.parameters},
                 {p.name: within[described.full_name(p)] for p in described.parameters},
                 choice.probability[effect],
@@ -115,16 +116,20 @@ def _closing(case: Case, found: Search):
     return lambda fitted: share_of_gap(before.held_out, error_of(fitted, split).held_out, floor.held_out)
 
 
-def _shares(case: Case, found: Search, candidate: Candidate) -> list[tuple[str, float]]:
-    """Each effect with the share of the gap that it closes on top of those before it, the largest first of all."""
-    closes = _closing(case, found)
+def _shares(case: Case, found: Search, choice: Choice) -> list[tuple[str, float]]:
+    """Each effect with the share of the gap that it closes on top of those before it, the largest first of all; what a
+    form of their own closes counts with the last."""
+    closes, candidate = _closing(case, found), choice.candidate
     rest, chosen, closed, shares = list(candidate.effects), (), 0.0, []
     while rest:
         ahead = {}
         for effect in rest:
-            smaller = candidate if len(rest) == 1 else found.with_effects((*chosen, effect))
+            if len(rest) == 1:
+                ahead[effect] = closes(case.on_known(choice.explanation))
+                continue
+            smaller = found.with_effects((*chosen, effect))
             smaller = smaller or _refitted_without(case, candidate, (*chosen, effect))
-            ahead[effect] = closes(case.on_known(smaller) if smaller is candidate else smaller.fitted)
+            ahead[effect] = closes(smaller.fitted)
         best = max(ahead, key=ahead.get)
         shares.append((best, ahead[best] - closed))
         chosen, closed = (*chosen, best), ahead[best]
@@ -138,6 +143,12 @@ def _refitted_without(case: Case, candidate: Candidate, effects: Sequence[str]) 
     structure = Structure(parent.structure.system, tuple(e for e in candidate.effects if e in effects))
     start = [starting_point(parent, structure)]
     return case.judge(fit(structure, case.split.fit, parent.problem.floor, starts=start, relative=1e-3))
+
+
+def _form(effect: Effect, choice: Choice) -> str:
+    structure = choice.explanation.fitted.structure
+    own = [structure.system.correction_sites[site] for site in structure.sites if site in effect.freed_at]
+    return f"freed: {', '.join(f'{s.term} over {s.variable}' for s in own)}" if own else "as in the library"
 
 
 def _may_be_absent(effect: Effect, within: dict[str, tuple[float, float]]) -> bool:

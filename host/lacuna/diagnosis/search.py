@@ -19,6 +19,7 @@ from lacuna.diagnosis.candidate import (
     sketches,
 )
 from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.split import Split
@@ -62,16 +63,22 @@ class Screened:
 
 @dataclass(frozen=True)
 class Search:
-    """Every explanation that was refitted, all against the same `floor`, and the screening of the library."""
+    """Every explanation that was refitted, all against the same `floor`, and the screening of the library. `freed`:
+    the best of each size again, with the curve that helps most where its own mechanisms act."""
 
     base: Candidate
     floor: NoiseFloor
     tried: tuple[Candidate, ...]
     screened: tuple[Screened, ...]
+    freed: tuple[Candidate, ...] = ()
 
     def with_effects(self, effects: Sequence[str]) -> Candidate | None:
         wanted = frozenset(effects)
         return next((c for c in self.tried if frozenset(c.effects) == wanted), None)
+
+    def freed_form(self, candidate: Candidate) -> Candidate | None:
+        """The same effects in a form of their own, where that explains more."""
+        return next((c for c in self.freed if c.effects == candidate.effects and c.cost < candidate.cost), None)
 
 
 def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
@@ -99,8 +106,8 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
 
 
 def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy, crew: Crew) -> Search:
-    """Grow sets from the base model until one is `enough(candidate)`, or what the best leaves is too little for a
-    further effect to be named, or nothing promises to take its share away, or there are three effects.
+    """Grow sets from the base model until one is `enough(candidate)`, or a further effect takes too little away for it
+    to be named, or nothing promises to take its share away, or there are three effects.
 
     At each size, every effect is tried on every parent in the beam by its amplitude profile, the most
     promising are refitted with equal effort, and the best sets make the next beam.
@@ -109,6 +116,7 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy
     first = judge(base, split)
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     beam = [first]
+    freed: list[Candidate] = []
     library = list(base.structure.system.effects)
     for size in range(1, LARGEST_SET + 1):
         if not _grow(beam, library, split, floor, tried, enough, policy, crew):
@@ -119,13 +127,21 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy
             crew.say("weighing again against a lower floor")
             reach = policy.reach * _ranked(tried, size)[0].cost
             tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
+            freed = [reweighed(c, split, floor) for c in freed]
         before = min(tried[frozenset(c.effects)].excess for c in beam)
         beam = _ranked(tried, size)[: _BEAM[size]]
         best = beam[0]
-        if before - best.excess < policy.promising * before or enough(best):
+        gap, least = tried[frozenset()].excess, policy.promising * before
+        if best.excess < policy.half * gap:  # what is found may be named: what follows must be worth naming, too
+            least = max(policy.share * before, policy.share_of_gap * gap)
+        if before - best.excess < least or enough(best):
             break
+        if own := free_form(best, split, policy=policy, crew=crew):
+            freed.append(own)
+            if enough(own):
+                break
         beam = [c for c in beam if c.excess <= policy.hopeful * best.excess]
-    return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened))
+    return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened), tuple(freed))
 
 
 def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate]:
@@ -179,7 +195,7 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, polic
     fresh = []
     if again and enough(judge(again[0][0], split)):
         again = [pair for pair in again[1:] if pair[0].cost < policy.reach * again[0][0].cost]
-    elif not before.effects and before.rms > policy.lost:
+    elif again and not before.effects and before.rms > policy.lost:
         fresh = anew(before.fitted, ranked, policy, crew)
         begun = {fitted.structure.effects for fitted, _ in fresh}
         most = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)

@@ -12,13 +12,14 @@ STOPPED = "The search was stopped by hand: the verdict is based on the best resu
 
 
 class Finished:
-    """Keeps every explanation that the search has fitted to convergence, each time it asks whether that is enough."""
+    """Keeps each set of effects that the search has fitted to the end, whenever it asks whether that is enough."""
 
     def __init__(self, enough: Callable[[Candidate], bool]):
         self._enough, self.candidates, self.stopped = enough, [], False
 
     def __call__(self, candidate: Candidate) -> bool:
-        self.candidates.append(candidate)
+        if not candidate.fitted.structure.sites:
+            self.candidates.append(candidate)
         return self._enough(candidate)
 
     def search(self, base: Candidate, split: Split) -> Search:

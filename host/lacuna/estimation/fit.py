@@ -16,7 +16,7 @@ from lacuna.system import Channels, Record, System
 
 _SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
 _OPEN = 0.1  # scales
-_CONVERGED = 1e-4  # of the cost: half of it of the RMS error, which is then the same to four digits
+_CONVERGED = 1e-3  # of the cost: half of it of the RMS error, which is then the same to three digits
 _CONVERGED_ITERATIONS, _ROUNDS = 20, 5
 
 
@@ -131,7 +131,7 @@ def converged(fitted: Fit) -> Fit:
     """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
-    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _CONVERGED}
+    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.1 * _CONVERGED}
     solution = solve(problem, fitted.solution.point, **options)
     if not fitted.structure.sites:  # curves are many parameters, and their fit is not compared with another's
         solution = renewed(problem, solution, **options)
@@ -145,11 +145,12 @@ def renewed(problem: Problem, solution: Solution, **options) -> Solution:
     let go of one of them."""
     letting_go = any(problem.nuisances)
     for _ in range(_ROUNDS):
-        further = [solve(problem, solution.point, **options)]
+        further = [] if solution.converged else [solve(problem, solution.point, **options)]
         if letting_go:
-            further.append(solve(problem, problem.start(solution.point.values), **options))
-        best = min(further, key=lambda s: s.cost)
-        letting_go = best is not further[0]
+            begun_anew = solve(problem, problem.start(solution.point.values), **options)
+            letting_go = begun_anew.cost < min((s.cost for s in further), default=solution.cost)
+            further.append(begun_anew)
+        best = min(further, key=lambda s: s.cost, default=solution)
         gained = solution.cost - best.cost
         solution = min(solution, best, key=lambda s: s.cost)
         if gained < _CONVERGED * solution.cost:

@@ -121,6 +121,12 @@ def test_refuses_an_effect_under_another_key():
         lacuna.System(heater.simulate, heater.PARAMETERS, {"curve": effect})
 
 
+def test_refuses_an_effect_freed_where_there_is_no_curve():
+    effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0), freed_at=("nowhere",))
+    with pytest.raises(MisuseError, match="effect bend is freed at nowhere, which is no correction site"):
+        diagnose(Line(effects={"bend": effect}), progress=pytest.fail)
+
+
 @pytest.mark.parametrize("count", [0, 2])
 def test_refuses_fewer_trials_than_needed(count):
     with pytest.raises(TooLittleDataError, match=f"{count} trials given: a diagnosis needs at least 3"):

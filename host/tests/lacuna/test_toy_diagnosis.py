@@ -1,6 +1,7 @@
 """The engine on a small system whose truth is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,3 +140,16 @@ def test_a_dask_cluster_comes_to_the_same_verdict():
     assert count == 2
     here = as_record(diagnose(system))
     assert {**there, "seconds": 0} == {**here, "seconds": 0}
+
+
+@pytest.mark.parametrize("seed", [18, 19])
+def test_a_mechanism_in_another_form_than_the_library_s_needs_no_second_one(seed):
+    system = hide(SIZES["cubic_spring"] | {"ripple.force_N": 0.06}, seed=seed)
+    library = {**system.effects, "cubic_spring": replace(system.effects["cubic_spring"], freed_at=("spring",))}
+    found = diagnose(replace(system, effects=library))
+    assert [e.name for e in found.effects] == ["cubic_spring"]
+    assert found.effects[0].form == "freed: force of the spring over position (m)"
+    assert not found.left.matters
+    as_given = diagnose(system)
+    assert [e.form for e in as_given.effects] == ["as in the library"]
+    assert as_given.left.matters
