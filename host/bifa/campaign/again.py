@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 
 from bifa.campaign.resolve import joined
+from bifa.campaign.stages import StageError
 from bifa.campaign.walks import predict, predicted_speed, speeds
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.robot import Model, load_model, save_model
@@ -55,6 +56,15 @@ class Round:
         """Whether the model still names the same and its gait walks no faster or slower, nor is predicted better."""
         as_fast = abs(self.measured_mm_s - before.measured_mm_s) < _UNCHANGED * before.measured_mm_s
         return self.effects == before.effects and as_fast and self.error_mm > 0.9 * before.error_mm
+
+
+def read_rounds(file: Path) -> list[dict]:
+    """The rounds as `again` wrote them; StageError where an earlier version did, which kept less."""
+    rounds = json.loads(file.read_text())
+    known = {field.name for field in fields(Round)}
+    if not rounds or any(known - set(one) for one in rounds):
+        raise StageError(f"{file} is of an earlier version: walk the rounds again with --rerun again")
+    return rounds
 
 
 def ending(rounds: Sequence[Round]) -> Ending | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import bifa
+from bifa.campaign.again import read_rounds
 from bifa.campaign.page import campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import predict, predicted_speed, speeds
@@ -91,7 +92,7 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
         "remainder": diagnosis["remainder"],
         "error": diagnosis["error"],
         "prediction_error": json.loads((inputs / "errors.json").read_text()),
-        "rounds": json.loads((inputs / "rounds.json").read_text()),
+        "rounds": read_rounds(inputs / "rounds.json"),
         "robustness": _robustness(completed, trials),
         "truth": truth,
     }

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged
+from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged, read_rounds
+from bifa.campaign.stages import StageError
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, save_gait
@@ -118,3 +119,10 @@ def test_a_speed_within_what_repeats_differ_by_is_predicted():
         assert replace(one, predicted_mm_s=(1 + off) * one.measured_mm_s, spread_mm_s=0.0).is_predicted is predicted
     wide = replace(one, predicted_mm_s=1.04 * one.measured_mm_s, spread_mm_s=0.03 * one.measured_mm_s)
     assert wide.is_predicted
+
+
+def test_rounds_of_an_earlier_version_are_walked_again(tmp_path):
+    file = tmp_path / "rounds.json"
+    file.write_text('[{"effects": [], "predicted_mm_s": 20.0, "measured_mm_s": 20.1, "spread_mm_s": 0.1}]')
+    with pytest.raises(StageError, match=r"rounds\.json is of an earlier version.*--rerun again"):
+        read_rounds(file)
