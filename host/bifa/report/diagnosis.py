@@ -16,7 +16,8 @@ from bifa.report.words import (
     spoken,
     unit_of,
 )
-from lacuna.report import sentence
+from lacuna.report.sentence import own_form
+from lacuna.report.sentence import verdict_sentence as engine_sentence
 
 BASE_MODEL = "The base model is the paper's, with its parameters fitted to this robot."
 COMPLETED_MODEL = "The completed model includes the effects that were found, and was refitted."
@@ -30,7 +31,7 @@ Labels = Mapping[str, str]
 
 def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remainder: Mapping[str, Any]) -> str:
     """The engine's sentence on a verdict of `bifa diagnose --json`, effects in words and with their sizes."""
-    return sentence.verdict_sentence(
+    return engine_sentence(
         verdict, effects, remainder, lambda effect: effect_words(effect["name"], effect["parameters"])
     )
 
@@ -69,6 +70,8 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
         if effect["confusable_with"]:
             others = " or ".join(effect_words(other) for other in effect["confusable_with"])
             sentence += f", and this data cannot tell it from {others}"
+        if form := own_form(effect):
+            sentence += f"; it acts {form}"
         said.append(f"{sentence}.")
     return said
 

@@ -10,7 +10,7 @@ from lacuna.report.evidence import draw_errors, draw_learnt, draw_probabilities
 from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.overview import draw_held_out, draw_tried
 from lacuna.report.page import Page, Section, Table, both_palettes
-from lacuna.report.sentence import verdict_sentence
+from lacuna.report.sentence import own_form, verdict_sentence
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
@@ -44,7 +44,10 @@ def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
     figure = both_palettes(
         lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
     )
-    rows = [(_words(e["name"]), _sized(e), f"{100 * e['share_of_gap']:.0f} %") for e in effects]
+    rows = [
+        (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), f"{100 * e['share_of_gap']:.0f} %")
+        for e in effects
+    ]
     table = Table(("effect", "parameters, with 90 % intervals", "of the gap"), rows)
     return [Section("Evidence", tables=(table,), figures=(figure,))]
 

@@ -11,6 +11,12 @@ def in_words(effect: Mapping[str, Any]) -> str:
     return effect["name"].replace("_", " ")
 
 
+def own_form(effect: Mapping[str, Any]) -> str:
+    """Where it acts in another form than the library's; empty if it does not."""
+    _, freed, where = effect["form"].partition("freed: ")
+    return f"in a form of its own: {where}" if freed else ""
+
+
 def verdict_sentence(
     verdict: str,
     effects: Sequence[Mapping[str, Any]],

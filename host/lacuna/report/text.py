@@ -8,7 +8,7 @@ from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.report.measured import floor_sentence
-from lacuna.report.sentence import verdict_sentence
+from lacuna.report.sentence import own_form, verdict_sentence
 
 _WIDTH, _LINES = 100, 40
 _WARNINGS, _TRIED = 6, 4
@@ -42,6 +42,8 @@ def _wrapped(text: str, mark: str = "") -> list[str]:
 def _effects(record: Mapping[str, Any]) -> Iterator[str]:
     for effect in record["effects"]:
         yield f"{effect['name']}: closes {_percent(effect['share_of_gap'])}, probability {effect['probability']:.2f}"
+        if form := own_form(effect):
+            yield from _wrapped(form, "    ")
         for name, value in effect["parameters"].items():
             lower, upper = (_number(end) for end in effect["interval_90"][name])
             yield f"    {name} = {_number(value)}   ({lower} to {upper})"

@@ -9,6 +9,7 @@ from toy import ToySystem, hide
 
 from lacuna.diagnosis.diagnose import TooLittleDataError, diagnose
 from lacuna.diagnosis.record import as_record
+from lacuna.report.text import screen_of
 
 SIZES = {
     "coulomb": {"coulomb.force_N": 0.1},
@@ -149,6 +150,7 @@ def test_a_mechanism_in_another_form_than_the_library_s_needs_no_second_one(seed
     found = diagnose(replace(system, effects=library))
     assert [e.name for e in found.effects] == ["cubic_spring"]
     assert found.effects[0].form == "freed: force of the spring over position (m)"
+    assert "in a form of its own: force of the spring over position (m)" in screen_of("toy", as_record(found), found)
     assert not found.left.matters
     as_given = diagnose(system)
     assert [e.form for e in as_given.effects] == ["as in the library"]
