@@ -166,8 +166,9 @@ def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile
 
 def from_initial_guess(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple[Fit, Profile]]:
     """Each sketch, or a refit from the initial guess with its effect, whichever is better."""
-    profiled = [p for _, p in sketched]
-    again = _refitted(profiled, [p.from_initial_guess() for p in profiled], crew)
+    names = [p.problem.structure.effects for _, p in sketched]
+    jobs = [(p.problem, p.from_initial_guess()) for _, p in sketched]
+    again = crew.map("refitting from the initial guess", names, _sketched_graduated, jobs)
     return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, again, strict=True)]
 
 
@@ -184,12 +185,6 @@ def anew(parent: Fit, profiled: Sequence[Profile], policy: Policy, crew: Crew) -
     found = crew.map("following up", [names[k] for k in leading], _sketched_further, jobs)
     fits = [(best_of(profiled[k].problem, [solution]), profiled[k]) for k, solution in zip(leading, found, strict=True)]
     return sorted(fits, key=lambda pair: pair[0].cost)
-
-
-def _refitted(profiled: Sequence[Profile], starts: Sequence[np.ndarray], crew: Crew) -> list[Solution]:
-    names = [p.problem.structure.effects for p in profiled]
-    jobs = [(p.problem, start) for p, start in zip(profiled, starts, strict=True)]
-    return crew.map("refitting from the initial guess", names, _sketched_graduated, jobs)
 
 
 def _sketched(problem: Problem, start: Point) -> Solution:
