@@ -110,7 +110,8 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy
     to be named, or nothing promises to take its share away, or there are three effects.
 
     At each size, every effect is tried on every parent in the beam by its amplitude profile, the most
-    promising are refitted with equal effort, and the best sets make the next beam.
+    promising are refitted with equal effort, and the best sets make the next beam. The best one is tried in a form of
+    its own, too, before another effect joins it.
     """
     screened = screen(base, split, floor)
     first = judge(base, split)
