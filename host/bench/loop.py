@@ -96,7 +96,8 @@ def summed_up(gains: Sequence[Gain]) -> dict[str, float]:
         figures[f"loop_{name}_prediction_off_mm_s"] = mean(one.off_mm_s[k] for one in gains)
         figures[f"loop_{name}_walking"] = mean(one.walking[k] for one in gains)
     figures["loop_completed_is_faster"] = mean(one.measured_mm_s[1] > one.measured_mm_s[0] for one in gains)
-    print(f"\nmean of {len(gains)} robots{'base':>20}{'completed':>12}")
+    title = f"means, robots: {len(gains)}"
+    print(f"\n{title:33}{'base':>10}{'completed':>12}")
     for key, text in (("mm_s", "speed, mm/s"), ("prediction_off_mm_s", "prediction off by"), ("walking", "walking")):
         print(f"  {text:31}" + "".join(f"{figures[f'loop_{name}_{key}']:10.2f}  " for name in ("base", "completed")))
     print(f"  {'the faster one, share':31}{'':12}{figures['loop_completed_is_faster']:10.2f}")

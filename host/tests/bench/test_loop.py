@@ -47,7 +47,7 @@ def test_means_over_robots(capsys):
     assert figures["loop_base_prediction_off_mm_s"] == pytest.approx(2.0)
     assert figures["loop_base_walking"] == pytest.approx(0.75)
     assert figures["loop_completed_is_faster"] == 0.5
-    assert "mean of 2 robots" in capsys.readouterr().out
+    assert "means, robots: 2" in capsys.readouterr().out
 
 
 def test_an_interrupted_run_sums_up_what_there_is(monkeypatch, capsys, tmp_path):
