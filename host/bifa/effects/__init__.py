@@ -30,14 +30,15 @@ def library() -> Mapping[str, PhysicalEffect]:
 
 
 def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:
-    """An effect's parameters in full: those left out take their typical value. EffectError names the range."""
+    """An effect's parameters in full: those left out take their typical value, or the one for omission. EffectError
+    names the range."""
     if name not in library():
         raise EffectError(f"{name!r} is no effect of the library; it has {', '.join(library())}")
     known = {parameter.name: parameter for parameter in library()[name].parameters}
     unknown = [key for key in values if key not in known]
     if unknown:
         raise EffectError(f"{name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
-    full = {key: values.get(key, parameter.typical) for key, parameter in known.items()}
+    full = {key: values.get(key, p.typical if p.omitted is None else p.omitted) for key, p in known.items()}
     for key, value in full.items():
         lower, upper, unit = known[key].lower, known[key].upper, known[key].unit
         number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -18,8 +18,8 @@ EFFECT = PhysicalEffect(
             "saturation_s_per_psi", "s/psi", 0.0, 0.4, 0.045, "1 / the greatest rate, from 1 atm upstream", size=True
         ),
         EffectParameter("sharpness", "", 1.0, 8.0, 2.0, "how sharp the bend into saturation is"),
-        EffectParameter("upstream", "", -0.5, 1.5, 0.5, "1: limit as the pressure upstream; 0: constant"),
-        EffectParameter("by_volume", "", -0.5, 1.5, 0.5, "1: limit as 1 / volume; 0: the same for all"),
+        EffectParameter("upstream", "", -0.5, 1.5, 0.5, "1: limit as the pressure upstream; 0: constant", omitted=0.0),
+        EffectParameter("by_volume", "", -0.5, 1.5, 0.5, "1: limit as 1 / volume; 0: the same for all", omitted=0.0),
     ),
     freed_at=("filling",),
 )

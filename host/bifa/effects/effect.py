@@ -19,7 +19,8 @@ class EffectParameter:
     """One number of an effect. `typical` is the size at which the effect is plainly visible on the paper's robot.
 
     A `size` parameter is 0 when the effect is absent; the others only shape it. Of an `own` one every trial has its
-    own value; a `frequency` is looked for in the residual's spectrum.
+    own value; a `frequency` is looked for in the residual's spectrum. `omitted`: its value where it is left out, if not
+    the typical one: what an older file means that does not know it.
     """
 
     name: str
@@ -31,6 +32,7 @@ class EffectParameter:
     size: bool = False
     own: bool = False
     frequency: bool = False
+    omitted: float | None = None
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,11 @@ def test_an_effect_shows_where_it_says_and_only_there(name, base):
                 np.testing.assert_allclose(changed[experiment][key], base[experiment][key], atol=5e-3, err_msg=key)
 
 
+def test_choked_flow_in_an_older_file_has_the_constant_limit_that_it_had():
+    older = {"saturation_s_per_psi": 0.05, "sharpness": 2.0}
+    assert effects.complete("choked_flow", older) == older | {"upstream": 0.0, "by_volume": 0.0}
+
+
 @pytest.mark.parametrize("name", sorted(effects.library()))
 def test_size_zero_is_exactly_the_base_model(name, base):
     sizes = {parameter.name: 0.0 for parameter in effects.library()[name].sizes}
