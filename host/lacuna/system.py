@@ -229,6 +229,25 @@ class System(Protocol):
             for theta, learnt in zip(thetas, corrections, strict=True)
         ]
 
+    at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
+
+    def predict_trials(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trials: Sequence[Record],
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Sequence[Correction]] = (),
+    ) -> list[Channels]:
+        """`predict` for one of `thetas` in each of `trials`. Override it, and set `at_once`, if simulating several
+        trials of one experiment side by side is cheaper."""
+        corrections = corrections or [()] * len(thetas)
+        return [
+            self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)
+            for theta, trial, learnt in zip(thetas, trials, corrections, strict=True)
+        ]
+
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         """Named quantities, shape (n,) each, on which a residual may depend: "displacement", "direction of
         motion", "velocity", "command", "time since the last switch", "position in the pipe" ..."""

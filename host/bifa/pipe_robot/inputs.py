@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -43,14 +44,17 @@ class Case:
 
 class Inputs(Protocol):
     """`channels`: what is predicted. `actuator`: "large", "small", or None where it is not a single one's test.
-    `positive_psi`: the supply, where the trial sets one of its own for the walk."""
+    `positive_psi`: the supply, where the trial sets one of its own for the walk. `bench`: trials with an equal one are
+    simulated side by side."""
 
     channels: tuple[str, ...]
     actuator: str | None
     positive_psi: float | None
+    bench: Hashable
 
-    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
-        """The channels of each case, each of shape (n,). `together`: see `bifa.simulate.walks`."""
+    @staticmethod
+    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        """The channels of each case on one bench, each of shape (n,). `together`: see `bifa.simulate.walks`."""
         ...
 
 
@@ -64,10 +68,19 @@ class StaticInputs:
     channels: tuple[str, ...] = ("force_N", "pressure_psi")
     positive_psi: None = None
 
-    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
-        paths_mm = [(self.displacement_m - case.zero_m) * _MM for case in cases]
+    @cached_property
+    def bench(self) -> Hashable:
+        return STATIC, self.actuator, self.time_s.tobytes()
+
+    @staticmethod
+    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        first: StaticInputs = cases[0].inputs
         records = simulate.static_loadings(
-            [case.plant for case in cases], self.actuator, self.time_s, paths_mm, self.pressure_psi
+            [case.plant for case in cases],
+            first.actuator,
+            first.time_s,
+            [(case.inputs.displacement_m - case.zero_m) * _MM for case in cases],
+            [case.inputs.pressure_psi for case in cases],
         )
         return [record.columns for record in records]
 
@@ -82,13 +95,18 @@ class StepInputs:
     channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
     positive_psi: None = None
 
-    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    @property
+    def bench(self) -> Hashable:
+        return STEP, self.actuator
+
+    @staticmethod
+    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
         records = simulate.step_responses(
             [case.plant for case in cases],
-            self.actuator,
-            self.time_s,
+            cases[0].inputs.actuator,
+            [case.inputs.time_s for case in cases],
             [case.commands for case in cases],
-            self.pressure_psi,
+            [case.inputs.pressure_psi for case in cases],
             tolerance_m,
             together,
         )
@@ -115,13 +133,19 @@ class PullInputs:
     def sample_s(self) -> float:
         return float(np.median(np.diff(self.pulled_s)))
 
-    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    @property
+    def bench(self) -> Hashable:
+        return ANCHOR, self.rate_mm_s, self.load_cell_N_m
+
+    @staticmethod
+    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        first: PullInputs = cases[0].inputs
         records = simulate.anchor_pulls(
             [case.plant for case in cases],
-            self.pulled_s,
-            self.rate_mm_s,
-            self.pressure_psi,
-            self.load_cell_N_m,
+            [case.inputs.pulled_s for case in cases],
+            first.rate_mm_s,
+            [case.inputs.pressure_psi for case in cases],
+            first.load_cell_N_m,
             tolerance_m,
             together,
         )
@@ -161,12 +185,17 @@ class WalkInputs:
     switch_sd_s: float = 0.0
     actuator: None = None
 
-    def simulate(self, cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    @property
+    def bench(self) -> Hashable:
+        return WALK
+
+    @staticmethod
+    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
         records = simulate.walks(
             [case.plant for case in cases],
             [case.commands for case in cases],
-            self.time_s,
-            inclination_deg=self.inclination_deg,
+            [case.inputs.time_s for case in cases],
+            inclinations_deg=[case.inputs.inclination_deg for case in cases],
             tolerance_m=tolerance_m,
             together=together,
             states=False,

@@ -7,7 +7,7 @@ from K's own contracted zero, so the two differ by that zero, which is 0 where t
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from operator import itemgetter
 
 import numpy as np
@@ -24,7 +24,7 @@ from bifa.pipe_robot.spare import spare
 from bifa.pipe_robot.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
 from bifa.robot import Model
 from bifa.robot.stiffness import StiffnessCurve
-from bifa.simulate import Plant, layout
+from bifa.simulate import Plant, lanes, layout
 from bifa.simulate.plant import of_values
 from bifa.simulate.tables import tabulated
 from lacuna.system import (
@@ -132,21 +132,46 @@ class RobotSystem(System):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        corrections = corrections or [()] * len(thetas)
-        tolerance_m = (_COARSE_M if coarse else _EXACT_M)[trial.experiment]
-        cases = [self._case(*one, effects, trial) for one in zip(thetas, corrections, strict=True)]
-        whole = [case for case in cases if case]
-        try:
-            found = iter(trial.payload.simulate(whole, tolerance_m, alike) if whole else ())
-        except BifaError:  # what is out of range in one of them
-            if len(thetas) == 1:
-                return [_nothing(trial)]
-            each = zip(thetas, corrections, strict=True)
-            return [self.predict(one, effects, trial, coarse=coarse, corrections=learnt) for one, learnt in each]
-        return [
-            _seen(next(found), learnt, case, trial) if case else _nothing(trial)
-            for case, learnt in zip(cases, corrections, strict=True)
-        ]
+        return self._predicted(thetas, effects, [trial] * len(thetas), coarse, corrections, alike)
+
+    at_once = property(lambda self: lanes.width())
+
+    def predict_trials(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trials: Sequence[Record],
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Sequence[Correction]] = (),
+    ) -> list[Channels]:
+        return self._predicted(thetas, effects, trials, coarse, corrections, False)
+
+    def _predicted(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trials: Sequence[Record],
+        coarse: bool,
+        corrections: Sequence[Sequence[Correction]],
+        alike: bool,
+    ) -> list[Channels]:
+        """Each of `thetas` in its trial, those on one bench side by side."""
+        each = list(zip(thetas, corrections or [()] * len(thetas), trials, strict=True))
+        cases = [self._case(theta, learnt, effects, trial) for theta, learnt, trial in each]
+        benches: dict[Hashable, list[int]] = {}
+        for k, (case, trial) in enumerate(zip(cases, trials, strict=True)):
+            if case:
+                benches.setdefault(trial.payload.bench, []).append(k)
+        found = [_nothing(trial) for trial in trials]
+        for members in benches.values():
+            first = trials[members[0]]
+            tolerance_m = (_COARSE_M if coarse else _EXACT_M)[first.experiment]
+            simulated = _simulated(first.payload, [cases[k] for k in members], tolerance_m, alike)
+            for k, channels in zip(members, simulated, strict=True):
+                if channels:
+                    found[k] = _seen(channels, each[k][1], cases[k], trials[k])
+        return found
 
     def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record) -> Case | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
@@ -218,7 +243,7 @@ class RobotSystem(System):
         """A converter's count is the least that a pressure can be uncertain by."""
         return _ADC_COUNT_PSI / np.sqrt(12.0) if channel.startswith("pressure") else 0.0
 
-    @property
+    @cached_property
     def correction_sites(self) -> Mapping[str, CorrectionSite]:
         return sites.declared(self.model, self.curves)
 
@@ -304,6 +329,16 @@ def _bench_unknowns(dataset: Dataset) -> list[str]:
     """Constants of the bench that these trials feel and nobody declared."""
     experiments = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
     return [name for name, where in _FELT.items() if where in experiments]
+
+
+def _simulated(bench: Inputs, cases: Sequence[Case], tolerance_m: float, alike: bool) -> list[Mapping[str, np.ndarray]]:
+    """The channels of each case; none of one that is out of range."""
+    try:
+        return bench.simulate(cases, tolerance_m, alike)
+    except BifaError:
+        if len(cases) == 1:
+            return [{}]
+        return [_simulated(bench, [case], tolerance_m, alike)[0] for case in cases]
 
 
 def _nothing(trial: Record) -> Channels:

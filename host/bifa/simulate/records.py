@@ -71,30 +71,28 @@ def walk(
         if gait is None:
             raise SimulationError("a walk needs a gait or commands")
         commands = of_gait(gait, float(time_s[-1]) + gait.period_s)
-    place = {"inclination_deg": inclination_deg, "terrain": terrain}
-    return walks([model], [commands], time_s, **place, tolerance_m=tolerance_m)[0]
+    place = {"inclinations_deg": [inclination_deg], "terrain": terrain}
+    return walks([model], [commands], [time_s], **place, tolerance_m=tolerance_m)[0]
 
 
 def walks(
     models: Sequence[Model | Plant],
     commands: Sequence[Timeline],
-    time_s: np.ndarray,
+    times_s: Sequence[np.ndarray],
     *,
-    inclination_deg: float = 0.0,
+    inclinations_deg: Sequence[float],
     terrain: np.ndarray = rigs.CLEAR,
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
     states: bool = True,
 ) -> list[SimulatedTrial]:
-    """`walk` for each robot and its commands. `together`: they differ little and are to be compared with the first
-    (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
-    time_s = _times(time_s)
+    """`walk` for each robot, each by its own commands. `together`: they differ little and are to be compared with the
+    first (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
     flats = [plant(model) for model in models]
-    mounted = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
-    kind = lanes.WALK if states else lanes.SEEN
-    rows = _marched(kind, flats, mounted, commands, time_s, tolerance_m, together)
-    walked = _walked if states else _seen
-    return [SimulatedTrial("locomotion", *walked(*one, time_s)) for one in zip(flats, commands, rows, strict=True)]
+    mounted = [rigs.pipe(flat, degrees, terrain) for flat, degrees in zip(flats, inclinations_deg, strict=True)]
+    kind, walked = (lanes.WALK, _walked) if states else (lanes.SEEN, _seen)
+    rows = _marched(kind, flats, mounted, commands, times_s, tolerance_m, together)
+    return [SimulatedTrial("locomotion", *walked(*one)) for one in zip(flats, commands, rows, times_s, strict=True)]
 
 
 def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
@@ -151,26 +149,27 @@ def step_response(
         raise SimulationError("a step response at given times needs its commands")
     if not isinstance(command, Timeline):
         command = _timeline_of(time_s, np.asarray(command, dtype=float))
-    record = step_responses([model], actuator, time_s, [command], pressure_psi, tolerance_m)[0]
+    flat = plant(model)
+    supply_psi = flat.q[layout.SUPPLY_POSITIVE] if pressure_psi is None else pressure_psi
+    record = step_responses([flat], actuator, [time_s], [command], [supply_psi], tolerance_m)[0]
     return replace(record, columns={**record.columns, "command": _shown(command, time_s)})
 
 
 def step_responses(
     models: Sequence[Model | Plant],
     actuator: str,
-    time_s: np.ndarray,
+    times_s: Sequence[np.ndarray],
     commands: Sequence[Timeline],
-    pressure_psi: float | None = None,
+    pressures_psi: Sequence[float],
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
 ) -> list[SimulatedTrial]:
-    """`step_response` for each robot and its commands, which are not among the columns; `together` as in `walks`."""
-    time_s = _times(time_s)
+    """`step_response` for each robot, with its own commands, which are not among the columns, and its own supply;
+    `together` as in `walks`."""
     flats = [plant(model) for model in models]
-    supplies = [flat.q[layout.SUPPLY_POSITIVE] if pressure_psi is None else pressure_psi for flat in flats]
-    mounted = [rigs.stand(flat, actuator, supply) for flat, supply in zip(flats, supplies, strict=True)]
-    found = _marched(lanes.STEP, flats, mounted, commands, time_s, tolerance_m, together)
-    return [_stepped(flat, rows, time_s) for flat, rows in zip(flats, found, strict=True)]
+    mounted = [rigs.stand(flat, actuator, supply) for flat, supply in zip(flats, pressures_psi, strict=True)]
+    found = _marched(lanes.STEP, flats, mounted, commands, times_s, tolerance_m, together)
+    return [_stepped(*one) for one in zip(flats, found, times_s, strict=True)]
 
 
 def _stepped(flat: Plant, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
@@ -194,7 +193,10 @@ def static_loading(
 
     Quasi-static: K(x) - a p. Give the cross-head's path, not its noisy reading, or hysteresis sees the noise.
     """
-    return static_loadings([model], actuator, time_s, [displacement_mm], pressure_psi)[0]
+    time_s, path_mm = _times(time_s), np.ascontiguousarray(displacement_mm, dtype=float)
+    if path_mm.shape != time_s.shape or not np.all(np.isfinite(path_mm)):
+        raise SimulationError("a static loading needs one finite displacement for each time")
+    return static_loadings([model], actuator, time_s, [path_mm], [pressure_psi])[0]
 
 
 def static_loadings(
@@ -202,15 +204,12 @@ def static_loadings(
     actuator: str,
     time_s: np.ndarray,
     displacements_mm: Sequence[np.ndarray],
-    pressure_psi: float,
+    pressures_psi: Sequence[float],
 ) -> list[SimulatedTrial]:
-    """`static_loading` for each robot and its path."""
-    time_s = _times(time_s)
-    paths = [np.ascontiguousarray(path, dtype=float) / _MM for path in displacements_mm]
-    if any(path.shape != time_s.shape or not np.all(np.isfinite(path)) for path in paths):
-        raise SimulationError("a static loading needs one finite displacement for each time")
-    flats = [plant(model) for model in models]
-    found = lanes.load(flats, [rigs.stand(flat, actuator, pressure_psi) for flat in flats], paths, time_s)
+    """`static_loading` for each robot, along its own path and at its own pressure."""
+    flats, paths = [plant(model) for model in models], [path / _MM for path in displacements_mm]
+    mounted = [rigs.stand(flat, actuator, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
+    found = lanes.load(flats, mounted, paths, time_s)
     return [_loaded(path, rows, time_s) for path, rows in zip(paths, found, strict=True)]
 
 
@@ -236,28 +235,27 @@ def anchor_pull(
 
     Quasi-static. The head was extended first; `displacement_mm` is that of the pulling end.
     """
-    return anchor_pulls([model], time_s, rate_mm_s, pressure_psi, load_cell_N_m, tolerance_m)[0]
+    return anchor_pulls([model], [_times(time_s)], rate_mm_s, [pressure_psi], load_cell_N_m, tolerance_m)[0]
 
 
 def anchor_pulls(
     models: Sequence[Model | Plant],
-    time_s: np.ndarray,
+    times_s: Sequence[np.ndarray],
     rate_mm_s: float,
-    pressure_psi: float,
+    pressures_psi: Sequence[float],
     load_cell_N_m: float = LOAD_CELL_N_M,
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
 ) -> list[SimulatedTrial]:
-    """`anchor_pull` for each robot; `together` as in `walks`."""
-    time_s = _times(time_s)
+    """`anchor_pull` for each robot, each at its own pressure; `together` as in `walks`."""
     if not np.isfinite(rate_mm_s) or rate_mm_s == 0.0 or not load_cell_N_m > 0.0:
         raise SimulationError("an anchor pull needs a rate other than 0 and a load cell stiffer than 0 N/m")
     flats = [plant(model) for model in models]
-    mounted = [rigs.anchor(flat, pressure_psi) for flat in flats]
+    mounted = [rigs.anchor(flat, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
     still = [NO_COMMANDS] * len(flats)
     pull = {"rate_m_s": rate_mm_s / _MM, "load_cell_N_m": float(load_cell_N_m)}
-    found = _marched(lanes.ANCHOR, flats, mounted, still, time_s, tolerance_m, together, **pull)
-    return [_pulled(rate_mm_s, rows, time_s) for rows in found]
+    found = _marched(lanes.ANCHOR, flats, mounted, still, times_s, tolerance_m, together, **pull)
+    return [_pulled(rate_mm_s, *one) for one in zip(found, times_s, strict=True)]
 
 
 def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
@@ -270,9 +268,9 @@ def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> Simulated
     return SimulatedTrial("anchor_pull", columns, {"wound_N": rows[2], "holding_N": rows[3], "kinetic_N": rows[4]})
 
 
-def _marched(kind, flats, mounted, commands, time_s, tolerance_m, together, **pull) -> list[np.ndarray]:
+def _marched(kind, flats, mounted, commands, times_s, tolerance_m, together, **pull) -> list[np.ndarray]:
     switches = [_switches(one) for one in commands]
-    what = lanes.Experiment(kind, mounted, switches, [time_s] * len(flats), _tolerance(tolerance_m), **pull)
+    what = lanes.Experiment(kind, mounted, switches, times_s, _tolerance(tolerance_m), **pull)
     return lanes.march(flats, what, together)
 
 

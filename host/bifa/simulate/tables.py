@@ -73,7 +73,8 @@ class Family:
         self._first = table(curve)
         self._ways = np.array([table(way)[1:].ravel() for way in ways]).reshape(len(ways), 4 * _INTERVALS)
 
-    def at(self, weights: Sequence[float]) -> Tabulated:
+    @lru_cache(maxsize=128)  # noqa: B019 - a family lives as long as the program
+    def at(self, weights: tuple[float, ...]) -> Tabulated:
         """The member with so much of each way; ModelParameterError if it is not bistable."""
         rows = self._first.copy()
         rows[1:] += (np.asarray(weights) @ self._ways).reshape(_INTERVALS, 4)

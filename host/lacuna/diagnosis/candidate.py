@@ -95,8 +95,8 @@ def _outside(parameter: Parameter, value: float) -> float:
     return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
 
 
-def judge(fitted: Fit, split: Split) -> Candidate:
-    return Candidate(fitted, evaluate_on(fitted, split.judging))
+def judge(fitted: Fit, split: Split, near: Fit | None = None) -> Candidate:
+    return Candidate(fitted, evaluate_on(fitted, split.judging, near=near))
 
 
 @dataclass(frozen=True)

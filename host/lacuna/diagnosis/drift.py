@@ -62,8 +62,9 @@ def _moved(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndar
 def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> float:
     """What such shifts add to the mean square of the residual in the experiment where they add most."""
     squares, pieces = defaultdict(float), defaultdict(float)
+    jacobians = fitted.solution.jacobians
     for k, shift in zip(ordered, moved, strict=True):
-        trial, derivative = fitted.problem.trials[k], fitted.solution.jacobians[k][0][:, column]
+        trial, derivative = fitted.problem.trials[k], jacobians[k][0][:, column]
         squares[trial.experiment] += float(derivative @ derivative) * shift**2
         pieces[trial.experiment] += pieces_of(trial, fitted.problem.floor)
     return max(squares[e] / pieces[e] for e in squares)

@@ -120,10 +120,10 @@ def _promises(candidate: Candidate, sites: Sequence[str], split: Split, crew: Cr
         start = problem.start(starting_point(parent, structure), parent.solution.point.nuisances)
         knots = range(len(parent.structure.names), len(structure.names))
         moves, _ = stacked(problem.jacobians(start, knots, problem.first_steps()))
-        moves -= basis @ (basis.T @ moves)
+        taken_up, push = basis.T @ moves, moves.T @ remaining
+        own = moves.T @ moves - taken_up.T @ taken_up
         prior = problem.prior_precision[np.ix_(knots, knots)]
-        push = moves.T @ remaining
-        gain = 0.5 * push @ np.linalg.solve(moves.T @ moves + prior, push)
+        gain = 0.5 * push @ np.linalg.solve(own + prior, push)
         found.append(_Promise(candidate, problem, start, candidate.cost - float(gain)))
     return found
 

@@ -159,7 +159,7 @@ def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> No
 def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
     """The same explanation against another floor, fitted from where it stands if it is to be done thoroughly."""
     steps = _REWEIGHED_ITERATIONS if thoroughly else 0
-    return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split)
+    return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split, near=candidate.checked)
 
 
 def _grow(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,8 @@ _SAME_COST = 0.02  # relative: two starts that end within this of each other fou
 _OPEN = 0.1  # scales
 _CONVERGED = 1e-3  # of the cost: half of it of the RMS error, which is then the same to three digits
 _CONVERGED_ITERATIONS, _ROUNDS = 20, 5
+_NUISANCE_ITERATIONS = 4
+_NONE = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,11 @@ class Fit:
     @property
     def cost(self) -> float:
         return self.solution.cost
+
+    @cached_property
+    def elsewhere(self) -> dict[str, np.ndarray]:
+        """Nuisances of the trials that it was evaluated on besides its own, by the trial's name."""
+        return {}
 
     @property
     def at_bound(self) -> np.ndarray:
@@ -117,11 +125,7 @@ def refit_on(
     these trials; without them these begin at their means."""
     problem = fitted.problem.over(trials)
     values = fitted.solution.point.values
-    known = {
-        trial.name: nuisances
-        for one in near
-        for trial, nuisances in zip(one.problem.trials, one.solution.point.nuisances, strict=True)
-    }
+    known = {name: nuisances for one in near for name, nuisances in _by_name(one).items()}
     start = Point(values, tuple(known[t.name] for t in trials)) if near else problem.start(values)
     solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
@@ -159,25 +163,38 @@ def renewed(problem: Problem, solution: Solution, **options) -> Solution:
 
 
 def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
-    """The same structure and trials against another floor, by a few steps with the derivatives that there are."""
+    """The same structure and trials against another floor, by a few steps with the derivatives that there are; without
+    any steps it has no derivatives either."""
     point = fitted.solution.point
     problem = Problem(fitted.structure, fitted.problem.trials, floor, fitted.problem.view)
+    if not max_iterations:
+        bare = replace(fitted.solution, cost=cost_of(problem, point), sensitivities=())
+        return Fit(problem, bare, fitted.starts, fitted.starts_agreeing)
     pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
     known = [s.reweighed(new / old) for s, (new, old) in zip(fitted.solution.sensitivities, pairs, strict=True)]
     solution = solve(problem, point, max_iterations=max_iterations, sensitivities=known)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
-def evaluate_on(fitted: Fit, trials: Sequence[Record]) -> Fit:
-    """The fitted parameters on other trials: only the trials' own nuisances are estimated."""
+def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
+    """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from where
+    `near` has them if it knows them."""
+    known, values = fitted.elsewhere, fitted.solution.point.values
+    asked = fitted.problem.over([t for t in trials if t.name not in known])
+    if any(asked.nuisances):
+        begun = _by_name(near) if near else {}
+        start = asked.start(values)
+        start = Point(values, tuple(begun.get(t.name, q) for t, q in zip(asked.trials, start.nuisances, strict=True)))
+        known |= _by_name(Fit(asked, solve(asked, start, free=(), max_iterations=_NUISANCE_ITERATIONS), 1, 1))
     problem = fitted.problem.over(trials)
-    start = problem.start(fitted.solution.point.values)
-    if not any(problem.nuisances):
-        empty = np.zeros((0, 0))
-        solution = Solution(start, cost_of(problem, start), True, 0, (), empty, ())
-    else:
-        solution = solve(problem, start, free=(), max_iterations=4)
+    point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))
+    solution = Solution(point, cost_of(problem, point), True, 0, (), np.zeros((0, 0)), ())
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
+def _by_name(fitted: Fit) -> dict[str, np.ndarray]:
+    """Each trial's nuisances."""
+    return dict(zip((t.name for t in fitted.problem.trials), fitted.solution.point.nuisances, strict=True))
 
 
 def spread_starts(structure: Structure, around: np.ndarray, count: int, seed: int) -> list[np.ndarray]:

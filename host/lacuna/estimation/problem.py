@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy.signal import lfilter
@@ -95,6 +96,7 @@ class Problem:
         self._weighing = [_weighing(t, floor) for t in trials]
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
+        self._together = _side_by_side(self.trials, structure.system.at_once)
 
     def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
         """The structure's vector `values` (default its start), nuisances at their means or, the first ones of each
@@ -113,7 +115,7 @@ class Problem:
         tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
         tried[:, k] = np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False)
         found = self._simulate([(values, mine) for mine in tried], index, coarse=True)
-        costs = [float(np.sum(self._weigh(prediction, index) ** 2)) for prediction in found]
+        costs = np.sum(self._weigh(found, index) ** 2, axis=1)
         nuisances[index] = tried[int(np.argmin(costs))]
 
     def seen(self, view: View) -> Problem:
@@ -131,12 +133,12 @@ class Problem:
         return self._simulate([(point.values, point.nuisances[index])], index, coarse=coarse)[0]
 
     def predict_all(self, point: Point) -> list[Channels]:
-        return in_parallel(lambda i: self.predict(point, i), range(len(self.trials)))
+        return self._of_each(point, lambda prediction, _: prediction)
 
     def residuals(self, point: Point) -> list[np.ndarray]:
         """One vector a trial, channels one after the other, weighted."""
         coarse = self.view.raised > 1.0
-        return in_parallel(lambda i: self._weigh(self.predict(point, i, coarse=coarse), i), range(len(self.trials)))
+        return self._of_each(point, lambda prediction, i: self._weigh([prediction], i)[0], coarse=coarse)
 
     def prior_cost(self, point: Point) -> float:
         """Minus log of the priors on the nuisances and on the learnt curves."""
@@ -191,9 +193,9 @@ class Problem:
             moved = [*((v, nuisances) for v, _ in by_structure), *((values, n) for n, _ in by_nuisance)]
             changes = self.changes(i, (values, nuisances), moved, coarse=True)
             changes /= np.array([step for _, step in (*by_structure, *by_nuisance)])
-            structure = np.zeros((len(changes), len(free)))
-            structure[:, moving] = changes[:, : len(moving)]
-            return structure, changes[:, len(moving) :]
+            structure = np.zeros((len(free), len(changes)))
+            structure[moving] = changes[:, : len(moving)].T
+            return structure.T, changes[:, len(moving) :]
 
         return in_parallel(blocks, range(len(self.trials)))
 
@@ -202,11 +204,13 @@ class Problem:
     ) -> np.ndarray:
         """By what the residuals of a trial change, shape (n, len(moved)), from `here` to each of `moved` nearby:
         values and the trial's nuisances."""
-        first, *others = self._simulate([here, *moved], index, coarse=coarse, alike=True)
-        reference = self._weigh(first, index)
-        changes = np.empty((len(others), len(reference)))
-        for row, prediction in zip(changes, others, strict=True):
-            row[:] = self._weigh(prediction, index) - reference
+        found = self._deviations(self._simulate([here, *moved], index, coarse=coarse, alike=True), index)
+        first, changes = found[:1], np.subtract(found[1:], found[0], out=found[1:])
+        first, weight = self._looked_at(first, index)
+        if self.view.blur:
+            changes, _ = self._looked_at(changes, index)
+        # what is compressed changes by the slope there: as small a step as a derivative takes is seen as a straight line
+        changes *= weight / self.view.raised / np.hypot(1.0, first[0] / self.view.raised / self.view.soft_limit)
         return changes.T
 
     def scaled(self, predictions: Sequence[Channels]) -> list[Channels]:
@@ -218,7 +222,29 @@ class Problem:
 
     def slopes(self, point: Point) -> list[np.ndarray]:
         """What a unit of each prediction changes its residual by, one vector a trial, shapes as `residuals`."""
-        return in_parallel(lambda i: self._slope(self.predict(point, i), i), range(len(self.trials)))
+        return self._of_each(point, self._slope)
+
+    def _of_each(self, point: Point, finish: Callable[[Channels, int], Any], *, coarse: bool = False) -> list:
+        """`finish(prediction, index)` of each trial."""
+        found: list = [None] * len(self.trials)
+
+        def together(members: Sequence[int]) -> None:
+            for i, prediction in zip(members, self._simulate_trials(point, members, coarse=coarse), strict=True):
+                found[i] = finish(prediction, i)
+
+        in_parallel(together, self._together)
+        return found
+
+    def _simulate_trials(self, point: Point, members: Sequence[int], *, coarse: bool) -> list[Channels]:
+        theta = self.structure.theta(point.values)
+        corrections = [self.structure.corrections(theta)] * len(members)
+        thetas = [theta | self._named(i, point.nuisances[i]) for i in members]
+        trials = [self.trials[i] for i in members]
+        how = {"coarse": coarse, "corrections": corrections}
+        return self.structure.system.predict_trials(thetas, self.structure.effects, trials, **how)
+
+    def _named(self, index: int, nuisances: np.ndarray) -> dict[str, float]:
+        return {p.name: float(v) for p, v in zip(self.nuisances[index], nuisances, strict=True)}
 
     def _simulate(
         self, places: Sequence[tuple[np.ndarray, np.ndarray]], index: int, *, coarse: bool, alike: bool = False
@@ -227,40 +253,47 @@ class Problem:
         thetas = [self.structure.theta(values) for values, _ in places]
         corrections = [self.structure.corrections(theta) for theta in thetas]
         for theta, (_, nuisances) in zip(thetas, places, strict=True):
-            theta |= {p.name: float(v) for p, v in zip(self.nuisances[index], nuisances, strict=True)}
+            theta |= self._named(index, nuisances)
         how = {"coarse": coarse, "corrections": corrections, "alike": alike}
         return self.structure.system.predict_many(thetas, self.structure.effects, self.trials[index], **how)
 
-    def _weigh(self, prediction: Channels, index: int) -> np.ndarray:
-        _, _, thinning, keep = self._weighing[index]
-        z, weight = self._deviations(prediction, index) / self.view.raised, thinning[keep]
-        if self.view.blur:
-            z, weight = self._blurred(z, weight, index)
-        limit = self.view.soft_limit
-        return limit * np.arcsinh(z / limit) * weight
+    def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
+        """Residuals of each prediction of a trial, a row each."""
+        z, weight = self._looked_at(self._deviations(predictions, index), index)
+        limit = self.view.soft_limit * self.view.raised
+        return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 
-    def _blurred(self, z: np.ndarray, weight: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Each channel through a low-pass, and as many samples of it as it then has anything to say."""
-        keep = self._weighing[index][3].reshape(len(self.trials[index].channels), -1)
+    def _looked_at(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Deviations as the view has them, and the weight of each: blurred, each channel goes through a low-pass, and
+        as many samples of it are kept as it then has anything to say."""
+        _, _, thinning, keep = self._weighing[index]
+        weight = thinning[keep]
+        if not self.view.blur:
+            return z, weight
+        keep = keep.reshape(len(self.trials[index].channels), -1)
         samples = keep.shape[1] * self.view.blur
         decay, every = np.exp(-1.0 / samples), max(1, round(samples / 4))
         ends = np.cumsum(keep.sum(axis=1))[:-1]
         found, weights = [], []
-        for z_, w_ in zip(np.split(z, ends), np.split(weight, ends), strict=True):
-            found.append(lfilter([1.0 - decay], [1.0, -decay], z_)[every - 1 :: every])
+        for z_, w_ in zip(np.split(z, ends, axis=1), np.split(weight, ends), strict=True):
+            found.append(lfilter([1.0 - decay], [1.0, -decay], z_)[:, every - 1 :: every])
             weights.append(w_[every - 1 :: every] * np.sqrt(every))
-        return np.concatenate(found), np.concatenate(weights)
+        return np.concatenate(found, axis=1), np.concatenate(weights)
 
     def _slope(self, prediction: Channels, index: int) -> np.ndarray:
         _, weight, thinning, keep = self._weighing[index]
-        return (weight * thinning)[keep] / np.hypot(1.0, self._deviations(prediction, index) / self.view.soft_limit)
+        return (weight * thinning)[keep] / np.hypot(1.0, self._deviations([prediction], index)[0] / self.view.soft_limit)
 
-    def _deviations(self, prediction: Channels, index: int) -> np.ndarray:
-        """Residuals in standard deviations, uncompressed."""
+    def _deviations(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
+        """Residuals of each prediction in standard deviations, uncompressed, a row each."""
         measured, weight, _, keep = self._weighing[index]
-        predicted = np.concatenate([prediction[c] for c in self.trials[index].channels])
-        z = ((predicted - measured) * weight)[keep]
-        return np.where(np.isfinite(z), z, _FAILED)
+        channels = self.trials[index].channels
+        predicted = np.array([np.concatenate([prediction[c] for c in channels]) for prediction in predictions])
+        predicted -= measured
+        predicted *= weight
+        z = predicted if keep.all() else predicted[:, keep]
+        z[~np.isfinite(z)] = _FAILED
+        return z
 
 
 def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
@@ -270,6 +303,14 @@ def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
         [np.full(v.shape, floor.samples_per_piece(trial, c) ** -0.5) for c, v in trial.channels.items()]
     )
     return measured, weight, thinning, np.isfinite(measured)
+
+
+def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:
+    """Indices of the trials that are simulated together: of one experiment, so many at once."""
+    experiments: dict[str, list[int]] = {}
+    for i, trial in enumerate(trials):
+        experiments.setdefault(trial.experiment, []).append(i)
+    return [members[k : k + at_once] for members in experiments.values() for k in range(0, len(members), at_once)]
 
 
 def _stepped(values: np.ndarray, index: int, parameter: Parameter, step: float) -> tuple[np.ndarray, float]:

@@ -11,8 +11,8 @@ import numpy as np
 class Sensitivity:
     """Derivatives of n residuals by p parameters of the structure and the trial's own q nuisances.
 
-    `taken`, shape (n, p + q), as finite differences gave them; to them are added the products `left` (m, n) by
-    `right` (m, p + q) of the steps since. `gram`, shape (p + q, p + q), is of the sum: kept up to date, since the
+    `taken`, shape (p + q, n), as finite differences gave them, a parameter a row; to them are added the products of
+    `left` (m, n) and `right` (m, p + q) of the steps since. `gram`, shape (p + q, p + q), is of the sum: kept up to date, since the
     residuals are many.
     """
 
@@ -28,17 +28,20 @@ class Sensitivity:
 
     @classmethod
     def of(cls, by_structure: np.ndarray, by_nuisances: np.ndarray) -> Sensitivity:
-        taken = np.hstack([by_structure, by_nuisances])
-        n, size = taken.shape
-        return cls(taken, taken.T @ taken, np.zeros((0, n)), np.zeros((0, size)), by_structure.shape[1])
+        taken = np.concatenate([by_structure.T, by_nuisances.T])
+        size, n = taken.shape
+        felt = np.flatnonzero(taken.any(axis=1))  # a trial that isolates parameters feels few of them
+        gram, rows = np.zeros((size, size)), taken[felt]
+        gram[np.ix_(felt, felt)] = rows @ rows.T
+        return cls(taken, gram, np.zeros((0, n)), np.zeros((0, size)), by_structure.shape[1])
 
     def gradient(self, residuals: np.ndarray) -> np.ndarray:
         """Transposed derivatives times `residuals`, shape (p + q,)."""
-        return residuals @ self.taken + (self.left @ residuals) @ self.right
+        return self.taken @ residuals + (self.left @ residuals) @ self.right
 
     def times(self, step: np.ndarray) -> np.ndarray:
         """What the residuals should change by, shape (n,)."""
-        return self.taken @ step + (self.right @ step) @ self.left
+        return step @ self.taken + (self.right @ step) @ self.left
 
     def corrected(self, step: np.ndarray, scale: np.ndarray, change: np.ndarray) -> Sensitivity:
         """The least change, counted in scales, by which the derivatives say what the step did. A parameter that the
@@ -65,5 +68,5 @@ class Sensitivity:
 
     def dense(self) -> tuple[np.ndarray, np.ndarray]:
         """By the structure's parameters, shape (n, p), and by the nuisances, shape (n, q)."""
-        whole = self.taken + self.left.T @ self.right if len(self.left) else self.taken
-        return whole[:, : self.structure], whole[:, self.structure :]
+        whole = self.taken + self.right.T @ self.left if len(self.left) else self.taken
+        return whole[: self.structure].T, whole[self.structure :].T

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -141,11 +141,15 @@ def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
 
 
 def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
-    each = max(_TABLE_INTERVALS // (site.knots - 1), 2)  # intervals of the table between two knots
-    at = np.linspace(0, 1, each * (site.knots - 1) + 1)
-    knots = np.linspace(0, 1, site.knots)
-    rows = [
-        CubicSpline(knots, [theta[_knot_name(site, row, k)] for k in range(site.knots)], bc_type="natural")(at)
-        for row in range(len(site.rows))
-    ]
-    return Correction(site.name, np.array(rows))
+    rows = range(len(site.rows))
+    values = np.array([[theta[_knot_name(site, row, k)] for k in range(site.knots)] for row in rows])
+    return Correction(site.name, values @ _splines(site.knots))
+
+
+@cache
+def _splines(knots: int) -> np.ndarray:
+    """Of each knot the natural cubic spline that is 1 there and 0 at the others, on the table's grid: a curve is their
+    sum. Shape (knots, n)."""
+    each = max(_TABLE_INTERVALS // (knots - 1), 2)  # intervals of the table between two knots
+    at = np.linspace(0, 1, each * (knots - 1) + 1)
+    return CubicSpline(np.linspace(0, 1, knots), np.eye(knots), bc_type="natural")(at).T

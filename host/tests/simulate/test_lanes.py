@@ -190,8 +190,9 @@ def _columns(tolerance_m, together, gait):
     robots = [model, *moved]
     commands = [simulate.of_gait(gait, 3.0 * gait.period_s)] * len(robots)
     time_s = np.arange(0.0, 2.5 * gait.period_s, 0.01)
+    level = {"times_s": [time_s] * len(robots), "inclinations_deg": [0.0] * len(robots)}
     how = {"tolerance_m": tolerance_m, "together": together, "states": False}
-    first, *others = (r["displacement_head_mm"] for r in simulate.walks(robots, commands, time_s, **how))
+    first, *others = (r["displacement_head_mm"] for r in simulate.walks(robots, commands, **level, **how))
     return np.array([other - first for other in others])
 
 
@@ -212,7 +213,8 @@ def test_the_first_robot_leads_every_pack():
     """Equal robots in different packs differ by nothing from the first."""
     plants = _robots(None, 1) * 20
     commands = [simulate.of_gait(FAST, 5.0)] * 20
-    records = simulate.walks(plants, commands, np.arange(0.0, 4.0, 0.01), together=True)
+    level = {"times_s": [np.arange(0.0, 4.0, 0.01)] * 20, "inclinations_deg": [0.0] * 20}
+    records = simulate.walks(plants, commands, **level, together=True)
     for record in records[1:]:
         np.testing.assert_array_equal(record["displacement_head_mm"], records[0]["displacement_head_mm"])
 

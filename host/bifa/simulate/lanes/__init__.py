@@ -33,6 +33,7 @@ __all__ = [
 ]
 
 
+_WORTH_LANES = 3  # simulations: a step of all lanes costs a little more than two of a single one
 SEEN_OF_WALK = [X_HEAD, V_HEAD, X_TAIL, V_TAIL, READ_BODY, READ_BODY + 1, READ_BODY + 2]
 
 
@@ -57,11 +58,9 @@ def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.
     if found is None:
         return [_in_numba(what, k, plant) for k, plant in enumerate(plants)]
     many, one = found
-    if len(plants) == 1:
-        return one.march(plants, what, False)
-    if together:
+    if together and len(plants) > 1:
         return _around_the_first(many, plants, what)
-    return many.march(plants, what, False)
+    return (one if len(plants) < _WORTH_LANES else many).march(plants, what, False)
 
 
 def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment) -> list[np.ndarray]:
@@ -96,7 +95,7 @@ def load(plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndar
             entries.static_record(_sealed(plant), rig, size, path, sample_s).T
             for plant, rig, path in zip(plants, rigs, paths_m, strict=True)
         ]
-    return found[len(plants) == 1].load(plants, rigs, paths_m, sample_s)
+    return found[len(plants) < _WORTH_LANES].load(plants, rigs, paths_m, sample_s)
 
 
 def _sealed(plant: Plant) -> Plant:

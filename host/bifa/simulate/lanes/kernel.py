@@ -80,12 +80,11 @@ class Kernel:
         jobs, setting, kept = _jobs(plants, what.rigs)
         setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
         setting.rate_m_s, setting.load_cell_N_m = what.rate_m_s, what.load_cell_N_m
-        rows = [np.empty((COLUMNS[what.kind], times.size)) for times in what.sample_s]
         for name, k in (("switch_s", 0), ("chamber", 1), ("command", 2)):
             jobs[name] = _addresses([one[k] for one in what.switches])
         jobs["switches"] = [one[0].size for one in what.switches]
         jobs["sample_s"], jobs["samples"] = _addresses(what.sample_s), [times.size for times in what.sample_s]
-        jobs["rows"] = _addresses(rows)
+        rows = _rows_for(jobs, COLUMNS[what.kind])
         self._call(self._march, setting, jobs)
         del kept
         return rows
@@ -93,9 +92,8 @@ class Kernel:
     def load(self, plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray):
         """Rows (2, samples) of a static loading for each robot, force in N and reading in psi."""
         jobs, setting, kept = _jobs(plants, rigs)
-        rows = np.empty((len(plants), 2, sample_s.size))
-        jobs["path"], jobs["rows"] = _addresses(paths_m), _addresses(rows)
-        jobs["sample_s"], jobs["samples"] = _address(sample_s), sample_s.size
+        jobs["path"], jobs["sample_s"], jobs["samples"] = _addresses(paths_m), _address(sample_s), sample_s.size
+        rows = _rows_for(jobs, 2)
         self._call(self._load, setting, jobs)
         del kept
         return rows
@@ -140,7 +138,19 @@ def _address(array: np.ndarray) -> int:
 
 
 def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
-    return [array.ctypes.data for array in arrays]
+    """Of each; arrays that several jobs share are asked once, which is slow."""
+    known = {id(array): array for array in arrays}
+    found = {key: _address(array) for key, array in known.items()}
+    return [found[id(array)] for array in arrays]
+
+
+def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
+    """Where each job's results go, (columns, samples)."""
+    sizes = columns * jobs["samples"]
+    ends = np.cumsum(sizes)
+    whole = np.empty(ends[-1])
+    jobs["rows"] = _address(whole) + whole.itemsize * (ends - sizes)
+    return [part.reshape(columns, -1) for part in np.split(whole, ends[:-1])]
 
 
 @cache
