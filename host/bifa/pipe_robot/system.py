@@ -39,10 +39,12 @@ from lacuna.system import (
     Theta,
 )
 
+_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")
 FRICTION_WOBBLE = 0.01  # from run to run, relative
 _ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
 _EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
 _COARSE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-6}
+_ALIKE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-5}  # shared steps err alike: differences are better
 
 _LARGE = ("body_damping_Ns_m", "body_area_N_psi", "body_alpha_n_per_s", "body_alpha_s_per_s")
 _SMALL = ("small_damping_Ns_m", "small_area_N_psi", "small_alpha_n_per_s", "small_alpha_s_per_s")
@@ -99,11 +101,14 @@ class RobotSystem(System):
     def _remember(self) -> None:
         self._plant = lru_cache(maxsize=512)(self._plant_of)
         self._own_values = _picked(self.fitted)
+        self._unfitted = {name: p.value for name, p in self.model.parameters.items() if name not in self.fitted}
         self._shapes = {prefix: _picked(curve.names) for prefix, curve in self.curves.items()}
 
     def __getstate__(self) -> dict:
         """What travels to another process: all but what is remembered."""
-        return {n: value for n, value in vars(self).items() if n not in ("_plant", "_own_values", "_shapes")}
+        return {
+            n: value for n, value in vars(self).items() if n not in ("_plant", "_own_values", "_unfitted", "_shapes")
+        }
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -163,15 +168,16 @@ class RobotSystem(System):
         for k, (case, trial) in enumerate(zip(cases, trials, strict=True)):
             if case:
                 benches.setdefault(trial.payload.bench, []).append(k)
-        found = [_nothing(trial) for trial in trials]
+        found: dict[int, Channels] = {}
         for members in benches.values():
             first = trials[members[0]]
-            tolerance_m = (_COARSE_M if coarse else _EXACT_M)[first.experiment]
+            tolerances_m = _EXACT_M if not coarse else _ALIKE_M if alike else _COARSE_M
+            tolerance_m = tolerances_m[first.experiment]
             simulated = _simulated(first.payload, [cases[k] for k in members], tolerance_m, alike)
             for k, channels in zip(members, simulated, strict=True):
                 if channels:
                     found[k] = _seen(channels, each[k][1], cases[k], trials[k])
-        return found
+        return [found[k] if k in found else _nothing(trial) for k, trial in enumerate(trials)]
 
     def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record) -> Case | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
@@ -310,9 +316,7 @@ class RobotSystem(System):
             for prefix, own in (("body", self.model.body_stiffness), ("small", self.model.small_stiffness))
         )
         effects = {effect: dict(values) for effect, values in extra}
-        values = {name: p.value for name, p in self.model.parameters.items()} | dict(
-            zip(self.fitted, named, strict=True)
-        )
+        values = self._unfitted | dict(zip(self.fitted, named, strict=True))
         values |= {f"{effect}.{name}": v for effect, own in effects.items() for name, v in own.items()}
         return of_values(values, effects, body, small), (body.contracted_m, small.contracted_m)
 

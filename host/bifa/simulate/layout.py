@@ -63,6 +63,7 @@ def index(name: str) -> int:
     return _indices()[name]
 
 
+@cache
 def size() -> int:
     """Length of `q`."""
     return max(_indices().values()) + 1

@@ -47,8 +47,7 @@ def of_values(
 
 def _numbers(values: Mapping[str, float], body: Tabulated, small: Tabulated) -> np.ndarray:
     q = np.zeros(layout.size())
-    for name, value in values.items():
-        q[layout.index(name)] = value
+    q[[layout.index(name) for name in values]] = list(values.values())
     q[layout.BODY + layout.MASS] = values["head_mass_kg"]
     _shape(q, layout.BODY, body)
     _shape(q, layout.SMALL, small)

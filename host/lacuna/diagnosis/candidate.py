@@ -10,21 +10,24 @@ import numpy as np
 
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.diagnosis.residual_error import rms
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, starting_point
 from lacuna.estimation.graduated import Isolated, fit_isolated, fit_together, solve_graduated
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
-from lacuna.estimation.solve import Solution, solve
+from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 from lacuna.system import Effect, Parameter
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
+_ABSURD = 10.0  # times the parent's cost: of a size that begins beyond, nothing is to be hoped
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
 _FOLLOWED = 4  # of those begun anew, the ones that are followed to the end
+_NEAR = 1.3  # times the cost of a finished refit
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
 
@@ -49,6 +52,11 @@ class Candidate:
     def rms(self) -> float:
         """Weighted RMS residual of the known trials, in units of the noise; large ones compressed, as in the fit."""
         return float(np.sqrt(2.0 * (self.fitted.cost + self.checked.cost) / self.pieces))
+
+    @cached_property
+    def unseen_rms(self) -> float:
+        """RMS residual of the trials that it was not fitted to, large ones at their full size."""
+        return rms(self.checked.scaled_residuals())
 
     @cached_property
     def cost(self) -> float:
@@ -150,6 +158,10 @@ def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -
         return solve(problem, start, free=rest, max_iterations=steps, sensitivities=known)
 
     starts = [problem.start(values, parent.point.nuisances) for values in sizes]
+    costs = [cost_of(problem, start) for start in starts]
+    starts = [
+        start for start, cost in zip(starts, costs, strict=True) if cost <= max(_ABSURD * parent.cost, min(costs))
+    ]
     found = sorted((released(start, 1) for start in starts), key=lambda s: s.cost)
     best = [released(s.point, _PROFILE_STEPS - 1) for s in found[:_PROFILED_FURTHER]]
     found = sorted([*best, *found[_PROFILED_FURTHER:]], key=lambda s: s.cost)
@@ -208,9 +220,12 @@ def finish(sketched: Fit) -> Fit:
 
 
 def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:
-    """The better of a finished refit and one from the profile's second best point."""
-    others = [solve(profiled.problem, point, **_REFIT) for point in profiled.points[1:2]]
-    return best_of(profiled.problem, [finished.solution, *others])
+    """The better of a finished refit and one from the profile's second best point, which is followed to the end where a
+    quick refit comes near."""
+    problem = profiled.problem
+    others = [solve(problem, point, **_SKETCH) for point in profiled.points[1:2]]
+    near = [solve(problem, one.point, **_REFIT) for one in others if one.cost < _NEAR * finished.cost]
+    return best_of(problem, [finished.solution, *near])
 
 
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:

@@ -74,7 +74,8 @@ def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, polic
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
     share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
     least = extra * max(policy.gain, policy.gain_per_piece * smaller.pieces)
-    return gain > least and unseen > policy.unseen_gain * least and share > min(extra * policy.share, 0.9)
+    better = unseen > policy.unseen_gain * least and larger.unseen_rms < smaller.unseen_rms
+    return gain > least and better and share > min(extra * policy.share, 0.9)
 
 
 def dispersion_of(tried: Sequence[Candidate]) -> float:

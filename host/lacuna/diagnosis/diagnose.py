@@ -16,7 +16,7 @@ from lacuna.diagnosis.named import Named, Rival, describe_effects, drop_absent, 
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder
-from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, rms, share_of_gap
+from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search, screen, search
 from lacuna.diagnosis.sign import impossible_signs
 from lacuna.diagnosis.signature import Signature, describe
@@ -196,7 +196,7 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew:
     offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
     if unexplained:
         offered += (*found.tried, *found.freed)
-    best = min(offered, key=lambda c: rms(c.checked.scaled_residuals()), default=None)
+    best = min(offered, key=lambda c: c.unseen_rms, default=None)
     if best is None:
         return judged.explained
     final = case.converged(best)

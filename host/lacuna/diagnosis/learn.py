@@ -84,12 +84,8 @@ def _best_grown(
     if before.checked.cost - best.checked.cost < policy.curve * _excess(before.checked):
         return None
     best = min(best, judge(_refined(best.fitted), split), key=lambda c: c.checked.cost)
-    return best if _rms(best) < _rms(before) else None
-
-
-def _rms(candidate: Candidate) -> float:
-    """On unseen trials, large residuals at their full size: a fit may not buy small ones with them."""
-    return rms(candidate.checked.scaled_residuals())
+    # a fit may not buy small residuals with large ones, which its cost compresses
+    return best if best.unseen_rms < before.unseen_rms else None
 
 
 def _excess(fit: Fit) -> float:

@@ -83,7 +83,7 @@ class Policy:
         3.0, "times the least excess of the beam", "sets that leave more are not extended", "simulation"
     )
     hopeless: float = _rule(
-        10.0,
+        5.0,
         "times the least excess finished",
         "a rough fit that leaves more is not fitted to convergence",
         "simulation",

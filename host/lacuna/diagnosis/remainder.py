@@ -161,9 +161,10 @@ def _exceeded(draws: np.ndarray, value: float) -> float:
 def _stretches(noise: Sequence[np.ndarray], shape: tuple[int, ...], draw: np.random.Generator) -> np.ndarray:
     """Rows of noise, each a trace drawn at random, begun anywhere in it and gone round, in either sign."""
     *rows, length = shape
-    lengths = np.array([len(trace) for trace in noise])
-    begins = np.cumsum(lengths) - lengths
     chosen = draw.integers(len(noise), size=rows)
-    place = draw.integers(lengths[chosen])[..., None] + np.arange(length)
-    found = np.concatenate(noise)[begins[chosen][..., None] + place % lengths[chosen][..., None]]
+    place = draw.integers(np.array([len(trace) for trace in noise])[chosen])
+    round_again = [np.resize(trace, len(trace) + length) for trace in noise]
+    found = np.empty(shape)
+    for row in np.ndindex(*rows):
+        found[row] = round_again[chosen[row]][place[row] : place[row] + length]
     return found * draw.choice((-1.0, 1.0), (*rows, 1))

@@ -214,7 +214,7 @@ def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:
     """From the initial guess again for as long as that pays: a friction in the wrong minimum may need to restart more
     than once."""
     for _ in range(_ROUNDS):
-        further = judge(finish(candidate.fitted), split)
+        further = judge(finish(candidate.fitted), split, near=candidate.checked)
         fruitful = candidate.cost - further.cost > max(policy.promising * candidate.excess, _LEAST)
         candidate = min(candidate, further, key=lambda c: c.cost)
         if not fruitful:
@@ -226,7 +226,7 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Po
     """Refit to the end the best `count` of those that explain more than the best set so far, `before`; once one of them
     explains enough, only those that are not out of its reach. What does not explain enough gets a second start, so that
     it is not the optimiser who failed."""
-    grown = [judge(fitted, split) for fitted, _ in sketched]
+    grown = [judge(fitted, split, near=before.checked) for fitted, _ in sketched]
     profiled = {candidate.effects: profile for candidate, (_, profile) in zip(grown, sketched, strict=True)}
     waiting = sorted(grown, key=lambda c: c.cost)
     done: list[Candidate] = []
@@ -242,7 +242,8 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Po
         candidate = _finished(candidate, split, policy)
         suffices = enough(candidate)
         if not suffices:
-            candidate = judge(finish_elsewhere(candidate.fitted, profiled[candidate.effects]), split)
+            other = finish_elsewhere(candidate.fitted, profiled[candidate.effects])
+            candidate = judge(other, split, near=candidate.checked)
             suffices = enough(candidate)
         if suffices:
             explained = min(explained, candidate.cost)

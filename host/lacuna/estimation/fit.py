@@ -135,7 +135,7 @@ def converged(fitted: Fit) -> Fit:
     """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
-    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.1 * _CONVERGED}
+    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _CONVERGED}
     solution = solve(problem, fitted.solution.point, **options)
     if not fitted.structure.sites:  # curves are many parameters, and their fit is not compared with another's
         solution = renewed(problem, solution, **options)
@@ -177,14 +177,13 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
 
 
 def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
-    """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from where
-    `near` has them if it knows them."""
+    """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from
+    where `near` has them if it knows them."""
     known, values = fitted.elsewhere, fitted.solution.point.values
     asked = fitted.problem.over([t for t in trials if t.name not in known])
     if any(asked.nuisances):
         begun = _by_name(near) if near else {}
-        start = asked.start(values)
-        start = Point(values, tuple(begun.get(t.name, q) for t, q in zip(asked.trials, start.nuisances, strict=True)))
+        start = asked.start(values, [begun.get(t.name, _NONE) for t in asked.trials])
         known |= _by_name(Fit(asked, solve(asked, start, free=(), max_iterations=_NUISANCE_ITERATIONS), 1, 1))
     problem = fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))

@@ -61,7 +61,8 @@ class NoiseFloor:
         noise = self.channels[trial.experiment, channel]
         if noise.jitter_s == 0:
             return np.full(trial.time_s.shape, noise.sd)
-        return np.sqrt(noise.sd**2 + _shift_variance(trial, channel, noise.jitter_s, noise.sd))
+        samples = _smooth(trial.channels[channel])
+        return np.sqrt(noise.sd**2 + _shift_variance(trial.time_s, samples, noise.jitter_s, noise.sd))
 
     def lowered_by(self, other: NoiseFloor) -> NoiseFloor:
         """The lower of two floors for each channel: both are upper bounds, since a model that does not fit
@@ -133,10 +134,11 @@ def _from_pairs(
         still = np.ones_like(still)
     sd = np.sqrt(np.nanmean(everything[still] ** 2))
     sd = max(sd, sensor, _smallest([trial for pair in pairs for trial in pair], channel))
-    jitter_s = _jitter(pairs, channel, differences, moving, sd)
+    records = [(first.time_s, _smooth(first.channels[channel])) for first, _ in pairs]
+    jitter_s = _jitter(records, differences, moving, sd)
     scaled = []
-    for (first, _), difference in zip(pairs, differences, strict=True):
-        variance = sd**2 + (_shift_variance(first, channel, jitter_s, sd) if jitter_s else 0.0)
+    for record, difference in zip(records, differences, strict=True):
+        variance = sd**2 + (_shift_variance(*record, jitter_s, sd) if jitter_s else 0.0)
         scaled.append(difference / np.sqrt(variance))
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
 
@@ -183,33 +185,29 @@ def _moves(trial: Record, channel: str) -> np.ndarray:
     return change > _MOVING_SIGMAS * max(_fast_noise(samples), 1e-12)
 
 
-def _jitter(pairs, channel, differences, moving, sd) -> float:
+def _jitter(records, differences, moving, sd) -> float:
     """The shift in time whose mean square effect explains what fast-moving samples differ by beyond `sd`."""
     excess = float(np.nansum([np.nansum(d[m] ** 2 - sd**2) for d, m in zip(differences, moving, strict=True)]))
     if excess <= 0 or not any(m.any() for m in moving):
         return 0.0
 
     def lacking(jitter_s: float) -> float:
-        explained = sum(
-            np.nansum(_shift_variance(first, channel, jitter_s, sd)[m])
-            for (first, _), m in zip(pairs, moving, strict=True)
-        )
-        return excess - explained
+        variances = (_shift_variance(*record, jitter_s, sd) for record in records)
+        return excess - sum(np.nansum(variance[m]) for variance, m in zip(variances, moving, strict=True))
 
     if lacking(_LONGEST_JITTER_S) > 0:
         return _LONGEST_JITTER_S
     return float(brentq(lacking, 0.0, _LONGEST_JITTER_S, xtol=1e-9))
 
 
-def _shift_variance(trial: Record, channel: str, jitter_s: float, sd: float) -> np.ndarray:
-    """Mean square change of a record under a random shift in time, less what its own noise adds."""
-    samples = _smooth(trial.channels[channel])
+def _shift_variance(time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: float) -> np.ndarray:
+    """Mean square change of a smooth record under a random shift in time, less what its own noise adds."""
     known = np.isfinite(samples)
     if known.sum() < 2:
         return np.zeros(samples.shape)
     total = np.zeros(samples.shape)
     for node, weight in zip(_SHIFT_NODES, _SHIFT_WEIGHTS, strict=True):
-        shifted = np.interp(trial.time_s + node * jitter_s, trial.time_s[known], samples[known])
+        shifted = np.interp(time_s + node * jitter_s, time_s[known], samples[known])
         total += weight * (shifted - samples) ** 2
     return np.nan_to_num(np.maximum(total - sd**2, 0.0))
 

@@ -20,6 +20,7 @@ from lacuna.system import Channels, Parameter, Record
 LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivatives
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
 _OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
+_REMEMBERED = 4  # points whose residuals are kept
 _FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
 
 
@@ -96,6 +97,7 @@ class Problem:
         self._weighing = [_weighing(t, floor) for t in trials]
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
+        self._recent: dict[tuple, list[np.ndarray]] = {}  # residuals: a search begins where the one before ended
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
     def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
@@ -104,7 +106,7 @@ class Problem:
         start = self.structure.start() if values is None else np.asarray(values, float)
         nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
         for mine, given in zip(nuisances, known or (), strict=False):
-            mine[: len(given)] = given
+            mine[: len(given)] = given[: len(mine)]
         own = [(i, len(ps) - k - 1) for i, ps in enumerate(self.nuisances) for k in range(len(self._own[i]))]
         in_parallel(lambda job: self._scan(start, nuisances, *job), own)
         return Point(start, tuple(nuisances))
@@ -137,8 +139,14 @@ class Problem:
 
     def residuals(self, point: Point) -> list[np.ndarray]:
         """One vector a trial, channels one after the other, weighted."""
-        coarse = self.view.raised > 1.0
-        return self._of_each(point, lambda prediction, i: self._weigh([prediction], i)[0], coarse=coarse)
+        key = (self.view, point.values.tobytes(), *(q.tobytes() for q in point.nuisances))
+        if key not in self._recent:
+            coarse = self.view.raised > 1.0
+            found = self._of_each(point, lambda prediction, i: self._weigh([prediction], i)[0], coarse=coarse)
+            for old in list(self._recent)[: 1 - _REMEMBERED]:
+                del self._recent[old]
+            self._recent[key] = found
+        return self._recent[key]
 
     def prior_cost(self, point: Point) -> float:
         """Minus log of the priors on the nuisances and on the learnt curves."""
@@ -209,7 +217,7 @@ class Problem:
         first, weight = self._looked_at(first, index)
         if self.view.blur:
             changes, _ = self._looked_at(changes, index)
-        # what is compressed changes by the slope there: as small a step as a derivative takes is seen as a straight line
+        # over as small a step as a derivative takes, the compression is a straight line
         changes *= weight / self.view.raised / np.hypot(1.0, first[0] / self.view.raised / self.view.soft_limit)
         return changes.T
 
@@ -282,7 +290,9 @@ class Problem:
 
     def _slope(self, prediction: Channels, index: int) -> np.ndarray:
         _, weight, thinning, keep = self._weighing[index]
-        return (weight * thinning)[keep] / np.hypot(1.0, self._deviations([prediction], index)[0] / self.view.soft_limit)
+        return (weight * thinning)[keep] / np.hypot(
+            1.0, self._deviations([prediction], index)[0] / self.view.soft_limit
+        )
 
     def _deviations(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of each prediction in standard deviations, uncompressed, a row each."""

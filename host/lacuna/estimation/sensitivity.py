@@ -12,8 +12,8 @@ class Sensitivity:
     """Derivatives of n residuals by p parameters of the structure and the trial's own q nuisances.
 
     `taken`, shape (p + q, n), as finite differences gave them, a parameter a row; to them are added the products of
-    `left` (m, n) and `right` (m, p + q) of the steps since. `gram`, shape (p + q, p + q), is of the sum: kept up to date, since the
-    residuals are many.
+    `left` (m, n) and `right` (m, p + q) of the steps since. `gram`, shape (p + q, p + q), is of the sum: kept up to
+    date, since the residuals are many.
     """
 
     taken: np.ndarray

@@ -145,7 +145,7 @@ def _descended(
     reach = _REACH * scale
     bounds = np.maximum(lower, here.x - reach), np.minimum(upper, here.x + reach)
     least = max(ENOUGH, relative * here.cost)
-    promise = np.inf
+    promise, growth = np.inf, 8.0
     while damping < _LAMBDA_MOST:
         step, promise = _step(system, here.x, *bounds, scale, damping)
         if promise < least:
@@ -155,7 +155,7 @@ def _descended(
         if there.cost < here.cost:
             damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
             return _Taken(there, there.x - here.x, ratio), damping, False
-        damping = max(damping, 1e-6) * 8
+        damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
         if once:
             break
     return None, damping, promise < least

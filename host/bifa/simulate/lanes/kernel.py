@@ -113,9 +113,10 @@ def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]):
         level = np.zeros_like(curved)
         learnt = [table if len(table) else level for table in learnt]
         jobs["learnt"] = _addresses(learnt)
-    for name, tables in (("q", [p.q for p in plants]), ("body_curve", [p.body_curve for p in plants]),
-                         ("small_curve", [p.small_curve for p in plants])):  # fmt: skip
-        jobs[name] = _addresses(tables)
+    numbers = np.array([plant.q for plant in plants])
+    jobs["q"] = _address(numbers) + numbers.strides[0] * np.arange(len(plants))
+    jobs["body_curve"] = _addresses([plant.body_curve for plant in plants])
+    jobs["small_curve"] = _addresses([plant.small_curve for plant in plants])
     jobs["active"] = [plant.active for plant in plants]
     for name in ("incline_rad", "positive_psi", "negative_psi", "share"):
         jobs[name] = [getattr(rig, name) for rig in rigs]
@@ -130,7 +131,7 @@ def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]):
         learnt_terms=0 if curved is None else curved.shape[0],
         learnt_columns=0 if curved is None else curved.shape[1],
     )
-    return jobs, setting, (learnt, terrain)
+    return jobs, setting, (numbers, learnt, terrain)
 
 
 def _address(array: np.ndarray) -> int:
