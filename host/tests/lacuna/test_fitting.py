@@ -1,16 +1,19 @@
 """Fitting on a system whose truth is known: values, intervals, bounds, floors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 from toy import SENSOR_SD_MM, hide
 
 from lacuna.estimation.autocorrelation import correlation_samples
-from lacuna.estimation.fit import fit_base
+from lacuna.estimation.fit import evaluate_on, fit, fit_base
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
-from lacuna.estimation.problem import Problem
+from lacuna.estimation.problem import Point, Problem, View
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import profile_interval, uncertainty
@@ -49,8 +52,6 @@ def test_a_parameter_that_the_data_cannot_see_is_said_to_be_undetermined():
     system = hide({}, seed=2)
     blind = Structure(system, ("sensor_gain",))
     floor = estimate_noise(system, system.trials)
-    from lacuna.estimation.fit import fit
-
     found = uncertainty(fit(blind, system.trials, floor))
     assert found.undetermined or found.correlations(above=0.99)
 
@@ -68,6 +69,49 @@ def test_a_fit_never_leaves_its_bounds_nor_gets_worse(shift):
     assert ended.cost <= begun.cost
     assert np.all(ended.point.values >= lower)
     assert np.all(ended.point.values <= upper)
+
+
+def test_the_nuisances_of_other_trials_are_estimated_once_and_as_if_they_were_alone():
+    system = hide({}, seed=5, repeats=3)
+    fitted = fit(Structure(system), system.trials[:4], estimate_noise(system, system.trials))
+    others = system.trials[4:8]
+    both = evaluate_on(fitted, others)
+    assert any(len(q) for q in both.solution.point.nuisances)
+    assert set(fitted.elsewhere) == {t.name for t in others}
+    again = evaluate_on(fitted, others[:1])
+    np.testing.assert_array_equal(again.solution.point.nuisances[0], both.solution.point.nuisances[0])
+    alone = evaluate_on(replace(fitted, starts=2), others[:1], near=both)
+    np.testing.assert_allclose(alone.solution.point.nuisances[0], both.solution.point.nuisances[0], atol=1e-3)
+    assert alone.cost == pytest.approx(both.problem.over(others[:1]).prior_cost(again.solution.point) + sum(
+        0.5 * float(r @ r) for r in again.problem.residuals(again.solution.point)
+    ), abs=0.02)  # fmt: skip
+
+
+@pytest.mark.parametrize("view", [View(), View(1 / 60, 10.0, 30.0), View(soft_limit=2.0)])
+def test_derivatives_are_those_of_the_residuals_however_they_are_looked_at(view):
+    system = hide({}, seed=6, repeats=1)
+    problem = Problem(Structure(system), system.trials[:3], estimate_noise(system, system.trials), view)
+    point, free = problem.start(), range(len(system.parameters))
+    taken = problem.jacobians(point, free, problem.first_steps())
+    for k, parameter in enumerate(system.parameters):
+        step = 1e-4 * parameter.step_scale * np.eye(len(free))[k]
+        ahead, back = (problem.residuals(Point(point.values + s, point.nuisances)) for s in (step, -step))
+        for (found, _), a, b in zip(taken, ahead, back, strict=True):
+            expected = (a - b) / (2.0 * step[k])
+            assert np.linalg.norm(found[:, k] - expected) < 0.02 * np.linalg.norm(expected) + 1e-9
+
+
+def test_a_learnt_curve_is_the_natural_spline_through_its_knots():
+    system = hide({}, seed=1, repeats=1)
+    name, site = next(iter(system.correction_sites.items()))
+    structure = Structure(system, (), (name,))
+    values = structure.start()
+    knots = np.random.default_rng(0).standard_normal(site.knots)
+    values[-site.knots :] = knots
+    (correction,) = structure.corrections(structure.theta(values))
+    at = np.linspace(0.0, 1.0, correction.table.shape[1])
+    spline = CubicSpline(np.linspace(0.0, 1.0, site.knots), knots, bc_type="natural")
+    np.testing.assert_allclose(correction.table[-1], spline(at), atol=1e-12)
 
 
 class Block(System):

@@ -107,12 +107,14 @@ def test_a_drift_below_relevance_is_told_and_the_verdict_is_none():
 
 @dataclass(eq=False)
 class Tried:
-    """As much of a candidate as the choice looks at: cost on the trials fitted and on those checked, by condition."""
+    """As much of a candidate as the choice looks at: cost on the trials fitted and on those checked, by condition.
+    `beyond`: what the compression of large residuals hides of the mean square of those checked."""
 
     effects: tuple[str, ...]
     fitted_costs: tuple[float, ...]
     checked_costs: tuple[float, ...]
     pieces: float = 2000.0
+    beyond: float = 0.0
 
     @cached_property
     def trials(self):
@@ -127,6 +129,10 @@ class Tried:
     def checked(self):
         trials = self.trials[len(self.fitted_costs) :]
         return SimpleNamespace(problem=SimpleNamespace(trials=trials), cost=sum(self.checked_costs))
+
+    @property
+    def unseen_rms(self):
+        return np.sqrt(np.mean(self.checked_costs) + self.beyond)
 
     @property
     def cost(self):
@@ -177,6 +183,13 @@ def test_unseen_gain_part_of_the_gain_must_be_on_trials_that_were_not_fitted():
     base = tried((), 40.0, unseen=0.5)
     assert worth_adding(base, tried(("a",), 20.0, unseen=0.8), 1.0, POLICY), "4 of the 20 gained"
     assert not worth_adding(base, tried(("a",), 20.0, unseen=0.95), 1.0, POLICY), "1 of the 20 gained"
+
+
+def test_an_effect_must_not_buy_small_residuals_with_large_ones():
+    base, larger = tried((), 40.0), tried(("a",), 20.0)
+    assert worth_adding(base, larger, 1.0, POLICY)
+    larger.beyond = 10.0
+    assert not worth_adding(base, larger, 1.0, POLICY), "one walk that fails costs little where it is compressed"
 
 
 def test_share_an_effect_must_close_a_share_of_what_is_left():

@@ -50,6 +50,22 @@ def theta(system):
     return {p.name: p.value for p in system.parameters}
 
 
+def test_trials_side_by_side_are_predicted_as_each_alone(system, theta):
+    """Walks of several lengths and slopes in one kernel's lanes, and one among them that cannot be simulated."""
+    walk = next(t for t in system.trials if t.experiment == "locomotion")
+    short = replace(walk.payload, time_s=walk.time_s[: len(walk.time_s) // 2], inclination_deg=4.0)
+    half = {c: v[: len(short.time_s)] for c, v in walk.channels.items()}
+    shorter = replace(walk, name="shorter", time_s=short.time_s, channels=half, payload=short)
+    overhanging = replace(walk, payload=replace(walk.payload, inclination_deg=100.0))
+    trials = [*system.trials, shorter, walk, overhanging]
+    found = system.predict_trials([theta] * len(trials), (), trials)
+    assert np.isnan(next(iter(found[-1].values()))).all()
+    for trial, channels in zip(trials[:-1], found[:-1], strict=True):
+        alone = system.predict(theta, (), trial)
+        for name, expected in alone.items():
+            np.testing.assert_allclose(channels[name], expected, atol=2e-3 * np.ptp(expected) + 1e-9, err_msg=name)
+
+
 def test_statics_alone_give_the_areas(system, theta, lab):
     assert theta["body_area_N_psi"] == pytest.approx(lab.large.area, rel=0.002)
     assert theta["small_area_N_psi"] == pytest.approx(lab.small.area, rel=0.002)
