@@ -39,7 +39,7 @@ from lacuna.system import (
     Theta,
 )
 
-_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")
+_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")  # by a system, for speed
 FRICTION_WOBBLE = 0.01  # from run to run, relative
 _ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
 _EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
@@ -106,9 +106,7 @@ class RobotSystem(System):
 
     def __getstate__(self) -> dict:
         """What travels to another process: all but what is remembered."""
-        return {
-            n: value for n, value in vars(self).items() if n not in ("_plant", "_own_values", "_unfitted", "_shapes")
-        }
+        return {n: value for n, value in vars(self).items() if n not in _REMEMBERED}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -139,7 +137,9 @@ class RobotSystem(System):
     ) -> list[Channels]:
         return self._predicted(thetas, effects, [trial] * len(thetas), coarse, corrections, alike)
 
-    at_once = property(lambda self: lanes.width())
+    @property
+    def at_once(self) -> int:
+        return lanes.width()
 
     def predict_trials(
         self,

@@ -73,7 +73,7 @@ class Family:
         self._first = table(curve)
         self._ways = np.array([table(way)[1:].ravel() for way in ways]).reshape(len(ways), 4 * _INTERVALS)
 
-    @lru_cache(maxsize=128)  # noqa: B019 - a family lives as long as the program
+    @lru_cache(maxsize=128)  # noqa: B019 - holds a family back at most until 128 other tables were asked for
     def at(self, weights: tuple[float, ...]) -> Tabulated:
         """The member with so much of each way; ModelParameterError if it is not bistable."""
         rows = self._first.copy()
