@@ -24,6 +24,7 @@ from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Finished
 from lacuna.diagnosis.warn import warnings_of
 from lacuna.estimation.fit import Fit
+from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
 
 
@@ -78,6 +79,7 @@ class Diagnosis:
         return f"<{self.verdict}{named}: error {self.before.held_out:.3g} to {self.after.held_out:.3g} floors>"
 
 
+@one_thread
 def diagnose(
     system: System,
     *,

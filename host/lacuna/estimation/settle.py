@@ -16,7 +16,7 @@ import numpy as np
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Point, Problem, in_parallel
 from lacuna.estimation.sensitivity import Sensitivity
-from lacuna.estimation.solve import Solution, solve
+from lacuna.estimation.solve import Solution, one_thread, solve
 
 _ROUNDS = 6
 _STEPS = 20  # a round: cheap beside its derivatives
@@ -38,6 +38,7 @@ class _Directions:
     spread: tuple[np.ndarray, ...]
 
 
+@one_thread
 def settle(fitted: Fit) -> Fit:
     """The fit at its optimum, with derivatives and a normal matrix to be trusted. A round costs P simulations of all
     trials; there are one to six, two as a rule. A fit that is stopped by a bound stays as it is: the model is wrong."""

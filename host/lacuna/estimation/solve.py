@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController
 from lacuna.estimation.problem import Point, Problem, Steps, in_parallel
 from lacuna.estimation.sensitivity import Sensitivity
 
-_blas = ThreadpoolController()  # linear algebra keeps to one thread: the cores are shared among trials
+one_thread = ThreadpoolController().wrap(limits=1, user_api="blas")  # of linear algebra: trials share the cores
 ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
 RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
 _NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
@@ -54,7 +54,7 @@ def cost_of(problem: Problem, point: Point) -> float:
     return 0.5 * sum(float(r @ r) for r in problem.residuals(point)) + problem.prior_cost(point)
 
 
-@_blas.wrap(limits=1, user_api="blas")
+@one_thread
 def solve(
     problem: Problem,
     start: Point,
