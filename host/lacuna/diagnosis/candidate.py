@@ -13,7 +13,7 @@ from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.residual_error import rms
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, starting_point
+from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, spread_starts, starting_point
 from lacuna.estimation.graduated import Isolated, fit_isolated, fit_together, solve_graduated
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
@@ -28,6 +28,7 @@ _ABSURD = 10.0  # times the parent's cost: of a size that begins beyond, nothing
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
 _FOLLOWED = 4  # of those begun anew, the ones that are followed to the end
 _NEAR = 1.3  # times the cost of a finished refit
+_AFRESH = 3  # starts
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
 
@@ -226,6 +227,20 @@ def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:
     others = [solve(problem, point, **_SKETCH) for point in profiled.points[1:2]]
     near = [solve(problem, one.point, **_REFIT) for one in others if one.cost < _NEAR * finished.cost]
     return best_of(problem, [finished.solution, *near])
+
+
+def finished_afresh(candidate: Candidate, split: Split, seed: int) -> Candidate:
+    """The better of a finished explanation and refits of it that begin anywhere plausible, its effects as they are."""
+    finished, structure = candidate.fitted, candidate.fitted.structure
+    problem, values = finished.problem, finished.solution.point.values
+    starts = spread_starts(structure, values, 1 + _AFRESH, seed)[1:]
+    for start in starts:
+        start[structure.base_size :] = values[structure.base_size :]
+    found = min((solve_graduated(problem, start, **_SKETCH) for start in starts), key=lambda s: s.cost)
+    if found.cost > _NEAR * finished.cost:
+        return candidate
+    best = best_of(problem, [finished.solution, renewed(problem, found, **_REFIT)])
+    return min(candidate, judge(best, split, near=candidate.checked), key=lambda c: c.cost)
 
 
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:

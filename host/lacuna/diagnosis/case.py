@@ -64,11 +64,15 @@ class Case:
         """Whether an explanation leaves nothing that matters once it is fitted to all known trials."""
         if candidate not in self._sufficient:
             self._sufficient[candidate] = (
-                self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
+                self.nearly(candidate)
                 and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
                 and not self.remainder(self.converged(candidate)).matters
             )
         return self._sufficient[candidate]
+
+    def nearly(self, candidate: Candidate) -> bool:
+        """Whether an explanation leaves so little that its fit, begun elsewhere, might leave nothing that matters."""
+        return self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may

@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from lacuna.check import TooLittleDataError, check
+from lacuna.diagnosis.candidate import finished_afresh
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
@@ -170,11 +171,15 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
     """Everything tried, and whether the search was stopped by hand. Nothing is tried where the base model leaves
     nothing that matters."""
     first = case.judge(base)
+    if case.nearly(first) and not case.suffices(first):
+        crew.say("fitting the base model from elsewhere, too")
+        first = finished_afresh(first, case.split, case.seed)
+        base = first.fitted
     if case.suffices(first):
         return Search(first, base.problem.floor, (first,), tuple(screen(base, case.split, base.problem.floor))), False
     finished = Finished(case.suffices)
     try:
-        return search(base, case.split, base.problem.floor, enough=finished, policy=case.policy, crew=crew), False
+        return search(case, base, enough=finished, crew=crew), False
     except KeyboardInterrupt:
         crew.say("stopped: weighing what was found until now (Ctrl-C again gives up)")
         return finished.search(first, case.split), True

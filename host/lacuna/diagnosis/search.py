@@ -13,11 +13,13 @@ from lacuna.diagnosis.candidate import (
     anew,
     finish,
     finish_elsewhere,
+    finished_afresh,
     from_initial_guess,
     judge,
     profiles,
     sketches,
 )
+from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.linear import remaining_after
@@ -105,7 +107,7 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
     return found
 
 
-def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy, crew: Crew) -> Search:
+def search(case: Case, base: Fit, *, enough, crew: Crew) -> Search:
     """Grow sets from the base model until one is `enough(candidate)`, or a further effect takes too little away for it
     to be named, or nothing promises to take its share away, or there are three effects.
 
@@ -113,6 +115,7 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy
     promising are refitted with equal effort, and the best sets make the next beam. The best one is tried in a form of
     its own, too, before another effect joins it.
     """
+    split, policy, floor = case.split, case.policy, base.problem.floor
     screened = screen(base, split, floor)
     first = judge(base, split)
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
@@ -132,6 +135,9 @@ def search(base: Fit, split: Split, floor: NoiseFloor, *, enough, policy: Policy
         before = min(tried[frozenset(c.effects)].excess for c in beam)
         beam = _ranked(tried, size)[: _BEAM[size]]
         best = beam[0]
+        if case.nearly(best) and not enough(best):
+            crew.say(f"fitting {' + '.join(best.effects)} from elsewhere, too")
+            best = beam[0] = tried[frozenset(best.effects)] = finished_afresh(best, split, case.seed)
         gap, least = tried[frozenset()].excess, policy.promising * before
         if best.excess < policy.half * gap:  # what is found may be named: what follows must be worth naming, too
             least = max(policy.share * before, policy.share_of_gap * gap)
