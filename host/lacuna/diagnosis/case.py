@@ -15,6 +15,7 @@ from lacuna.system import System
 _ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another follows, and one that is reported
 _HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away,
 _DOUBTFUL = 1.5  # and no last digits of it so much
+_ASTRAY = 1.1  # times the error on conditions never fitted
 
 
 class Case:
@@ -49,10 +50,18 @@ class Case:
         return self._refitted[candidate]
 
     def converged(self, candidate: Candidate) -> Fit:
-        """The same to the end of plain least squares: what a verdict rests on."""
+        """The same to the end of plain least squares: what a verdict rests on. Where a few large residuals lead these
+        astray, so that conditions never fitted are predicted worse, it stays where it was."""
         if candidate not in self._converged:
-            self._converged[candidate] = converged(self.on_known(candidate))
+            fitted = self.on_known(candidate)
+            ended = converged(fitted)
+            astray = self._on_unseen(ended) > _ASTRAY * self._on_unseen(fitted)
+            self._converged[candidate] = fitted if astray else ended
         return self._converged[candidate]
+
+    def _on_unseen(self, fitted: Fit) -> float:
+        unseen = self.split.unseen
+        return rms(evaluate_on(fitted, unseen).scaled_residuals()) if unseen else 0.0
 
     def remainder(self, fitted: Fit) -> Remainder:
         """What a fit leaves, on its own trials and on the others that may inform a choice."""
