@@ -1,0 +1,52 @@
+"""What a verdict rests on: fits that were not led astray, and explanations that were begun in more than one place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy import hide
+
+from lacuna.diagnosis import case as case_module
+from lacuna.diagnosis.candidate import finished_afresh
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.split import split_trials
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.solve import cost_of
+
+
+@pytest.fixture
+def case():
+    """The toy; one of its conditions is never fitted."""
+    system = hide({}, seed=31)
+    first = system.trials[0]
+    return Case(system, split_trials(system.trials, [(first.experiment, first.condition)]), POLICY, 0)
+
+
+def moved(fitted: Fit, by: float) -> Fit:
+    """The fit with its first parameter so many scales away."""
+    values = fitted.solution.point.values + by * fitted.structure.scales() * np.eye(len(fitted.theta))[0]
+    point = replace(fitted.solution.point, values=values)
+    solution = replace(fitted.solution, point=point, cost=cost_of(fitted.problem, point))
+    return Fit(fitted.problem, solution, 1, 1)
+
+
+@pytest.mark.parametrize(("by", "believed"), [(0.0, True), (2.0, False)])
+def test_a_fit_that_plain_least_squares_lead_astray_is_not_what_a_verdict_rests_on(case, monkeypatch, by, believed):
+    assert case.split.unseen
+    candidate = case.judge(case.fit_base(1))
+    ended = moved(case.on_known(candidate), by)
+    monkeypatch.setattr(case_module, "converged", lambda fitted: ended)
+    assert (case.converged(candidate) is ended) is believed
+
+
+def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
+    right = case.judge(case.fit_base(1))
+    astray = case.judge(moved(right.fitted, 0.3))
+    assert astray.cost > right.cost + 10.0
+    assert finished_afresh(astray, case.split, 0).cost < right.cost + 1.0
+
+
+def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case):
+    right = case.judge(case.fit_base(1))
+    assert finished_afresh(right, case.split, 0).cost <= right.cost
