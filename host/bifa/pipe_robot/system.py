@@ -171,7 +171,8 @@ class RobotSystem(System):
         found: dict[int, Channels] = {}
         for members in benches.values():
             first = trials[members[0]]
-            tolerances_m = _EXACT_M if not coarse else _ALIKE_M if alike else _COARSE_M
+            shared = alike and self.at_once > 1
+            tolerances_m = _EXACT_M if not coarse else _ALIKE_M if shared else _COARSE_M
             tolerance_m = tolerances_m[first.experiment]
             simulated = _simulated(first.payload, [cases[k] for k in members], tolerance_m, alike)
             for k, channels in zip(members, simulated, strict=True):

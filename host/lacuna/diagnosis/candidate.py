@@ -55,9 +55,10 @@ class Candidate:
         return float(np.sqrt(2.0 * (self.fitted.cost + self.checked.cost) / self.pieces))
 
     @cached_property
-    def unseen_rms(self) -> float:
-        """RMS residual of the trials that it was not fitted to, large ones at their full size."""
-        return rms(self.checked.scaled_residuals())
+    def checked_error(self) -> tuple[int, float]:
+        """How many of the trials that it was not fitted to it cannot predict at all, and the RMS residual of the
+        others, large ones at their full size."""
+        return len(self.checked.failed), rms(self.checked.scaled_residuals())
 
     @cached_property
     def cost(self) -> float:
@@ -239,7 +240,8 @@ def finished_afresh(candidate: Candidate, split: Split, seed: int) -> Candidate:
     found = min((solve_graduated(problem, start, **_SKETCH) for start in starts), key=lambda s: s.cost)
     if found.cost > _NEAR * finished.cost:
         return candidate
-    best = best_of(problem, [finished.solution, renewed(problem, found, **_REFIT)])
+    found = renewed(problem, solve(problem, found.point, **_REFIT), **_REFIT)
+    best = best_of(problem, [finished.solution, found])
     return min(candidate, judge(best, split, near=candidate.checked), key=lambda c: c.cost)
 
 

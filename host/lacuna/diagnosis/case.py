@@ -25,6 +25,7 @@ class Case:
         self.system, self.split, self.policy, self.seed = system, split, policy, seed
         self._refitted: dict[Candidate, Fit] = {}
         self._converged: dict[Candidate, Fit] = {}
+        self._near: dict[Candidate, bool] = {}
         self._sufficient: dict[Candidate, bool] = {}
 
     def fit_base(self, starts: int) -> Fit:
@@ -55,13 +56,15 @@ class Case:
         if candidate not in self._converged:
             fitted = self.on_known(candidate)
             ended = converged(fitted)
-            astray = self._on_unseen(ended) > _ASTRAY * self._on_unseen(fitted)
-            self._converged[candidate] = fitted if astray else ended
+            self._converged[candidate] = fitted if self._astray(ended, fitted) else ended
         return self._converged[candidate]
 
-    def _on_unseen(self, fitted: Fit) -> float:
-        unseen = self.split.unseen
-        return rms(evaluate_on(fitted, unseen).scaled_residuals()) if unseen else 0.0
+    def _astray(self, ended: Fit, before: Fit) -> bool:
+        if not self.split.unseen:
+            return False
+        after, then = (evaluate_on(fitted, self.split.unseen) for fitted in (ended, before))
+        worse = rms(after.scaled_residuals()) > _ASTRAY * rms(then.scaled_residuals())
+        return len(after.failed) > len(then.failed) or worse
 
     def remainder(self, fitted: Fit) -> Remainder:
         """What a fit leaves, on its own trials and on the others that may inform a choice."""
@@ -81,7 +84,9 @@ class Case:
 
     def nearly(self, candidate: Candidate) -> bool:
         """Whether an explanation leaves so little that its fit, begun elsewhere, might leave nothing that matters."""
-        return self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
+        if candidate not in self._near:
+            self._near[candidate] = self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
+        return self._near[candidate]
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may

@@ -74,7 +74,7 @@ def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, polic
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
     share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
     least = extra * max(policy.gain, policy.gain_per_piece * smaller.pieces)
-    better = unseen > policy.unseen_gain * least and larger.unseen_rms < smaller.unseen_rms
+    better = unseen > policy.unseen_gain * least and larger.checked_error < smaller.checked_error
     return gain > least and better and share > min(extra * policy.share, 0.9)
 
 

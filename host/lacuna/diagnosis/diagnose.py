@@ -113,8 +113,8 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Judged:
-    """The verdict and what it rests on: both models fitted to all known trials to the end of plain least squares, and
-    what each leaves. `floor` and `drifts` are seen with the chosen effects, whatever the verdict."""
+    """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), and what each
+    leaves. `floor` and `drifts` are seen with the chosen effects, whatever the verdict."""
 
     verdict: str
     base: Fit
@@ -174,12 +174,12 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
     if case.nearly(first) and not case.suffices(first):
         crew.say("fitting the base model from elsewhere, too")
         first = finished_afresh(first, case.split, case.seed)
-        base = first.fitted
     if case.suffices(first):
-        return Search(first, base.problem.floor, (first,), tuple(screen(base, case.split, base.problem.floor))), False
+        floor = first.fitted.problem.floor
+        return Search(first, floor, (first,), tuple(screen(first.fitted, case.split, floor))), False
     finished = Finished(case.suffices)
     try:
-        return search(case, base, enough=finished, crew=crew), False
+        return search(case, first, enough=finished, crew=crew), False
     except KeyboardInterrupt:
         crew.say("stopped: weighing what was found until now (Ctrl-C again gives up)")
         return finished.search(first, case.split), True
@@ -203,7 +203,7 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew:
     offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
     if unexplained:
         offered += (*found.tried, *found.freed)
-    best = min(offered, key=lambda c: c.unseen_rms, default=None)
+    best = min(offered, key=lambda c: c.checked_error, default=None)
     if best is None:
         return judged.explained
     final = case.converged(best)

@@ -85,7 +85,7 @@ def _best_grown(
         return None
     best = min(best, judge(_refined(best.fitted), split), key=lambda c: c.checked.cost)
     # a fit may not buy small residuals with large ones, which its cost compresses
-    return best if best.unseen_rms < before.unseen_rms else None
+    return best if best.checked_error < before.checked_error else None
 
 
 def _excess(fit: Fit) -> float:

@@ -25,8 +25,11 @@ def stacked(jacobians: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndar
 def remaining_after(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
     """An orthonormal basis, (n, q), of what the fit's parameters and nuisances can move the residuals by, and the
     residuals, (n,), less that."""
-    basis = _orthonormal(np.hstack(stacked(fitted.solution.jacobians)))
-    residual = np.concatenate(fitted.problem.residuals(fitted.solution.point))
+    problem, point = fitted.problem, fitted.solution.point
+    every = range(len(fitted.structure.names))
+    jacobians = fitted.solution.jacobians or problem.jacobians(point, every, problem.first_steps())
+    basis = _orthonormal(np.hstack(stacked(jacobians)))
+    residual = np.concatenate(problem.residuals(point))
     return basis, residual - basis @ (basis.T @ residual)
 
 

@@ -107,17 +107,17 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
     return found
 
 
-def search(case: Case, base: Fit, *, enough, crew: Crew) -> Search:
-    """Grow sets from the base model until one is `enough(candidate)`, or a further effect takes too little away for it
-    to be named, or nothing promises to take its share away, or there are three effects.
+def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
+    """Grow sets from the base model, `first`, until one is `enough(candidate)`, or a further effect takes too little
+    away for it to be named, or nothing promises to take its share away, or there are three effects.
 
     At each size, every effect is tried on every parent in the beam by its amplitude profile, the most
     promising are refitted with equal effort, and the best sets make the next beam. The best one is tried in a form of
     its own, too, before another effect joins it.
     """
-    split, policy, floor = case.split, case.policy, base.problem.floor
+    split, policy, base = case.split, case.policy, first.fitted
+    floor = base.problem.floor
     screened = screen(base, split, floor)
-    first = judge(base, split)
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     beam = [first]
     freed: list[Candidate] = []
@@ -129,8 +129,12 @@ def search(case: Case, base: Fit, *, enough, crew: Crew) -> Search:
         if lower.share_of(floor) < _LOWER:
             floor = lower
             crew.say("weighing again against a lower floor")
-            reach = policy.reach * _ranked(tried, size)[0].cost
-            tried = {s: reweighed(c, split, floor, thoroughly=not s or c.cost < reach) for s, c in tried.items()}
+            ranked = _ranked(tried, size)
+            reach, grown = policy.reach * ranked[0].cost, ranked[: _BEAM[size]]
+            tried = {
+                s: reweighed(c, split, floor, thoroughly=not s or c in grown or c.cost < reach)
+                for s, c in tried.items()
+            }
             freed = [reweighed(c, split, floor) for c in freed]
         before = min(tried[frozenset(c.effects)].excess for c in beam)
         beam = _ranked(tried, size)[: _BEAM[size]]

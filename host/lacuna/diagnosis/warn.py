@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.uncertainty import uncertainty
@@ -19,11 +17,7 @@ def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
 
 
 def _failed(fits: list[Fit]) -> list[str]:
-    names = []
-    for fit in fits:
-        for trial, prediction in zip(fit.problem.trials, fit.predictions(), strict=True):
-            if any(not np.isfinite(p[np.isfinite(trial.channels[c])]).all() for c, p in prediction.items()):
-                names.append(trial.name)
+    names = [name for fit in fits for name in fit.failed]
     if not names:
         return []
     return [f"The model could not predict {_listed(names)}: these trials count as badly predicted."]

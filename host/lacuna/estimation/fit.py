@@ -46,7 +46,7 @@ class Fit:
         return self.solution.cost
 
     @cached_property
-    def elsewhere(self) -> dict[str, np.ndarray]:
+    def known_nuisances(self) -> dict[str, np.ndarray]:
         """Nuisances of the trials that it was evaluated on besides its own, by the trial's name."""
         return {}
 
@@ -71,6 +71,15 @@ class Fit:
 
     def predictions(self) -> list[Channels]:
         return self.problem.predict_all(self.solution.point)
+
+    @cached_property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the trials that it cannot predict: no simulation, or one that was given up."""
+        return tuple(
+            trial.name
+            for trial, prediction in zip(self.problem.trials, self.predictions(), strict=True)
+            if any(not np.isfinite(p[np.isfinite(trial.channels[c])]).all() for c, p in prediction.items())
+        )
 
     def residuals(self) -> dict[str, Channels]:
         """Measured minus predicted by trial name and channel, in the channels' units."""
@@ -167,11 +176,14 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     any steps it has no derivatives either."""
     point = fitted.solution.point
     problem = Problem(fitted.structure, fitted.problem.trials, floor, fitted.problem.view)
+    sensitivities = fitted.solution.sensitivities
     if not max_iterations:
-        bare = replace(fitted.solution, cost=cost_of(problem, point), sensitivities=())
+        bare = replace(fitted.solution, cost=cost_of(problem, point), normal=np.zeros((0, 0)), sensitivities=())
         return Fit(problem, bare, fitted.starts, fitted.starts_agreeing)
-    pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
-    known = [s.reweighed(new / old) for s, (new, old) in zip(fitted.solution.sensitivities, pairs, strict=True)]
+    known = None  # they are taken anew
+    if sensitivities:
+        pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
+        known = [s.reweighed(new / old) for s, (new, old) in zip(sensitivities, pairs, strict=True)]
     solution = solve(problem, point, max_iterations=max_iterations, sensitivities=known)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
@@ -179,7 +191,7 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
 def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
     """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from
     where `near` has them if it knows them."""
-    known, values = fitted.elsewhere, fitted.solution.point.values
+    known, values = fitted.known_nuisances, fitted.solution.point.values
     asked = fitted.problem.over([t for t in trials if t.name not in known])
     if any(asked.nuisances):
         begun = _by_name(near) if near else {}

@@ -100,6 +100,10 @@ class Problem:
         self._recent: dict[tuple, list[np.ndarray]] = {}  # residuals: a search begins where the one before ended
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
+    def __getstate__(self) -> dict:
+        """What travels to another process: all but what is remembered."""
+        return vars(self) | {"_recent": {}}
+
     def start(self, values: np.ndarray | None = None, known: Sequence[np.ndarray] | None = None) -> Point:
         """The structure's vector `values` (default its start), nuisances at their means or, the first ones of each
         trial, as `known`. An effect's own parameters of a trial begin at the best of a few values."""
@@ -107,12 +111,15 @@ class Problem:
         nuisances = [np.array([p.value for p in ps]) for ps in self.nuisances]
         for mine, given in zip(nuisances, known or (), strict=False):
             mine[: len(given)] = given[: len(mine)]
-        own = [(i, len(ps) - k - 1) for i, ps in enumerate(self.nuisances) for k in range(len(self._own[i]))]
-        in_parallel(lambda job: self._scan(start, nuisances, *job), own)
+        in_parallel(lambda i: self._scan(start, nuisances, i), [i for i, own in enumerate(self._own) if own])
         return Point(start, tuple(nuisances))
 
-    def _scan(self, values: np.ndarray, nuisances: list[np.ndarray], index: int, k: int) -> None:
-        """Set nuisance `k` of trial `index` to the best of `_OWN_STARTS` values over its range."""
+    def _scan(self, values: np.ndarray, nuisances: list[np.ndarray], index: int) -> None:
+        """Set the effects' own parameters of a trial, the last first, to the best of `_OWN_STARTS` values each."""
+        for k in range(len(self._own[index])):
+            self._scan_one(values, nuisances, index, len(self.nuisances[index]) - k - 1)
+
+    def _scan_one(self, values: np.ndarray, nuisances: list[np.ndarray], index: int, k: int) -> None:
         parameter = self.nuisances[index][k]
         tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
         tried[:, k] = np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False)
@@ -213,12 +220,16 @@ class Problem:
         """By what the residuals of a trial change, shape (n, len(moved)), from `here` to each of `moved` nearby:
         values and the trial's nuisances."""
         found = self._deviations(self._simulate([here, *moved], index, coarse=coarse, alike=True), index)
+        failed = np.flatnonzero((found[1:] == _FAILED).any(axis=1))
+        seen = self._compressed(found[[0, *(failed + 1)]], index) if len(failed) else None
         first, changes = found[:1], np.subtract(found[1:], found[0], out=found[1:])
         first, weight = self._looked_at(first, index)
         if self.view.blur:
             changes, _ = self._looked_at(changes, index)
         # over as small a step as a derivative takes, the compression is a straight line
         changes *= weight / self.view.raised / np.hypot(1.0, first[0] / self.view.raised / self.view.soft_limit)
+        if seen is not None:
+            changes[failed] = seen[1:] - seen[0]
         return changes.T
 
     def scaled(self, predictions: Sequence[Channels]) -> list[Channels]:
@@ -267,7 +278,10 @@ class Problem:
 
     def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of each prediction of a trial, a row each."""
-        z, weight = self._looked_at(self._deviations(predictions, index), index)
+        return self._compressed(self._deviations(predictions, index), index)
+
+    def _compressed(self, deviations: np.ndarray, index: int) -> np.ndarray:
+        z, weight = self._looked_at(deviations, index)
         limit = self.view.soft_limit * self.view.raised
         return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from toy import hide
 
+from lacuna.diagnosis import candidate as candidate_module
 from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis.candidate import finished_afresh
 from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
-from lacuna.estimation.fit import Fit
+from lacuna.estimation.fit import Fit, reweigh
 from lacuna.estimation.solve import cost_of
 
 
@@ -47,6 +49,22 @@ def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
     assert finished_afresh(astray, case.split, 0).cost < right.cost + 1.0
 
 
-def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case):
+def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, monkeypatch):
     right = case.judge(case.fit_base(1))
-    assert finished_afresh(right, case.split, 0).cost <= right.cost
+    worse = moved(right.fitted, 0.1).solution
+    monkeypatch.setattr(candidate_module, "solve_graduated", lambda *_, **__: worse)
+    monkeypatch.setattr(candidate_module, "solve", lambda *_, **__: worse)
+    monkeypatch.setattr(candidate_module, "renewed", lambda *_, **__: worse)
+    assert finished_afresh(right, case.split, 0) is right
+
+
+def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):
+    right = case.judge(case.fit_base(1))
+    floor = right.fitted.problem.floor
+    bare = reweigh(right.fitted, floor, max_iterations=0)
+    assert bare.cost == pytest.approx(right.fitted.cost)
+    again = reweigh(bare, floor, max_iterations=3)
+    assert again.cost <= right.fitted.cost + 1e-9
+    assert len(again.solution.sensitivities) == len(case.split.fit)
+    basis, remaining = remaining_after(bare)
+    assert np.abs(basis.T @ remaining).max() < 1e-6 * np.linalg.norm(remaining)

@@ -77,7 +77,7 @@ def test_the_nuisances_of_other_trials_are_estimated_once_and_as_if_they_were_al
     others = system.trials[4:8]
     both = evaluate_on(fitted, others)
     assert any(len(q) for q in both.solution.point.nuisances)
-    assert set(fitted.elsewhere) == {t.name for t in others}
+    assert set(fitted.known_nuisances) == {t.name for t in others}
     again = evaluate_on(fitted, others[:1])
     np.testing.assert_array_equal(again.solution.point.nuisances[0], both.solution.point.nuisances[0])
     alone = evaluate_on(replace(fitted, starts=2), others[:1], near=both)

@@ -131,8 +131,8 @@ class Tried:
         return SimpleNamespace(problem=SimpleNamespace(trials=trials), cost=sum(self.checked_costs))
 
     @property
-    def unseen_rms(self):
-        return np.sqrt(np.mean(self.checked_costs) + self.beyond)
+    def checked_error(self):
+        return 0, np.sqrt(np.mean(self.checked_costs) + self.beyond)
 
     @property
     def cost(self):
