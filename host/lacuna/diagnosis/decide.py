@@ -115,7 +115,10 @@ def _weights(search: Search, chosen: Candidate, dispersion: float) -> dict[tuple
     differs from condition to condition. So the conditions are drawn anew (the Bayesian bootstrap, Rubin 1981), and an
     explanation's probability is the mean, over the draws, of its share of the likelihood in units of the dispersion.
     """
-    compared = list(dict.fromkeys([chosen, search.base, *sorted(search.tried, key=lambda c: c.cost)[:_COMPARED]]))
+    # what was tried of the chosen effects may have ended in another minimum than they have been found in since
+    others = [c for c in search.tried if frozenset(c.effects) != frozenset(chosen.effects)]
+    best = [c for c in sorted(others, key=lambda c: c.cost) if c.effects][:_COMPARED]
+    compared = [chosen, *([search.base] if chosen.effects else []), *best]
     trials = [*chosen.fitted.problem.trials, *chosen.checked.problem.trials]
     keys = list(dict.fromkeys((t.experiment, t.condition) for t in trials))
     costs = np.zeros((len(compared), len(keys)))

@@ -11,7 +11,7 @@ from toy import hide
 from lacuna.diagnosis import search
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.decide import choose, worth_adding
+from lacuna.diagnosis.decide import choose, weigh, worth_adding
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.drift import find_drift
 from lacuna.diagnosis.policy import POLICY, Policy
@@ -229,6 +229,13 @@ def test_confusable_an_exchange_is_named_where_it_is_probable():
 
     assert rival_at(1.0) == ("b",)
     assert rival_at(10.0) == ()
+
+
+def test_a_chosen_set_in_a_better_minimum_stands_for_what_was_tried_of_it():
+    base, lost, both = tried((), 1000.0), tried(("a",), 900.0), tried(("b", "a"), 30.0)
+    found = weigh(Search(base, NoiseFloor({}), (base, lost, both), ()), tried(("a",), 0.0), POLICY)
+    assert found.probability["a"] > 0.99
+    assert found.weights["a",] > 0.99
 
 
 def test_probability_is_not_sure_of_what_differs_from_condition_to_condition():
