@@ -220,14 +220,11 @@ class System(Protocol):
         corrections: Sequence[Sequence[Correction]] = (),
         alike: bool = False,
     ) -> list[Channels]:
-        """`predict` for each of `thetas`, with its own `corrections` if any. Override it if simulating
-        many at once is cheaper. `alike`: all are near the first and are to be compared with it, as for derivatives; so
-        let errors of the integrator be alike, too, if possible."""
-        corrections = corrections or [()] * len(thetas)
-        return [
-            self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)
-            for theta, learnt in zip(thetas, corrections, strict=True)
-        ]
+        """`predict` for each of `thetas`, with its own `corrections` if any. Override it, or `predict_trials`, if
+        simulating many at once is cheaper. `alike`: all are near the first and are to be compared with it, as for
+        derivatives; so let errors of the integrator be alike, too, if possible."""
+        how = {"coarse": coarse, "corrections": corrections, "alike": alike}
+        return self.predict_trials(thetas, effects, [trial] * len(thetas), **how)
 
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
 
@@ -239,9 +236,10 @@ class System(Protocol):
         *,
         coarse: bool = False,
         corrections: Sequence[Sequence[Correction]] = (),
+        alike: bool = False,
     ) -> list[Channels]:
         """`predict` for one of `thetas` in each of `trials`. Override it, and set `at_once`, if simulating several
-        trials of one experiment side by side is cheaper."""
+        trials of one experiment side by side is cheaper. `alike`: as in `predict_many`."""
         corrections = corrections or [()] * len(thetas)
         return [
             self.predict(theta, effects, trial, coarse=coarse, corrections=learnt)

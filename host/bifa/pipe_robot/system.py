@@ -123,19 +123,7 @@ class RobotSystem(System):
         coarse: bool = False,
         corrections: Sequence[Correction] = (),
     ) -> Channels:
-        return self.predict_many([theta], effects, trial, coarse=coarse, corrections=[corrections])[0]
-
-    def predict_many(
-        self,
-        thetas: Sequence[Theta],
-        effects: tuple[str, ...],
-        trial: Record,
-        *,
-        coarse: bool = False,
-        corrections: Sequence[Sequence[Correction]] = (),
-        alike: bool = False,
-    ) -> list[Channels]:
-        return self._predicted(thetas, effects, [trial] * len(thetas), coarse, corrections, alike)
+        return self.predict_trials([theta], effects, [trial], coarse=coarse, corrections=[corrections])[0]
 
     @property
     def at_once(self) -> int:
@@ -149,17 +137,7 @@ class RobotSystem(System):
         *,
         coarse: bool = False,
         corrections: Sequence[Sequence[Correction]] = (),
-    ) -> list[Channels]:
-        return self._predicted(thetas, effects, trials, coarse, corrections, False)
-
-    def _predicted(
-        self,
-        thetas: Sequence[Theta],
-        effects: tuple[str, ...],
-        trials: Sequence[Record],
-        coarse: bool,
-        corrections: Sequence[Sequence[Correction]],
-        alike: bool,
+        alike: bool = False,
     ) -> list[Channels]:
         """Each of `thetas` in its trial, those on one bench side by side."""
         each = list(zip(thetas, corrections or [()] * len(thetas), trials, strict=True))

@@ -87,8 +87,8 @@ def walks(
     states: bool = True,
 ) -> list[SimulatedTrial]:
     """`walk` for each robot, each by its own commands; times are taken as they are, as in all functions for many here:
-    contiguous floats that rise from 0 on. `together`: they differ little and are to be compared with the
-    first (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
+    contiguous floats that rise from 0 on. `together`: they differ little and are to be compared with the first
+    (`bifa.simulate.lanes.march`). Without `states` a record has but times, displacements and pressures."""
     flats = [plant(model) for model in models]
     mounted = [rigs.pipe(flat, degrees, terrain) for flat, degrees in zip(flats, inclinations_deg, strict=True)]
     kind, walked = (lanes.WALK, _walked) if states else (lanes.SEEN, _seen)

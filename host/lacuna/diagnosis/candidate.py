@@ -10,7 +10,7 @@ import numpy as np
 
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import POLICY, Policy
-from lacuna.diagnosis.residual_error import rms
+from lacuna.diagnosis.residual_error import at_full_size
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, spread_starts, starting_point
@@ -58,7 +58,7 @@ class Candidate:
     def checked_error(self) -> tuple[int, float]:
         """How many of the trials that it was not fitted to it cannot predict at all, and the RMS residual of the
         others, large ones at their full size."""
-        return len(self.checked.failed), rms(self.checked.scaled_residuals())
+        return at_full_size(self.checked)
 
     @cached_property
     def cost(self) -> float:
@@ -160,11 +160,10 @@ def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -
         return solve(problem, start, free=rest, max_iterations=steps, sensitivities=known)
 
     starts = [problem.start(values, parent.point.nuisances) for values in sizes]
-    costs = [cost_of(problem, start) for start in starts]
-    starts = [
-        start for start, cost in zip(starts, costs, strict=True) if cost <= max(_ABSURD * parent.cost, min(costs))
-    ]
-    found = sorted((released(start, 1) for start in starts), key=lambda s: s.cost)
+    # one at a time: the residuals of the last few points are remembered
+    found = [released(start, 1) for start in starts if cost_of(problem, start) <= _ABSURD * parent.cost]
+    found = found or [released(min(starts, key=lambda start: cost_of(problem, start)), 1)]
+    found.sort(key=lambda s: s.cost)
     best = [released(s.point, _PROFILE_STEPS - 1) for s in found[:_PROFILED_FURTHER]]
     found = sorted([*best, *found[_PROFILED_FURTHER:]], key=lambda s: s.cost)
     return found[0].cost, tuple(s.point for s in found)

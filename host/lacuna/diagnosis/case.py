@@ -5,7 +5,7 @@ from __future__ import annotations
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
-from lacuna.diagnosis.residual_error import repeat_differences, rms, share_of_gap
+from lacuna.diagnosis.residual_error import at_full_size, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, spread_starts
 from lacuna.estimation.noise import estimate_noise
@@ -62,9 +62,10 @@ class Case:
     def _astray(self, ended: Fit, before: Fit) -> bool:
         if not self.split.unseen:
             return False
-        after, then = (evaluate_on(fitted, self.split.unseen) for fitted in (ended, before))
-        worse = rms(after.scaled_residuals()) > _ASTRAY * rms(then.scaled_residuals())
-        return len(after.failed) > len(then.failed) or worse
+        (lost, error), (lost_before, error_before) = (
+            at_full_size(evaluate_on(fitted, self.split.unseen)) for fitted in (ended, before)
+        )
+        return lost > lost_before or error > _ASTRAY * error_before
 
     def remainder(self, fitted: Fit) -> Remainder:
         """What a fit leaves, on its own trials and on the others that may inform a choice."""

@@ -86,6 +86,21 @@ def rms(members) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
+def failed(trials: Sequence[Record], scaled: Sequence[Channels]) -> list[str]:
+    """Names of the trials that a fit cannot predict: no simulation, or one that was given up."""
+    return [
+        trial.name
+        for trial, channels in zip(trials, scaled, strict=True)
+        if any(not np.isfinite(z[np.isfinite(trial.channels[c])]).all() for c, z in channels.items())
+    ]
+
+
+def at_full_size(fitted: Fit) -> tuple[int, float]:
+    """How many of its trials a fit cannot predict, and the RMS residual of the others, none compressed."""
+    scaled = fitted.scaled_residuals()
+    return len(failed(fitted.problem.trials, scaled)), rms(scaled)
+
+
 def _on(fitted: Fit, trials: Sequence[Record]) -> dict[str, Channels]:
     if not trials:
         return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.uncertainty import uncertainty
@@ -17,7 +18,7 @@ def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
 
 
 def _failed(fits: list[Fit]) -> list[str]:
-    names = [name for fit in fits for name in fit.failed]
+    names = [name for fit in fits for name in failed(fit.problem.trials, fit.scaled_residuals())]
     if not names:
         return []
     return [f"The model could not predict {_listed(names)}: these trials count as badly predicted."]

@@ -72,15 +72,6 @@ class Fit:
     def predictions(self) -> list[Channels]:
         return self.problem.predict_all(self.solution.point)
 
-    @cached_property
-    def failed(self) -> tuple[str, ...]:
-        """Names of the trials that it cannot predict: no simulation, or one that was given up."""
-        return tuple(
-            trial.name
-            for trial, prediction in zip(self.problem.trials, self.predictions(), strict=True)
-            if any(not np.isfinite(p[np.isfinite(trial.channels[c])]).all() for c, p in prediction.items())
-        )
-
     def residuals(self) -> dict[str, Channels]:
         """Measured minus predicted by trial name and channel, in the channels' units."""
         return {
@@ -197,7 +188,8 @@ def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = Non
         begun = _by_name(near) if near else {}
         start = asked.start(values, [begun.get(t.name, _NONE) for t in asked.trials])
         known |= _by_name(Fit(asked, solve(asked, start, free=(), max_iterations=_NUISANCE_ITERATIONS), 1, 1))
-    problem = fitted.problem.over(trials)
+    # where all were asked, their residuals are still remembered
+    problem = asked if len(asked.trials) == len(trials) else fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))
     solution = Solution(point, cost_of(problem, point), True, 0, (), np.zeros((0, 0)), ())
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)

@@ -150,8 +150,8 @@ class Problem:
         if key not in self._recent:
             coarse = self.view.raised > 1.0
             found = self._of_each(point, lambda prediction, i: self._weigh([prediction], i)[0], coarse=coarse)
-            for old in list(self._recent)[: 1 - _REMEMBERED]:
-                del self._recent[old]
+            while len(self._recent) >= _REMEMBERED:
+                del self._recent[next(iter(self._recent))]
             self._recent[key] = found
         return self._recent[key]
 
