@@ -1,28 +1,76 @@
-"""Who does the work: this process, one piece after the other (each keeps all cores busy), or an executor's workers."""
+"""Who does the work: children of this process, a core each; an executor's workers; or this process itself."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import active_children, current_process, get_context
 from typing import Any
 
+from lacuna.estimation.problem import cores, use_threads
+
 Progress = Callable[[str], None]
+Jobs = Sequence[tuple[Any, ...]]
 
 
 class Crew:
     """Runs pure functions and says what is being done. Any `concurrent.futures.Executor` will do that can ship a
-    `Problem`, and so its system: threads, processes, dask."""
+    `Problem`, and so its system: threads, processes, dask. Without one, jobs go to children where there is more than
+    one job, more than one core, and Linux, on which forking is safe."""
 
     def __init__(self, progress: Progress, executor: Executor | None = None):
         self.say, self._executor = progress, executor
 
-    def map(
-        self, doing: str, names: Sequence[Sequence[str]], function: Callable, jobs: Sequence[tuple[Any, ...]]
-    ) -> list:
+    def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable, jobs: Jobs) -> list:
         """`function(*job)` for each of `jobs`, in their order; `names` are the effects that each is about."""
-        futures = [self._executor.submit(function, *job) for job in jobs] if self._executor else None
         found = []
-        for place, (effects, job) in enumerate(zip(names, jobs, strict=True)):
-            self.say(f"{doing} {' + '.join(effects)}")
-            found.append(futures[place].result() if futures else function(*job))
+        with self._working(function, jobs) as results:
+            for effects in names:
+                self.say(f"{doing} {' + '.join(effects)}")
+                found.append(next(results))
         return found
+
+    @contextmanager
+    def _working(self, function: Callable, jobs: Jobs) -> Iterator[Iterator]:
+        if self._executor:
+            futures = [self._executor.submit(function, *job) for job in jobs]
+            yield (future.result() for future in futures)
+        elif min(cores(), len(jobs)) > 1 and sys.platform == "linux" and not current_process().daemon:
+            with _children(function, jobs) as results:
+                yield results
+        else:
+            yield (function(*job) for job in jobs)
+
+
+@contextmanager
+def _children(function: Callable, jobs: Jobs) -> Iterator[Iterator]:
+    """Results in the jobs' order. A fork has everything that this process has, so that nothing but results is shipped
+    and a system may hold what cannot be. What is interrupted ends at once."""
+    before = set(active_children())
+    pool = ProcessPoolExecutor(min(cores(), len(jobs)), get_context("fork"), _begin, (function, jobs))
+    try:
+        yield pool.map(_do, range(len(jobs)))
+    except BaseException:
+        for child in set(active_children()) - before:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+_work: tuple[Callable, Jobs]
+
+
+def _begin(function: Callable, jobs: Jobs) -> None:
+    global _work
+    _work = function, jobs
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    use_threads(1)
+
+
+def _do(index: int) -> Any:
+    function, jobs = _work
+    return function(*jobs[index])

@@ -24,12 +24,19 @@ _REMEMBERED = 4  # points whose residuals are kept
 _FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
 
 
+_threads: int | None = None
+
+
+def cores() -> int:
+    """On how many this process simulates."""
+    return _threads or max(1, len(os.sched_getaffinity(0)))
+
+
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(_threads or max(1, len(os.sched_getaffinity(0))))
+    return ThreadPoolExecutor(cores())
 
 
-_threads: int | None = None
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)  # a child has the pool but none of its threads: it would wait
 
@@ -43,7 +50,7 @@ def use_threads(count: int | None) -> None:
 
 def in_parallel(function: Callable, items: Iterable) -> list:
     """`[function(x) for x in items]` on all cores, by threads: simulations release the GIL."""
-    return list(_pool().map(function, items))
+    return list(_pool().map(function, items) if cores() > 1 else map(function, items))
 
 
 @dataclass(frozen=True)
