@@ -30,7 +30,10 @@ class Parameter:
     a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
     deviation of its spread. `prior_sd`: standard deviation of its prior, around `value`; None: no prior.
     `at_least` names another parameter that it cannot be below. `elsewhere`: further initial values for graduated
-    fits, for a parameter whose isolating trials fit equally well at several values.
+    fits, for a parameter whose isolating trials fit equally well at several values. `factor_of`: of a nuisance, the
+    parameters that it multiplies in its trial; its derivatives are theirs then, to the last digit, and data do not
+    seem to tell a change of all trials' factors from one of the parameters. `periodic`: of an effect's own parameter,
+    `lower` and `upper` mean the same and are no bounds (a phase).
     """
 
     name: str
@@ -44,6 +47,8 @@ class Parameter:
     prior_sd: float | None = None
     at_least: str | None = None
     elsewhere: tuple[float, ...] = ()
+    factor_of: tuple[str, ...] = ()
+    periodic: bool = False
 
     def __post_init__(self) -> None:
         if not self.lower < self.upper:

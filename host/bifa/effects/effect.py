@@ -20,7 +20,7 @@ class EffectParameter:
 
     A `size` parameter is 0 when the effect is absent; the others only shape it. Of an `own` one every trial has its
     own value; a `frequency` is looked for in the residual's spectrum. `omitted`: its value where it is left out, if not
-    the typical one: what an older file means that does not know it.
+    the typical one: what an older file means that does not know it. `period`: of a value that repeats itself.
     """
 
     name: str
@@ -33,6 +33,7 @@ class EffectParameter:
     own: bool = False
     frequency: bool = False
     omitted: float | None = None
+    period: float | None = None
 
 
 @dataclass(frozen=True)

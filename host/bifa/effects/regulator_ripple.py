@@ -15,7 +15,9 @@ EFFECT = PhysicalEffect(
     parameters=(
         EffectParameter("amplitude_psi", "psi", 0.0, 3.0, 0.3, "amplitude", size=True),
         EffectParameter("frequency_Hz", "Hz", 0.02, 5.0, 0.5, "frequency", frequency=True),
-        EffectParameter("phase_rad", "rad", -6.3, 6.3, 0.0, "phase at the trial's time 0", own=True),
+        EffectParameter(
+            "phase_rad", "rad", -6.3, 6.3, 0.0, "phase at the trial's time 0", own=True, period=2.0 * math.pi
+        ),
     ),
 )
 

@@ -29,14 +29,18 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
 
 
 def _engine_parameter(parameter: effects.EffectParameter) -> Parameter:
+    lower, upper = parameter.lower, parameter.upper
+    if parameter.period is not None:
+        lower, upper = parameter.typical - 0.5 * parameter.period, parameter.typical + 0.5 * parameter.period
     return Parameter(
         name=parameter.name,
         unit=parameter.unit,
         value=parameter.typical,
-        lower=parameter.lower,
-        upper=parameter.upper,
+        lower=lower,
+        upper=upper,
         scale=_scale(parameter),
         source=parameter.meaning,
+        periodic=parameter.period is not None,
     )
 
 

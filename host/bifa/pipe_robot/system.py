@@ -180,7 +180,10 @@ class RobotSystem(System):
         found = []
         if trial.experiment in (ANCHOR, WALK):
             source = "friction differs from run to run"
-            found.append(Parameter("friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source=source))
+            both = ("mu_s", "mu_k")
+            found.append(
+                Parameter("friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source=source, factor_of=both)
+            )
         if trial.experiment in (STEP, WALK) and (sd := trial.payload.switch_sd_s) > 0.0:
             source = "the valves switched between two samples"
             found.append(Parameter("switch_late_s", "s", 0.0, -3.0 * sd, 3.0 * sd, scale=sd, source=source))

@@ -205,21 +205,31 @@ class Problem:
         def blocks(i: int) -> tuple[np.ndarray, np.ndarray]:
             values, nuisances = point.values, point.nuisances[i]
             moving = [k for k, j in enumerate(free) if self.structure.moves(j, self.trials[i])]
+            factors = self._factors(i, [free[k] for k in moving])
+            stepping = [k for k in range(len(nuisances)) if k not in factors]
             by_structure = [
                 _stepped(values, free[k], self.structure.parameters[free[k]], steps.structure[free[k]]) for k in moving
             ]
-            by_nuisance = [
-                _stepped(nuisances, k, parameter, steps.nuisances[i][k])
-                for k, parameter in enumerate(self.nuisances[i])
-            ]
+            by_nuisance = [_stepped(nuisances, k, self.nuisances[i][k], steps.nuisances[i][k]) for k in stepping]
             moved = [*((v, nuisances) for v, _ in by_structure), *((values, n) for n, _ in by_nuisance)]
             changes = self.changes(i, (values, nuisances), moved, coarse=True)
             changes /= np.array([step for _, step in (*by_structure, *by_nuisance)])
-            structure = np.zeros((len(free), len(changes)))
-            structure[moving] = changes[:, : len(moving)].T
-            return structure.T, changes[:, len(moving) :]
+            structure, own = np.zeros((len(free), len(changes))), np.zeros((len(nuisances), len(changes)))
+            structure[moving], own[stepping] = changes[:, : len(moving)].T, changes[:, len(moving) :].T
+            for k, of in factors.items():
+                own[k] = sum(values[j] * structure[free.index(j)] for j in of) / nuisances[k]
+            return structure.T, own.T
 
         return in_parallel(blocks, range(len(self.trials)))
+
+    def _factors(self, index: int, moving: Sequence[int]) -> dict[int, list[int]]:
+        """The nuisances of a trial that are factors of parameters all of which are in `moving`, and of which ones."""
+        named = {self.structure.names[j]: j for j in moving}
+        return {
+            k: [named[name] for name in parameter.factor_of]
+            for k, parameter in enumerate(self.nuisances[index])
+            if parameter.factor_of and all(name in named for name in parameter.factor_of)
+        }
 
     def changes(
         self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple], *, coarse: bool = False

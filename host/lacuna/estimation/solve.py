@@ -11,11 +11,12 @@ from threadpoolctl import ThreadpoolController
 
 from lacuna.estimation.problem import Point, Problem, Steps, in_parallel
 from lacuna.estimation.sensitivity import Sensitivity
+from lacuna.system import Parameter
 
 one_thread = ThreadpoolController().wrap(limits=1, user_api="blas")  # of linear algebra: trials share the cores
 ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
 RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
-_NUISANCE_SDS = 4.0  # a nuisance may not stray further, or it would stand in for what the model lacks
+_NUISANCE_SDS = 10.0  # nearer than this its prior holds it: a bound there would hold the parameters, too
 _REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 _TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
@@ -184,11 +185,20 @@ def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.n
     lower, upper = problem.structure.bounds(point.values)
     scale = problem.structure.scales()
     nuisances = [p for ps in problem.nuisances for p in ps]
+    least, most = np.array([_may_be(p) for p in nuisances]).reshape(-1, 2).T
     return (
-        np.concatenate([lower[list(free)], [max(p.lower, p.value - _NUISANCE_SDS * p.step_scale) for p in nuisances]]),
-        np.concatenate([upper[list(free)], [min(p.upper, p.value + _NUISANCE_SDS * p.step_scale) for p in nuisances]]),
+        np.concatenate([lower[list(free)], least]),
+        np.concatenate([upper[list(free)], most]),
         np.concatenate([scale[list(free)], [p.step_scale for p in nuisances]]),
     )
+
+
+def _may_be(nuisance: Parameter) -> tuple[float, float]:
+    """The range of a nuisance."""
+    if nuisance.periodic:
+        return -np.inf, np.inf
+    strays = _NUISANCE_SDS * nuisance.step_scale
+    return max(nuisance.lower, nuisance.value - strays), min(nuisance.upper, nuisance.value + strays)
 
 
 def _pack(point: Point, free: tuple[int, ...]) -> np.ndarray:

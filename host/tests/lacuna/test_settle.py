@@ -11,7 +11,7 @@ from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
 from lacuna.estimation.structure import Structure
-from lacuna.system import Parameter, Record, System
+from lacuna.system import Effect, Parameter, Record, System
 
 SD = 0.1
 TRUTH = {"slope": 1.0, "bent": 2.0}
@@ -148,3 +148,54 @@ def moved(found, **theta: float):
     point = found.solution.point
     there = replace(point, values=found.structure.values(found.theta | theta))
     return replace(found, solution=replace(found.solution, point=there))
+
+
+class Told(Lines):
+    """The same, where the factor is said to be one of both slopes."""
+
+    def nuisances(self, trial):
+        return tuple(replace(p, factor_of=tuple(TRUTH)) for p in super().nuisances(trial))
+
+
+def test_derivatives_by_a_factor_are_those_of_what_it_multiplies():
+    system = Told(3)
+    problem = Problem(Structure(system), system.trials, NoiseFloor({("line", "y_m"): ChannelNoise(SD, 0.0, 1.0, 3)}))
+    point = problem.start(np.array([1.1, 1.9]))
+    for slopes, factor in problem.jacobians(point, (0, 1), problem.first_steps()):
+        assert np.array_equal(factor[:, 0], slopes @ point.values / point.nuisances[0])
+    for slopes, factor in problem.jacobians(point, (0,), problem.first_steps()):
+        assert not np.allclose(factor[:, 0], slopes[:, 0] * point.values[0]), "the other slope is held"
+        assert factor.any()
+
+
+class Hum(System):
+    """y = level + size sin(2 pi t + phase), the phase another one in every run."""
+
+    name = "hum"
+    parameters = (Parameter("level", "m", 0.0, -1.0, 1.0, scale=0.1),)
+
+    def __init__(self, periodic: bool):
+        phase = Parameter("phase_rad", "rad", 0.0, -np.pi, np.pi, scale=np.pi, periodic=periodic)
+        self.effects = {"hum": Effect("hum", Parameter("size_m", "m", 1.0, 0.0, 5.0, scale=0.3), own=phase)}
+        random = np.random.default_rng(0)
+        self.trials = tuple(
+            Record(f"{run}", "hum", "all alike", T, {"y_m": hum(1.0, phase_rad) + SD * random.standard_normal(T.shape)})
+            for run, phase_rad in enumerate((3.0, -3.0, 0.2))
+        )
+
+    def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
+        return {"y_m": theta["level"] + hum(theta["hum.size_m"], theta["hum.phase_rad"])}
+
+
+def hum(size_m, phase_rad):
+    return size_m * np.sin(2.0 * np.pi * T + phase_rad)
+
+
+def test_a_phase_may_leave_its_range():
+    floor = NoiseFloor({("hum", "y_m"): ChannelNoise(SD, 0.0, 1.0, 3)})
+    costs = [
+        fit(Structure(system, ("hum",)), system.trials, floor).cost
+        for system in (Hum(periodic=True), Hum(periodic=False))
+    ]
+    assert costs[0] == pytest.approx(0.5 * 3 * len(T), rel=0.1)
+    assert costs[1] > 1.3 * costs[0]
