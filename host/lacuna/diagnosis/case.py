@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, spread_starts
+from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, renewed, spread_starts
+from lacuna.estimation.intervals import intervals
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.structure import Structure
 from lacuna.system import System
@@ -18,15 +23,25 @@ _DOUBTFUL = 1.5  # and no last digits of it so much
 _ASTRAY = 1.1  # times the error on conditions never fitted
 
 
+def _once(ask: Callable) -> Callable:
+    """A question about a candidate, which is answered once."""
+
+    @wraps(ask)
+    def answered(self, candidate: Candidate):
+        asked = (ask.__name__, candidate)
+        if asked not in self._answers:
+            self._answers[asked] = ask(self, candidate)
+        return self._answers[asked]
+
+    return answered
+
+
 class Case:
     """Answers what the search and the verdict ask about a candidate, each refit and each test made once."""
 
     def __init__(self, system: System, split: Split, policy: Policy, seed: int):
         self.system, self.split, self.policy, self.seed = system, split, policy, seed
-        self._refitted: dict[Candidate, Fit] = {}
-        self._converged: dict[Candidate, Fit] = {}
-        self._near: dict[Candidate, bool] = {}
-        self._sufficient: dict[Candidate, bool] = {}
+        self._answers: dict[tuple[str, Candidate], Any] = {}
 
     def fit_base(self, starts: int) -> Fit:
         """Base fitted to the trials to fit, with a floor from what repeats' residuals differ by among all but the
@@ -38,26 +53,30 @@ class Case:
         residuals = first.residuals() | evaluate_on(first, split.judging).residuals()
         sharper = floor.lowered_by(estimate_noise(self.system, split.fit + split.judging, residuals))
         again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], relative=_FINE)
-        return Fit(again.problem, again.solution, first.starts, first.starts_agreeing)
+        solution = renewed(again.problem, again.solution, relative=_FINE)
+        return Fit(again.problem, solution, first.starts, first.starts_agreeing)
 
     def judge(self, fitted: Fit) -> Candidate:
         return judge(fitted, self.split)
 
+    @_once
     def on_known(self, candidate: Candidate) -> Fit:
         """The explanation fitted to all known trials, every one with the same effort."""
-        if candidate not in self._refitted:
-            near = (candidate.fitted, candidate.checked)
-            self._refitted[candidate] = refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
-        return self._refitted[candidate]
+        near = (candidate.fitted, candidate.checked)
+        return refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
 
+    @_once
+    def intervals(self, candidate: Candidate) -> dict[str, tuple[float, float]]:
+        """90 % interval of every parameter of the explanation, from all known trials."""
+        return intervals(self.on_known(candidate))
+
+    @_once
     def converged(self, candidate: Candidate) -> Fit:
         """The same to the end of plain least squares: what a verdict rests on. Where a few large residuals lead these
         astray, so that conditions never fitted are predicted worse, it stays where it was."""
-        if candidate not in self._converged:
-            fitted = self.on_known(candidate)
-            ended = converged(fitted)
-            self._converged[candidate] = fitted if self._astray(ended, fitted) else ended
-        return self._converged[candidate]
+        fitted = self.on_known(candidate)
+        ended = converged(fitted)
+        return fitted if self._astray(ended, fitted) else ended
 
     def _astray(self, ended: Fit, before: Fit) -> bool:
         if not self.split.unseen:
@@ -73,21 +92,19 @@ class Case:
         others = tuple(t for t in self.split.known + self.split.unseen if t.name not in names)
         return self._tested(fitted, evaluate_on(fitted, others)) if others else self._tested(fitted)
 
+    @_once
     def suffices(self, candidate: Candidate) -> bool:
         """Whether an explanation leaves nothing that matters once it is fitted to all known trials."""
-        if candidate not in self._sufficient:
-            self._sufficient[candidate] = (
-                self.nearly(candidate)
-                and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
-                and not self.remainder(self.converged(candidate)).matters
-            )
-        return self._sufficient[candidate]
+        return (
+            self.nearly(candidate)
+            and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
+            and not self.remainder(self.converged(candidate)).matters
+        )
 
+    @_once
     def nearly(self, candidate: Candidate) -> bool:
         """Whether an explanation leaves so little that its fit, begun elsewhere, might leave nothing that matters."""
-        if candidate not in self._near:
-            self._near[candidate] = self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
-        return self._near[candidate]
+        return self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may

@@ -5,21 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.stats import t as student
-
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Choice, weigh
 from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search
-from lacuna.estimation.clustered import clustered_covariance
-from lacuna.estimation.fit import Fit, fit, starting_point
+from lacuna.estimation.fit import fit, starting_point
 from lacuna.estimation.structure import Structure
-from lacuna.estimation.uncertainty import uncertainty
 from lacuna.system import Effect
 
-_CONFIDENCE = 0.9
 _NEAREST = 5
 
 
@@ -47,26 +41,9 @@ class Rival:
     share_of_gap: float
 
 
-def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """90 % interval of every fitted parameter, within its bounds: by the curvature of the likelihood or by what
-    conditions disagree about, whichever is wider; Student's t with as many degrees of freedom as conditions, less
-    one."""
-    known = uncertainty(fitted)
-    sd = np.sqrt(np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted))))
-    conditions = len({(t.experiment, t.condition) for t in fitted.problem.trials})
-    half = sd * student.ppf(0.5 + _CONFIDENCE / 2, max(conditions - 1, 1))
-    found = {}
-    for estimate, index, width in zip(known.estimates, fitted.solution.free, half, strict=True):
-        parameter = fitted.structure.parameters[index]
-        lower, upper = max(parameter.lower, estimate.value - width), min(parameter.upper, estimate.value + width)
-        found[estimate.name] = (float(lower), float(upper))
-    return found
-
-
 def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
     """`choice` without effects whose interval holds the value at which they are absent: the least certain first."""
-    fitted = case.on_known(choice.candidate)
-    within = intervals(fitted)
+    fitted, within = case.on_known(choice.candidate), case.intervals(choice.candidate)
     idle = [e for e in choice.candidate.effects if _may_be_absent(fitted.structure.system.effects[e], within)]
     if not idle:
         return choice
@@ -81,8 +58,7 @@ def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
 def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, ...]:
     """Every effect of the choice, in the order of what it explains."""
     candidate = choice.candidate
-    fitted = case.on_known(candidate)
-    within = intervals(fitted)
+    fitted, within = case.on_known(candidate), case.intervals(candidate)
     named = []
     for effect, share in _shares(case, found, choice):
         described = fitted.structure.system.effects[effect]

@@ -17,7 +17,8 @@ from lacuna.system import Channels, Record, System
 
 _SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
 _OPEN = 0.1  # scales
-_CONVERGED = 1e-3  # of the cost: half of it of the RMS error, which is then the same to three digits
+_FRUITFUL = 1e-3  # of the cost: what a search has to gain for another to follow it
+_CONVERGED = 4e-3  # the same where an RMS error is stated: it is then known to a fifth of a per cent
 _CONVERGED_ITERATIONS, _ROUNDS = 20, 5
 _NUISANCE_ITERATIONS = 4
 _NONE = np.zeros(0)
@@ -135,18 +136,18 @@ def converged(fitted: Fit) -> Fit:
     """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
-    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _CONVERGED}
+    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _FRUITFUL}
     solution = solve(problem, fitted.solution.point, **options)
     if not fitted.structure.sites:  # curves are many parameters, and their fit is not compared with another's
-        solution = renewed(problem, solution, **options)
+        solution = renewed(problem, solution, fruitful=_CONVERGED, **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
-def renewed(problem: Problem, solution: Solution, **options) -> Solution:
-    """Searches that follow `solution`, for as long as one gains `_CONVERGED` of the cost: with nuisances as they are
-    and, while that leads further, begun anew at their means. A nuisance and a parameter of like effect (a run's
-    friction and the friction) hold one another where the model predicts a jump a little early or late; a search has to
-    let go of one of them."""
+def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL, **options) -> Solution:
+    """Searches that follow `solution`, for as long as one gains the share `fruitful` of the cost: with nuisances as
+    they are and, while that leads further, begun anew at their means. A nuisance and a parameter of like effect (a
+    run's friction and the friction) hold one another where the model predicts a jump a little early or late; a search
+    has to let go of one of them."""
     letting_go = any(problem.nuisances)
     for _ in range(_ROUNDS):
         further = [] if solution.converged else [solve(problem, solution.point, **options)]
@@ -157,7 +158,7 @@ def renewed(problem: Problem, solution: Solution, **options) -> Solution:
         best = min(further, key=lambda s: s.cost, default=solution)
         gained = solution.cost - best.cost
         solution = min(solution, best, key=lambda s: s.cost)
-        if gained < _CONVERGED * solution.cost:
+        if gained < fruitful * solution.cost:
             break
     return solution
 
