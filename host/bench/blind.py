@@ -69,8 +69,8 @@ def jobs(truth: str, counts: dict[str, int], first_seed: int) -> list[Job]:
     return [job for _, job in sorted(placed, key=lambda pair: pair[0])]
 
 
-def diagnose_sealed(job: Job, out: Path) -> dict:
-    """Draw, diagnose, and only then open the label. Returns the record kept for one data set."""
+def diagnose_sealed(job: Job, out: Path, threads: int) -> dict:
+    """Draw, diagnose on so many threads, and only then open the label. Returns the record kept for one data set."""
     kept = out / f"{job.truth}-{job.kind}-{job.seed}.json"
     if kept.exists():
         return json.loads(kept.read_text())
@@ -84,6 +84,7 @@ def diagnose_sealed(job: Job, out: Path) -> dict:
         sealed = [*_DRAWN_BY[job.truth], "--seed", str(job.seed), "--out", str(folder), *options]
         subprocess.run([sys.executable, *sealed, "--label", str(label)], check=True)
         one = [sys.executable, "-m", "bench.blind", "--one", str(folder), "--json", str(verdict), *withheld]
+        one += ["--threads", str(threads)]
         out.mkdir(parents=True, exist_ok=True)
         with kept.with_suffix(".log").open("w") as log:
             subprocess.run(one, check=True, stdout=log)
@@ -95,18 +96,22 @@ def diagnose_sealed(job: Job, out: Path) -> dict:
     return record
 
 
-def diagnose_one(folder: Path, verdict: Path, without: str | None) -> None:
+def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int) -> None:
     """The diagnosis of one folder with a library that lacks `without`, and what the baselines say of the same fits."""
     from bifa.data import read_dataset
     from bifa.identify.start import prepare
     from lacuna.diagnosis.diagnose import diagnose
     from lacuna.diagnosis.record import as_record
+    from lacuna.estimation.problem import use_threads
 
+    use_threads(threads)
     system = prepare(read_dataset(folder))
     system.effects = {name: effect for name, effect in system.effects.items() if name != without}
     began = time.monotonic()
     found = diagnose(system, progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
-    record = as_record(found) | {"processor_seconds": time.process_time(), "baselines": baselines(found.search)}
+    spent = os.times()
+    processor = spent.user + spent.system + spent.children_user + spent.children_system
+    record = as_record(found) | {"processor_seconds": processor, "baselines": baselines(found.search)}
     verdict.write_text(json.dumps(record))
 
 
@@ -235,20 +240,23 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=count)
     parser.add_argument("--truth", choices=tuple(_CLOSE), default="own", help="whose equations the robots follow")
     parser.add_argument("--first-seed", type=int, default=1000)
-    parser.add_argument("--jobs", type=int, default=max(1, len(os.sched_getaffinity(0)) // 2))
+    cores = len(os.sched_getaffinity(0))
+    parser.add_argument("--jobs", type=int, default=cores, help="at once, which share the cores")
     parser.add_argument("--out", type=Path, default=Path("../out/blind"))
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--json", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--without", help=argparse.SUPPRESS)
+    parser.add_argument("--threads", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        diagnose_one(options.one, options.json, options.without)
+        diagnose_one(options.one, options.json, options.without, options.threads)
         return
     todo = jobs(options.truth, {kind: getattr(options, n) for n, (kind, _) in counts.items()}, options.first_seed)
     records = []
     with ThreadPoolExecutor(options.jobs) as pool:
         try:
-            for record in pool.map(lambda job: diagnose_sealed(job, options.out), todo):
+            threads = max(1, cores // options.jobs)
+            for record in pool.map(lambda job: diagnose_sealed(job, options.out, threads), todo):
                 records.append(record)
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(

@@ -19,13 +19,18 @@ import tomli_w
 
 from bifa.errors import BifaError
 from bifa.measure import plan
-from bifa.measure.session import run_session
+from bifa.measure.session import Event, run_session
 from virtual_robot.effects import EFFECTS
 from virtual_robot.errors import VirtualRobotError
 from virtual_robot.rig import open_rig
 from virtual_robot.sealed import SIZES, SealedError
 
 KINDS = {"one": "single", "none": "none", "pair": "pair", "outside": "outside"}
+
+
+def _shown(event: Event) -> None:
+    if sys.stderr.isatty():
+        print(f"\r{event.number:3d} of {event.total}  {event.planned.file:50}", end="", file=sys.stderr)
 
 
 def generate(
@@ -59,9 +64,10 @@ def generate(
             name=f"bench-{seed}",
             known=rig.known,
             provenance={"recorded_by": "bench.sealed_campaign", "port": "virtual"},
-            on_event=lambda e: print(f"\r{e.number:3d} of {e.total}  {e.planned.file:50}", end="", file=sys.stderr),
+            on_event=_shown,
         )
-        print(file=sys.stderr)
+        if sys.stderr.isatty():
+            print(file=sys.stderr)
         inside = rig.open_seal()
         sizes = {name: _factor(name, values) for name, values in inside.items()}
         content = {"format": 1, "truth": profile, "seed": seed, "kind": kind, "sizes": sizes, "effects": inside}
