@@ -125,6 +125,8 @@ class RobotSystem(System):
     ) -> Channels:
         return self.predict_trials([theta], effects, [trial], coarse=coarse, corrections=[corrections])[0]
 
+    forks = True
+
     @property
     def at_once(self) -> int:
         return lanes.width()

@@ -18,11 +18,12 @@ Jobs = Sequence[tuple[Any, ...]]
 
 class Crew:
     """Runs pure functions and says what is being done. Any `concurrent.futures.Executor` will do that can ship a
-    `Problem`, and so its system: threads, processes, dask. Without one, jobs go to children where there is more than
-    one job, more than one core, and Linux, on which forking is safe."""
+    `Problem`, and so its system: threads, processes, dask. Without one, jobs go to forked children if these are allowed
+    (`System.forks`), there is more than one job and more than one core, and this is Linux."""
 
-    def __init__(self, progress: Progress, executor: Executor | None = None):
+    def __init__(self, progress: Progress, executor: Executor | None = None, *, forks: bool = False):
         self.say, self._executor = progress, executor
+        self._forks = forks and sys.platform == "linux" and not current_process().daemon
 
     def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable, jobs: Jobs) -> list:
         """`function(*job)` for each of `jobs`, in their order; `names` are the effects that each is about."""
@@ -38,7 +39,7 @@ class Crew:
         if self._executor:
             futures = [self._executor.submit(function, *job) for job in jobs]
             yield (future.result() for future in futures)
-        elif min(cores(), len(jobs)) > 1 and sys.platform == "linux" and not current_process().daemon:
+        elif self._forks and min(cores(), len(jobs)) > 1:
             with _children(function, jobs) as results:
                 yield results
         else:

@@ -98,7 +98,7 @@ def diagnose(
     split = split_trials(system.trials, system.spare())
     if not split.fit or not split.judging:
         raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
-    crew, case = Crew(progress, executor), Case(system, split, policy, seed)
+    crew, case = Crew(progress, executor, forks=system.forks), Case(system, split, policy, seed)
     crew.say("fitting the base model")
     base = case.fit_base(starts)
     found, stopped = _explanations(case, base, crew)
