@@ -125,7 +125,7 @@ class RobotSystem(System):
     ) -> Channels:
         return self.predict_trials([theta], effects, [trial], coarse=coarse, corrections=[corrections])[0]
 
-    forks = True
+    forks = True  # compiled code without threads or state of its own
 
     @property
     def at_once(self) -> int:

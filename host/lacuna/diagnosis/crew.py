@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +12,8 @@ from multiprocessing import active_children, current_process, get_context
 from typing import Any
 
 from lacuna.estimation.problem import cores, use_threads
+
+_DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 Progress = Callable[[str], None]
 Jobs = Sequence[tuple[Any, ...]]
@@ -69,6 +72,8 @@ def _begin(function: Callable, jobs: Jobs) -> None:
     global _work
     _work = function, jobs
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)  # however it ends
     use_threads(1)
 
 

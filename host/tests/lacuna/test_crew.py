@@ -1,6 +1,8 @@
 """Who does the work of a search: the same results whoever does it, and nobody left behind."""
 
 import os
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import active_children
@@ -60,3 +62,37 @@ def test_an_interruption_leaves_no_child_at_work(cores):
     with pytest.raises(KeyboardInterrupt):
         Crew(interrupted, forks=True).map("trying", NAMES, lambda _: time.sleep(3600.0), JOBS)
     assert not active_children()
+
+
+def test_children_do_not_outlive_a_parent_that_is_killed():
+    begun = subprocess.Popen([sys.executable, "-c", _FOREVER], stdout=subprocess.PIPE, text=True)
+    children = [int(begun.stdout.readline()) for _ in range(2)]
+    begun.kill()
+    begun.wait()
+    begun.stdout.close()
+    deadline = time.monotonic() + 20.0
+    while any(map(_alive, children)):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+_FOREVER = """
+import os, time
+from lacuna.diagnosis.crew import Crew
+from lacuna.estimation.problem import use_threads
+
+def job(_):
+    os.write(1, f"{os.getpid()}\\n".encode())
+    time.sleep(3600.0)
+
+use_threads(2)
+Crew(lambda _: None, forks=True).map("trying", [("one",), ("two",)], job, [(1,), (2,)])
+"""
+
+
+def _alive(pid: int) -> bool:
+    try:
+        with open(f"/proc/{pid}/stat") as stat:
+            return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
