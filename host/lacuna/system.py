@@ -232,9 +232,7 @@ class System(Protocol):
         return self.predict_trials(thetas, effects, [trial] * len(thetas), **how)
 
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
-    forks: bool = (
-        False  # whether a forked copy of this process may simulate, too: not with threads or devices of its own
-    )
+    forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own
 
     def predict_trials(
         self,

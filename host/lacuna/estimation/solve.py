@@ -16,7 +16,8 @@ from lacuna.system import Parameter
 one_thread = ThreadpoolController().wrap(limits=1, user_api="blas")  # of linear algebra: trials share the cores
 ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
 RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
-_NUISANCE_SDS = 10.0  # nearer than this its prior holds it: a bound there would hold the parameters, too
+_STRAY_SDS = 10.0  # that a nuisance may: nearer its prior holds it, and a bound would hold the parameters, too,
+_ALONE_SDS = 4.0  # but where nothing else is free, or it would stand in for what the model lacks
 _REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 _TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
@@ -185,7 +186,8 @@ def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.n
     lower, upper = problem.structure.bounds(point.values)
     scale = problem.structure.scales()
     nuisances = [p for ps in problem.nuisances for p in ps]
-    least, most = np.array([_may_be(p) for p in nuisances]).reshape(-1, 2).T
+    sds = _STRAY_SDS if free else _ALONE_SDS
+    least, most = np.array([_may_be(p, sds) for p in nuisances]).reshape(-1, 2).T
     return (
         np.concatenate([lower[list(free)], least]),
         np.concatenate([upper[list(free)], most]),
@@ -193,11 +195,11 @@ def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.n
     )
 
 
-def _may_be(nuisance: Parameter) -> tuple[float, float]:
-    """The range of a nuisance."""
+def _may_be(nuisance: Parameter, sds: float) -> tuple[float, float]:
+    """The range of a nuisance, so many standard deviations of its spread to either side."""
     if nuisance.periodic:
         return -np.inf, np.inf
-    strays = _NUISANCE_SDS * nuisance.step_scale
+    strays = sds * nuisance.step_scale
     return max(nuisance.lower, nuisance.value - strays), min(nuisance.upper, nuisance.value + strays)
 
 
