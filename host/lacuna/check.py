@@ -53,6 +53,11 @@ def _check_names(system: System, trials: Sequence[Record]) -> None:
         for site in effect.freed_at:
             if site not in system.correction_sites:
                 raise MisuseError(f"effect {effect.name} is freed at {site}, which is no correction site.")
+        for parameter in system.parameters:  # one that is known is not among them
+            if parameter.name in effect.apart and parameter.at_least is None:
+                raise MisuseError(
+                    f"effect {effect.name} needs {parameter.name} apart, but nothing says from what: give it `at_least`."
+                )
     effects = [e.full_name(p) for e in system.effects.values() for p in (*e.parameters, *e.own)]
     for name in _repeated([p.name for p in system.parameters] + effects):
         raise MisuseError(f"parameter {name}: more than one has this name; names must be unique.")

@@ -77,7 +77,9 @@ class Effect:
     are fitted trial by trial, from the best of several values over their range. `frequency` names the
     parameter that is a frequency, in Hz: fits start at the peaks of the residual's spectrum, since from
     anywhere else they would not converge to it. `freed_at`: correction sites where this mechanism may act in another
-    form than its formula's; a curve there is tried before another effect is called in.
+    form than its formula's; a curve there is tried before another effect is called in. `apart`: base parameters
+    without which the effect does nothing while they are as low as `Parameter.at_least` lets them; where a fit without
+    the effect made them one, fits with it begin with the two apart.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Effect:
     own: tuple[Parameter, ...] = ()
     frequency: str | None = None
     freed_at: tuple[str, ...] = ()
+    apart: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for each in ("parameters", "own"):

@@ -16,6 +16,7 @@ EFFECT = PhysicalEffect(
         EffectParameter("speed_m_s", "m/s", 0.0, 0.2, 0.01, "speed at which most of it has fallen", size=True),
     ),
     freed_at=("friction_speed", "grip_speed"),
+    apart=("mu_s",),
 )
 
 

@@ -24,6 +24,7 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
         sizes=len(effect.sizes),
         own=tuple(_engine_parameter(p) for p in effect.parameters if p.own),
         freed_at=effect.freed_at,
+        apart=effect.apart,
         frequency=next((p.name for p in effect.parameters if p.frequency), None),
     )
 

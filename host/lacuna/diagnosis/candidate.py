@@ -29,6 +29,7 @@ _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of th
 _FOLLOWED = 4  # of those begun anew, the ones that are followed to the end
 _NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
+_ELSEWHERE = 2  # further sizes that a refit is begun at
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
 
@@ -146,6 +147,14 @@ def profiles(parent: Fit, effects: Sequence[str], split: Split, floor: NoiseFloo
     return sorted((Profile(e, p, cost, points) for e, p, (cost, points) in each), key=lambda p: p.cost)
 
 
+def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
+    """Whether an effect, at one of the sizes that fits begin at, gains so much log-likelihood with nothing refitted but
+    what it has of its own in every trial: quickly told."""
+    problem = Problem(_grown(parent, effect), parent.problem.trials, parent.problem.floor)
+    starts = (problem.start(v, parent.solution.point.nuisances) for v in _sizes(parent, problem.structure, effect))
+    return any(cost_of(problem, start) < parent.cost - gain for start in starts)
+
+
 def _grown(parent: Fit, effect: str) -> Structure:
     return Structure(parent.structure.system, (*parent.structure.effects, effect))
 
@@ -220,23 +229,31 @@ def finish(sketched: Fit) -> Fit:
     return best_of(sketched.problem, [renewed(sketched.problem, best, **_REFIT)])
 
 
-def finish_elsewhere(finished: Fit, profiled: Profile) -> Fit:
-    """The better of a finished refit and one from the profile's second best point, which is followed to the end where a
-    quick refit comes near."""
+def finish_elsewhere(finished: Fit, profiled: Profile, crew: Crew) -> Fit:
+    """The best of a finished refit and those from the profile's next points: at the best one the effect may be so small
+    that it does nothing."""
     problem = profiled.problem
-    others = [solve(problem, point, **_SKETCH) for point in profiled.points[1:2]]
-    near = [solve(problem, one.point, **_REFIT) for one in others if one.cost < _NEAR * finished.cost]
-    return best_of(problem, [finished.solution, *near])
+    jobs = [(problem, point, _NEAR * finished.cost) for point in profiled.points[1 : 1 + _ELSEWHERE]]
+    others = crew.map("from another size, finishing", [problem.structure.effects] * len(jobs), _finished_from, jobs)
+    return best_of(problem, [finished.solution, *others])
 
 
-def finished_afresh(candidate: Candidate, split: Split, seed: int) -> Candidate:
+def _finished_from(problem: Problem, point: Point, near: float) -> Solution:
+    """Followed to the end where a quick refit comes near."""
+    sketched = solve(problem, point, **_SKETCH)
+    return finish(best_of(problem, [sketched])).solution if sketched.cost < near else sketched
+
+
+def finished_afresh(candidate: Candidate, split: Split, seed: int, crew: Crew) -> Candidate:
     """The better of a finished explanation and refits of it that begin anywhere plausible, its effects as they are."""
     finished, structure = candidate.fitted, candidate.fitted.structure
     problem, values = finished.problem, finished.solution.point.values
     starts = spread_starts(structure, values, 1 + _AFRESH, seed)[1:]
     for start in starts:
         start[structure.base_size :] = values[structure.base_size :]
-    found = min((solve_graduated(problem, start, **_SKETCH) for start in starts), key=lambda s: s.cost)
+    names = [structure.effects or ("nothing",)] * _AFRESH
+    jobs = [(problem, start) for start in starts]
+    found = min(crew.map("from elsewhere, refitting with", names, _sketched_graduated, jobs), key=lambda s: s.cost)
     if found.cost > _NEAR * finished.cost:
         return candidate
     found = renewed(problem, solve(problem, found.point, **_REFIT), **_REFIT)
@@ -247,7 +264,7 @@ def finished_afresh(candidate: Candidate, split: Split, seed: int) -> Candidate:
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
     """Starting vectors: the parent's values, the effect at a grid of sizes of either sign."""
     described = structure.system.effects[effect]
-    base = starting_point(parent, structure)
+    base = structure.parted(starting_point(parent, structure), effect)
     at = [structure.names.index(name) for name in described.size_names]
     vectors = []
     for factor in described.start_factors:

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-from lacuna.diagnosis.candidate import Candidate, judge
+from lacuna.diagnosis.candidate import Candidate, helps_at_once, judge, profiles, sketches
+from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
-from lacuna.diagnosis.residual_error import at_full_size, repeat_differences, rms, share_of_gap
+from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, renewed, spread_starts
 from lacuna.estimation.intervals import intervals
@@ -99,12 +100,41 @@ class Case:
             self.nearly(candidate)
             and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
             and not self.remainder(self.converged(candidate)).matters
+            and not self.hides(candidate)
+        )
+
+    @_once
+    def hides(self, candidate: Candidate) -> bool:
+        """Whether repeats differ by something that matters and is no noise: what an effect explains that has values of
+        its own in every trial. Nothing of it need be shared, and the floor then contains it."""
+        library, crew = self.system.effects, Crew(lambda _: None)
+        parent = candidate.fitted
+        own = [
+            name
+            for name, effect in library.items()
+            if effect.own and name not in candidate.effects and helps_at_once(parent, name, self.policy.gain)
+        ]
+        for fitted, _ in sketches(profiles(parent, own, self.split, parent.problem.floor, crew), crew):
+            other = judge(fitted, self.split, near=candidate.checked)
+            gained = candidate.cost - other.cost
+            if gained > self.policy.gain and self._excess(candidate, other) > self.policy.relevance:
+                return True
+        return False
+
+    def _excess(self, candidate: Candidate, other: Candidate) -> float:
+        return max(
+            excess_over(mine, others, self.system.accuracy)
+            for mine, others in ((candidate.fitted, other.fitted), (candidate.checked, other.checked))
         )
 
     @_once
     def nearly(self, candidate: Candidate) -> bool:
         """Whether an explanation leaves so little that its fit, begun elsewhere, might leave nothing that matters."""
         return self._tested(candidate.fitted, candidate.checked).worst < _HOPELESS
+
+    def may_be_lost(self, candidate: Candidate) -> bool:
+        """Whether what an explanation leaves may be its fit's failure."""
+        return self.nearly(candidate) and not self.suffices(candidate) and not self.hides(candidate)
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may

@@ -114,13 +114,15 @@ def diagnose(
 @dataclass(frozen=True)
 class _Judged:
     """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), and what each
-    leaves. `floor` and `drifts` are seen with the chosen effects, whatever the verdict."""
+    leaves; `unshared`: whether the base model leaves what matters and is not shared by repeats (`Case.hides`). `floor`
+    and `drifts` are seen with the chosen effects, whatever the verdict."""
 
     verdict: str
     base: Fit
     explained: Fit
     remainder: Remainder
     left: Remainder
+    unshared: bool
     floor: Floor
     drifts: tuple[Drift, ...]
 
@@ -128,9 +130,10 @@ class _Judged:
 def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
-    verdict = _verdict(case, choice, found, remainder, drifts)
+    unshared = not remainder.matters and case.hides(found.base)
+    verdict = _verdict(case, choice, found, remainder.matters or unshared, drifts)
     explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
-    return _Judged(verdict, base, explained, remainder, left, floor_of(chosen, case.split), drifts)
+    return _Judged(verdict, base, explained, remainder, left, unshared, floor_of(chosen, case.split), drifts)
 
 
 def _reported(
@@ -153,7 +156,7 @@ def _reported(
         after=error_of(final, split),
         floor=judged.floor,
         remainder_before=judged.remainder,
-        signature=describe(judged.base, judged.remainder, judged.drifts),
+        signature=describe(judged.base, judged.remainder, judged.drifts, unshared=judged.unshared),
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(*said, *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ())),
@@ -171,9 +174,9 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
     """Everything tried, and whether the search was stopped by hand. Nothing is tried where the base model leaves
     nothing that matters."""
     first = case.judge(base)
-    if case.nearly(first) and not case.suffices(first):
+    if case.may_be_lost(first):
         crew.say("fitting the base model from elsewhere, too")
-        first = finished_afresh(first, case.split, case.seed)
+        first = finished_afresh(first, case.split, case.seed, crew)
     if case.suffices(first):
         floor = first.fitted.problem.floor
         return Search(first, floor, (first,), tuple(screen(first.fitted, case.split, floor))), False
@@ -185,8 +188,8 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
         return finished.search(first, case.split), True
 
 
-def _verdict(case: Case, choice: Choice, found: Search, remainder: Remainder, drifts: tuple[Drift, ...]) -> str:
-    if not remainder.matters:
+def _verdict(case: Case, choice: Choice, found: Search, matters: bool, drifts: tuple[Drift, ...]) -> str:
+    if not matters:
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
     if not choice.probability or min(choice.probability.values()) < case.policy.supported:
         return "unexplained"

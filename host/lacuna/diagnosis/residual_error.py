@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +65,27 @@ def floor_of(fitted: Fit, split: Split) -> Floor:
 def share_of_gap(before: float, after: float, floor: float) -> float:
     """Of the gap between a model's error and the floor, RMS all three, the share that is closed: squares add up."""
     return (before**2 - after**2) / max(before**2 - floor**2, 1e-12)
+
+
+def excess_over(fitted: Fit, other: Fit, accuracy: Callable[[str, str], float]) -> float:
+    """By what share the mean square of a fit's residual exceeds that of another's on the same trials: in the experiment
+    where it does so most, over all of its channels. Within `accuracy(experiment, channel)` counts as nothing."""
+    mine, others = (_mean_squares(one) for one in (fitted, other))
+    shares: dict[str, list[float]] = defaultdict(list)
+    for (experiment, channel), square in mine.items():
+        least = others[experiment, channel]
+        enough = (accuracy(experiment, channel) / fitted.problem.floor.channels[experiment, channel].sd) ** 2
+        shares[experiment].append((square - least) / least if square - least > enough else 0.0)
+    return max((float(np.mean(each)) for each in shares.values()), default=0.0)
+
+
+def _mean_squares(fitted: Fit) -> dict[tuple[str, str], float]:
+    """By experiment and channel, of the residuals that there are."""
+    squares: dict[tuple[str, str], list[float]] = defaultdict(list)
+    for trial, channels in zip(fitted.problem.trials, fitted.scaled_residuals(), strict=True):
+        for channel, z in channels.items():
+            squares[trial.experiment, channel].append(float(np.nanmean(z**2)))
+    return {key: float(np.mean(each)) for key, each in squares.items()}
 
 
 def repeat_differences(

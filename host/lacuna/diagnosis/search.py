@@ -98,6 +98,7 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
             | parent.theta
             | {effect.full_name(p): p.value for p in effect.parameters}
         )
+        values = structure.parted(values, name)
         moved = problem.residuals(problem.start(values, parent.solution.point.nuisances))
         change = np.concatenate([m - r for m, r in zip(moved, reference, strict=True)])
         left = change - basis @ (basis.T @ change)
@@ -139,9 +140,9 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
         before = min(tried[frozenset(c.effects)].excess for c in beam)
         beam = _ranked(tried, size)[: _BEAM[size]]
         best = beam[0]
-        if case.nearly(best) and not enough(best):
+        if not enough(best) and case.may_be_lost(best):
             crew.say(f"fitting {' + '.join(best.effects)} from elsewhere, too")
-            best = beam[0] = tried[frozenset(best.effects)] = finished_afresh(best, split, case.seed)
+            best = beam[0] = tried[frozenset(best.effects)] = finished_afresh(best, split, case.seed, crew)
         gap, least = tried[frozenset()].excess, policy.promising * before
         if best.excess < policy.half * gap:  # what is found may be named: what follows must be worth naming, too
             least = max(policy.share * before, policy.share_of_gap * gap)
@@ -182,7 +183,9 @@ def _grow(
         fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
         if parent.effects:
             gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
-            fresh = sorted(fresh, key=lambda e: -gains[e])[:_PROFILED]
+            effects = parent.fitted.structure.system.effects
+            # a regression knows nothing of values that each trial has of its own
+            fresh = sorted(fresh, key=lambda e: (not effects[e].own, -gains[e]))[:_PROFILED]
         least = policy.promising * max(parent.fitted.cost - 0.5 * effective_samples(parent.fitted), 0.0)
         for found in profiles(parent.fitted, fresh, split, floor, crew):
             if parent.effects and parent.fitted.cost - found.cost < least:
@@ -243,7 +246,8 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Po
     explained = np.inf
     while waiting and len(done) < count:
         candidate = waiting[0]
-        fruitful = before.cost - candidate.cost > policy.promising * before.excess
+        most = max(before.excess, *(before.cost - c.cost for c in done), 0.0)
+        fruitful = before.cost - candidate.cost > policy.promising * most
         hopeless = done and candidate.excess > policy.hopeless * min(c.excess for c in done)
         if not fruitful or hopeless or candidate.cost > policy.reach * explained:
             break
@@ -252,7 +256,7 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Po
         candidate = _finished(candidate, split, policy)
         suffices = enough(candidate)
         if not suffices:
-            other = finish_elsewhere(candidate.fitted, profiled[candidate.effects])
+            other = finish_elsewhere(candidate.fitted, profiled[candidate.effects], crew)
             candidate = judge(other, split, near=candidate.checked)
             suffices = enough(candidate)
         if suffices:

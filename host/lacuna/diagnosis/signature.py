@@ -40,8 +40,9 @@ class Signature:
     text: str
 
 
-def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = ()) -> Signature:
-    """The signature of the residual of `fitted`, given its test for structure and the drifts over the session."""
+def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, unshared: bool = False) -> Signature:
+    """The signature of the residual of `fitted`, given its test for structure, the drifts over the session, and whether
+    repeats differ by what is no noise."""
     top = remainder.largest
     places = sorted(
         (key for key, z in remainder.z.items() if z > _VISIBLE and remainder.shared[key] > _SHARE_OF_LARGEST * top),
@@ -54,7 +55,7 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = ()) ->
     if drifts:
         depends_on.append("order of the session")
     return Signature(
-        experiments, tuple(depends_on), tuple(dependences), _sentence(places, remainder, dependences, drifts)
+        experiments, tuple(depends_on), tuple(dependences), _sentence(places, remainder, dependences, drifts, unshared)
     )
 
 
@@ -129,8 +130,8 @@ def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
-def _sentence(places, remainder: Remainder, dependences, drifts) -> str:
-    if not places and not drifts:
+def _sentence(places, remainder: Remainder, dependences, drifts, unshared: bool) -> str:
+    if not places and not drifts and not unshared:
         return "The residual contains nothing beyond the differences between repeats."
     parts = []
     if places:
@@ -146,6 +147,10 @@ def _sentence(places, remainder: Remainder, dependences, drifts) -> str:
         )
     if places and not dependences:
         parts.append("No single quantity of the model explains it.")
+    if unshared:
+        parts.append(
+            "What repeats differ by is no noise: an effect explains it that has values of its own in every trial."
+        )
     if drifts:
         parts.append(
             f"{', '.join(d.parameter for d in drifts)} drift{'s' if len(drifts) == 1 else ''} over the session."

@@ -79,6 +79,15 @@ class Structure:
             values[index] = max(values[index], values[floor])
         return values
 
+    def parted(self, values: np.ndarray, effect: str) -> np.ndarray:
+        """`values` with the parameters that `effect` needs apart (`Effect.apart`) at least half as far above what they
+        cannot be below as they are at the start."""
+        values, start = values.copy(), self.start()
+        for index, floor in self.ordered:
+            if self.names[index] in self.system.effects[effect].apart:
+                values[index] = max(values[index], values[floor] + 0.5 * (start[index] - start[floor]))
+        return np.minimum(values, [p.upper for p in self.parameters])
+
     @cached_property
     def ordered(self) -> tuple[tuple[int, int], ...]:
         """Pairs of indices: the first parameter cannot be below the second."""

@@ -8,13 +8,18 @@ from toy import hide
 
 from lacuna.diagnosis import candidate as candidate_module
 from lacuna.diagnosis import case as case_module
-from lacuna.diagnosis.candidate import finished_afresh
+from lacuna.diagnosis.candidate import Profile, finish_elsewhere, finished_afresh
 from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
-from lacuna.estimation.fit import Fit, reweigh
+from lacuna.estimation.fit import Fit, fit, reweigh
+from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import cost_of
+from lacuna.estimation.structure import Structure
+
+NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
 
 
 @pytest.fixture
@@ -46,7 +51,7 @@ def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
     right = case.judge(case.fit_base(1))
     astray = case.judge(moved(right.fitted, 0.3))
     assert astray.cost > right.cost + 10.0
-    assert finished_afresh(astray, case.split, 0).cost < right.cost + 1.0
+    assert finished_afresh(astray, case.split, 0, NOBODY).cost < right.cost + 1.0
 
 
 def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, monkeypatch):
@@ -55,7 +60,20 @@ def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, monkeypatch):
     monkeypatch.setattr(candidate_module, "solve_graduated", lambda *_, **__: worse)
     monkeypatch.setattr(candidate_module, "solve", lambda *_, **__: worse)
     monkeypatch.setattr(candidate_module, "renewed", lambda *_, **__: worse)
-    assert finished_afresh(right, case.split, 0) is right
+    assert finished_afresh(right, case.split, 0, NOBODY) is right
+
+
+def test_an_effect_that_does_nothing_at_its_best_size_is_finished_from_the_next_ones():
+    system = hide({"delay.delay_s": 0.03}, seed=32)
+    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    base = case.fit_base(1)
+    problem = Problem(Structure(system, ("delay",)), case.split.fit, base.problem.floor)
+    idle, active = (problem.start(np.append(base.solution.point.values, size)) for size in (0.0, 0.02))
+    lost = Fit(problem, replace(base.solution, point=idle, free=(0, 1, 2, 3), cost=cost_of(problem, idle)), 1, 1)
+    found = finish_elsewhere(lost, Profile("delay", problem, lost.cost, (idle, active)), NOBODY)
+    assert found.theta["delay.delay_s"] == pytest.approx(0.03, rel=0.1)
+    right = fit(problem.structure, case.split.fit, problem.floor, starts=[active.values])
+    assert found.cost < right.cost + 1.0
 
 
 def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):

@@ -1,6 +1,7 @@
 """Fitting on a system whose truth is known: values, intervals, bounds, floors."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from lacuna.estimation.problem import Point, Problem, View
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import profile_interval, uncertainty
-from lacuna.system import Parameter, Record, System
+from lacuna.system import Effect, Parameter, Record, System
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +143,24 @@ def test_static_friction_comes_back_from_below_the_kinetic_one(start):
     problem = Problem(Structure(system), system.trials, estimate_noise(system, system.trials))
     found = solve(problem, problem.start(np.array(start)))
     assert found.point.values == pytest.approx([4.0, 3.0], abs=0.05)
+
+
+class FadingBlock(Block):
+    """The same, and static friction may fade with speed; it cannot exceed 3 N."""
+
+    effects: ClassVar = {"fading": Effect("fading", Parameter("speed_m_s", "m/s", 0.1, 0.0, 1.0), apart=("holding_N",))}
+    parameters = (
+        Parameter("holding_N", "N", 2.8, 0.0, 3.0, at_least="sliding_N"),
+        Parameter("sliding_N", "N", 2.0, 0.0, 9.0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("held", "sliding", "begun"), [(1.5, 1.5, 1.9), (1.6, 1.5, 1.9), (2.5, 1.5, 2.5), (2.8, 2.8, 3.0)]
+)
+def test_what_an_effect_needs_apart_begins_half_as_far_apart_as_at_the_start(held, sliding, begun):
+    structure = Structure(FadingBlock(2.5, 2.0), ("fading",))
+    assert structure.parted(np.array([held, sliding, 0.1]), "fading") == pytest.approx([begun, sliding, 0.1])
 
 
 def test_correlated_noise_counts_for_less():

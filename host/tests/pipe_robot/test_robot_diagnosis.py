@@ -54,6 +54,7 @@ def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
         ("supply_sag", "resistance_s"),
         pytest.param("hysteresis", "force_N", marks=pytest.mark.soak),
         pytest.param("choked_flow", "saturation_s_per_psi", marks=pytest.mark.soak),
+        pytest.param("regulator_ripple", "amplitude_psi", marks=pytest.mark.soak),
     ],
 )
 def test_names_sizes_and_adds_an_effect_that_nobody_declared(sealed, effect, parameter):
