@@ -56,7 +56,7 @@ def _check_names(system: System, trials: Sequence[Record]) -> None:
         for parameter in system.parameters:  # one that is known is not among them
             if parameter.name in effect.apart and parameter.at_least is None:
                 raise MisuseError(
-                    f"effect {effect.name} needs {parameter.name} apart, but nothing says from what: give it `at_least`."
+                    f"effect {effect.name} needs {parameter.name} apart, which lacks `at_least`: apart from what?"
                 )
     effects = [e.full_name(p) for e in system.effects.values() for p in (*e.parameters, *e.own)]
     for name in _repeated([p.name for p in system.parameters] + effects):

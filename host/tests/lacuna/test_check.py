@@ -129,7 +129,7 @@ def test_refuses_an_effect_freed_where_there_is_no_curve():
 
 def test_refuses_an_effect_that_needs_apart_what_is_not_next_to_anything():
     effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0), apart=("slope",))
-    with pytest.raises(MisuseError, match="effect bend needs slope apart, but nothing says from what"):
+    with pytest.raises(MisuseError, match="effect bend needs slope apart, which lacks"):
         diagnose(Line(effects={"bend": effect}), progress=pytest.fail)
 
 
