@@ -1,11 +1,13 @@
 """Blind trial of the diagnosis: sealed data sets, verdicts first, labels opened afterwards.
 
     python -m bench.blind --truth own|realistic|foreign --singles 60 --none 20 [--jobs 2] [--out FOLDER]
+                          [--records FILE [--print]]
 
 Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or measured through the real firmware by
 `python -m bench.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the library
 those that were never in it and, but for the foreign truth, each library effect in turn, withheld from the diagnosis.
-Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues. Prints the
+Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues; FILE has a line
+for each data set, with which it continues on another machine, and `--print` only prints what is in it. Prints the
 figures with 95 % Wilson intervals beside four baselines that see the same fits: the best single refit by error, BIC,
 greedy forward selection, and sparse regression on the base model's residual.
 """
@@ -26,6 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench import blind_records
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
@@ -247,17 +250,28 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--without", help=argparse.SUPPRESS)
     parser.add_argument("--threads", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--records", type=Path, help="a line of JSON a data set; read first, and kept up to date")
+    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
     options = parser.parse_args()
     if options.one:
         diagnose_one(options.one, options.json, options.without, options.threads)
+        return
+    known = blind_records.read(options.records) if options.records else {}
+    if options.print:
+        report(list(known.values()), options.truth)
         return
     todo = jobs(options.truth, {kind: getattr(options, n) for n, (kind, _) in counts.items()}, options.first_seed)
     records = []
     with ThreadPoolExecutor(options.jobs) as pool:
         try:
             threads = max(1, cores // options.jobs)
-            for record in pool.map(lambda job: diagnose_sealed(job, options.out, threads), todo):
+            for record in pool.map(
+                lambda job: known.get((job.kind, job.seed)) or diagnose_sealed(job, options.out, threads), todo
+            ):
                 records.append(record)
+                if options.records:
+                    known[blind_records.place(record)] = record
+                    blind_records.write(options.records, known.values())
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(
                     f"{record['kind']:8}{record['seed']}  {_name(record['truth'])} ({sizes}) -> {_said(record)}"
