@@ -62,7 +62,7 @@ def run() -> dict[str, float]:
         f"most; in small pieces {pieces:.2f}; the rest is what else ran"
     )
     print(
-        f"ratio on one core, the {np.count_nonzero(ended)} gaits that LSODA finished: {speedup:.0f} (required: 5000); "
+        f"ratio on one core, the {np.count_nonzero(ended)} gaits that LSODA finished: {speedup:.0f} (required: 20000); "
         f"all, those stopped at {LONGEST_S:.0f} s: {theirs.sum() / each.sum():.0f}; "
         f"to the threshold of 1e-2 m/s, wrong by half: {crude.sum() / each.sum():.0f}"
     )

@@ -19,7 +19,7 @@ from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
-from lacuna.estimation.uncertainty import effective_samples
+from lacuna.estimation.uncertainty import effective_samples, pieces_of
 from lacuna.system import Effect, Parameter
 
 _PROFILE_STEPS = 4
@@ -196,17 +196,36 @@ def from_initial_guess(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> l
 
 def anew(parent: Fit, profiled: Sequence[Profile], policy: Policy, crew: Crew) -> list[tuple[Fit, Profile]]:
     """Sketches that owe nothing to `parent`: from the initial guess, the effect at its typical size, the best first.
-    The trials that isolate parameters go first; the few that take most away there are followed to the end."""
+    The trials that isolate parameters go first; the few that take most away there are followed to the end, and so are
+    those that cannot be seen there where the other trials leave more."""
     alone = fit_isolated(parent.problem, parent.structure.start())
     names = [p.problem.structure.effects for p in profiled]
     begun = crew.map("restarting with", names, fit_isolated, [(p.problem, p.at_typical_size()) for p in profiled])
     leading = sorted(range(len(begun)), key=lambda k: begun[k].cost)[:_FOLLOWED]
     most = min((1.0 - policy.promising) * alone.cost, policy.reach * begun[leading[0]].cost)
     leading = [k for k in leading if begun[k].cost < most]
+    if _more_is_left_together(parent, alone):
+        leading += [k for k, p in enumerate(profiled) if k not in leading and not _is_isolated(p)]
     jobs = [(profiled[k].problem, begun[k]) for k in leading]
     found = crew.map("following up", [names[k] for k in leading], _sketched_further, jobs)
     fits = [(best_of(profiled[k].problem, [solution]), profiled[k]) for k, solution in zip(leading, found, strict=True)]
     return sorted(fits, key=lambda pair: pair[0].cost)
+
+
+def _more_is_left_together(parent: Fit, alone: Isolated) -> bool:
+    """Whether trials that do not isolate parameters leave more of the cost than those that do leave by themselves."""
+    isolates, floor = parent.structure.system.isolates, parent.problem.floor
+    pieces = sum(pieces_of(trial, floor) for trial in parent.problem.trials if isolates(trial))
+    left = parent.cost - 0.5 * effective_samples(parent)
+    return left > 2.0 * max(alone.cost - 0.5 * pieces, 0.0)
+
+
+def _is_isolated(profiled: Profile) -> bool:
+    """Whether a trial that isolates parameters can show the effect."""
+    structure, trials = profiled.problem.structure, profiled.problem.trials
+    effect = structure.system.effects[profiled.effect]
+    shown = [t for t in trials if not effect.experiments or t.experiment in effect.experiments]
+    return any(map(structure.system.isolates, shown))
 
 
 def _sketched(problem: Problem, start: Point) -> Solution:

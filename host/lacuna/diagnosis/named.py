@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.decide import Choice, weigh
+from lacuna.diagnosis.decide import Choice, dispersion_of, weigh, worth_adding
 from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search
 from lacuna.estimation.fit import fit, starting_point
@@ -42,17 +42,19 @@ class Rival:
 
 
 def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
-    """`choice` without effects whose interval holds the value at which they are absent: the least certain first."""
+    """`choice` without effects whose interval holds the value at which they are absent, and without which nothing is
+    explained any worse: the least certain first."""
     fitted, within = case.on_known(choice.candidate), case.intervals(choice.candidate)
     idle = [e for e in choice.candidate.effects if _may_be_absent(fitted.structure.system.effects[e], within)]
-    if not idle:
-        return choice
-    least = min(idle, key=lambda e: choice.probability[e])
-    rest = tuple(e for e in choice.candidate.effects if e != least)
-    refitted = _refitted_without(case, choice.candidate, rest)
-    # what was tried of these effects may have ended in another minimum than they have in company
-    smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
-    return drop_absent(case, found, weigh(found, smaller, case.policy))
+    for least in sorted(idle, key=lambda e: choice.probability[e]):
+        rest = tuple(e for e in choice.candidate.effects if e != least)
+        refitted = _refitted_without(case, choice.candidate, rest)
+        # what was tried of these effects may have ended in another minimum than they have in company
+        smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
+        # intervals are wide where fits end in several places; that the effect is there may still be sure
+        if not worth_adding(smaller, choice.candidate, dispersion_of(found.tried), case.policy):
+            return drop_absent(case, found, weigh(found, smaller, case.policy))
+    return choice
 
 
 def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, ...]:

@@ -184,8 +184,9 @@ def _grow(
         if parent.effects:
             gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
             effects = parent.fitted.structure.system.effects
-            # a regression knows nothing of values that each trial has of its own
-            fresh = sorted(fresh, key=lambda e: (not effects[e].own, -gains[e]))[:_PROFILED]
+            # a regression knows nothing of values that each trial has of its own, nor of what does nothing as yet
+            blind = [e for e in fresh if effects[e].own or effects[e].apart]
+            fresh = [*blind, *sorted((e for e in fresh if e not in blind), key=lambda e: -gains[e])[:_PROFILED]]
         least = policy.promising * max(parent.fitted.cost - 0.5 * effective_samples(parent.fitted), 0.0)
         for found in profiles(parent.fitted, fresh, split, floor, crew):
             if parent.effects and parent.fitted.cost - found.cost < least:

@@ -4,17 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import hide
+from toy import ToySystem, hide
 
 from lacuna.diagnosis import candidate as candidate_module
 from lacuna.diagnosis import case as case_module
-from lacuna.diagnosis.candidate import Profile, finish_elsewhere, finished_afresh
+from lacuna.diagnosis.candidate import (
+    Profile,
+    _more_is_left_together,
+    anew,
+    finish_elsewhere,
+    finished_afresh,
+    profiles,
+)
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, fit, reweigh
+from lacuna.estimation.graduated import fit_isolated
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
@@ -86,3 +94,24 @@ def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):
     assert len(again.solution.sensitivities) == len(case.split.fit)
     basis, remaining = remaining_after(bare)
     assert np.abs(basis.T @ remaining).max() < 1e-6 * np.linalg.norm(remaining)
+
+
+class Bench(ToySystem):
+    """Sweeps show all parameters together."""
+
+    def isolates(self, trial):
+        return trial.experiment == "steps"
+
+
+def test_effects_that_isolated_trials_cannot_show_are_begun_anew_where_the_others_leave_more():
+    hidden = hide({"quadratic_drag.drag_Ns2_m2": 8.0}, seed=34)
+    late = replace(hidden.effects["quadratic_drag"], name="late_drag", experiments=("sweep",))
+    system = Bench(hidden.trials, {**hidden.effects, "late_drag": late})
+    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    base = case.fit_base(1)
+    effects = ("delay", "late_drag")
+    found = profiles(base, effects, case.split, base.problem.floor, NOBODY)
+    alone = fit_isolated(base.problem, base.structure.start())
+    assert _more_is_left_together(base, alone)
+    assert not _more_is_left_together(base, alone._replace(cost=1e9))
+    assert "late_drag" in {fitted.structure.effects[0] for fitted, _ in anew(base, found, POLICY, NOBODY)}
