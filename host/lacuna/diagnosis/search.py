@@ -201,23 +201,42 @@ def _grow(
 
 
 def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, policy: Policy, crew: Crew):
-    """A quick refit of the most promising, the best first; the best few from the initial guess as well. Where one
-    explains enough as it is (it restarts when it is finished), only those are that could reach it. Where the base
-    leaves so much that it may be in the wrong minimum, effects are also begun anew."""
+    """A quick refit of the most promising, the best first. Where one explains enough as it is (it restarts when it is
+    finished), those that could reach it are refitted from the initial guess as well; where none does, the best few."""
     size = len(before.effects) + 1
     near = sketches(ranked[: _SKETCHED[size]], crew)
-    again = near[: _SKETCHED_TWICE[size]]
-    fresh = []
-    if again and enough(judge(again[0][0], split)):
-        again = [pair for pair in again[1:] if pair[0].cost < policy.reach * again[0][0].cost]
-    elif again and not before.effects and before.rms > policy.lost:
+    twice = near[: _SKETCHED_TWICE[size]]
+    if twice and enough(judge(twice[0][0], split)):
+        reach = policy.reach * twice[0][0].cost
+        far = from_initial_guess([pair for pair in twice[1:] if pair[0].cost < reach], crew)
+    elif twice and not before.effects:
+        far = _sketched_afar(before, near, ranked, split, enough, policy, crew)
+    else:
+        far = from_initial_guess(twice, crew)
+    return _best_of_each([*near, *far])
+
+
+def _sketched_afar(before: Candidate, near, ranked: Sequence[Profile], split, enough, policy: Policy, crew: Crew):
+    """Refits from the initial guess: of the best sketches and, if none of these explains enough then, of the others,
+    too, since a base model that makes up for what it lacks may leave the effect no room. Where it leaves so much that
+    it may be in the wrong minimum, effects are begun anew."""
+    count = _SKETCHED_TWICE[1]
+    if before.rms > policy.lost:
         fresh = anew(before.fitted, ranked, policy, crew)
         begun = {fitted.structure.effects for fitted, _ in fresh}
         most = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
-        again = [pair for pair in again if pair[0].structure.effects not in begun and pair[0].cost < most]
-        again = again[: _SKETCHED_TWICE[size] - len(fresh) or 1]
+        again = [pair for pair in near[:count] if pair[0].structure.effects not in begun and pair[0].cost < most]
+        return [*from_initial_guess(again[: count - len(fresh) or 1], crew), *fresh]
+    found = from_initial_guess(near[:count], crew)
+    if not enough(judge(min(found, key=lambda pair: pair[0].cost)[0], split)):
+        found += from_initial_guess(near[count:], crew)
+    return found
+
+
+def _best_of_each(sketched: Sequence[tuple[Fit, Profile]]) -> list[tuple[Fit, Profile]]:
+    """The best fit of each set of effects, the best set first."""
     best: dict[tuple[str, ...], tuple[Fit, Profile]] = {}
-    for fitted, profile in (*near, *from_initial_guess(again, crew), *fresh):
+    for fitted, profile in sketched:
         effects = fitted.structure.effects
         if effects not in best or fitted.cost < best[effects][0].cost:
             best[effects] = (fitted, profile)
