@@ -9,7 +9,8 @@ from bifa.gait import Settings, optimise, simulations
 from bifa.robot import nominal
 from bifa.simulate import cores
 
-NOMINAL_REQUIRED_MM_S, ROBUST_REQUIRED_MM_S, SECONDS_ALLOWED = 23.4, 21.8, 30.0
+NOMINAL_REQUIRED_MM_S, ROBUST_REQUIRED_MM_S = 23.4, 21.8
+REQUIRED_S = 10.0  # on two idle cores; half as long again with AVX2
 PAPER_MM_S = 23.3
 SEEDS = range(int(os.environ.get("BIFA_BENCH_SEEDS", "2")))
 
@@ -37,7 +38,7 @@ def run() -> dict[str, float]:
             shared = max(processor) / cores()
             print(
                 f"    at most {max(processor):.1f} s of processor, {shared:.1f} s on each of {cores()} cores; "
-                f"{max(seconds):.1f} s by the clock with what else ran (allowed {SECONDS_ALLOWED:g})"
+                f"{max(seconds):.1f} s by the clock with what else ran (required {REQUIRED_S:g})"
             )
             print(f"    seeds within {100 * scatter:.2f} % (allowed 1)")
             figures |= {
@@ -48,7 +49,7 @@ def run() -> dict[str, float]:
                 f"gait_{name}_seconds_a_core": shared,
                 f"gait_{name}_seed_scatter": scatter,
             }
-    return figures | {"gait_seconds_allowed": SECONDS_ALLOWED, "gait_paper_mm_s": PAPER_MM_S}
+    return figures | {"gait_seconds_required": REQUIRED_S, "gait_paper_mm_s": PAPER_MM_S}
 
 
 def _warm_up(model, runs) -> None:
