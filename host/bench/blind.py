@@ -94,7 +94,7 @@ def diagnose_sealed(job: Job, out: Path, threads: int) -> dict:
         record = json.loads(verdict.read_text())
         truth = tomllib.loads(label.read_text())
     record |= {"seed": job.seed, "kind": job.kind, "truth": sorted(truth["effects"]), "sizes": truth["sizes"]}
-    record["values"] = truth["effects"]
+    record |= {"values": truth["effects"], "base_values": truth["parameters"]}
     kept.write_text(json.dumps(record, indent=1))
     return record
 
@@ -175,6 +175,8 @@ def report(records: list[dict], truth: str) -> None:
     )
     if truth != "foreign":
         _share("90 % intervals of sizes hold the truth", [hit for r in named for hit in _covered(r)])
+        right = [r for r in single + none + pair if {e["name"] for e in r["effects"]} == set(r["truth"])]
+        _share("90 % intervals of base parameters hold the truth", [hit for r in right for hit in _base_covered(r)])
     closed = sorted(_closed(r) for r in named)
     if closed:
         print(f"  median share of the gap closed {closed[len(closed) // 2]:.2f}")
@@ -228,6 +230,13 @@ def _covered(record: dict) -> list[bool]:
             if (ends := effect["interval_90"].get(name)) is not None:
                 hits.append(ends[0] <= true <= ends[1])
     return hits
+
+
+def _base_covered(record: dict) -> list[bool]:
+    """Of each parameter of the base model, whether its interval holds the truth."""
+    estimated, values = record["base_parameters"], record["base_values"]
+    ends = {name: estimated[name]["interval_90"] for name in estimated if name in values}
+    return [low <= values[name] <= high for name, (low, high) in ends.items()]
 
 
 def _closed(record: dict) -> float:

@@ -28,17 +28,22 @@ def write(path: Path, records: Iterable[dict]) -> None:
 
 def brief(record: dict) -> dict:
     """What a report needs of a record."""
-    kept = ("kind", "seed", "truth", "sizes", "values", "verdict", "processor_seconds", "baselines")
+    kept = ("kind", "seed", "truth", "sizes", "values", "base_values", "verdict", "processor_seconds", "baselines")
+    estimated = record["base_parameters"]
+    known = {
+        name: {"interval_90": estimated[name]["interval_90"]} for name in record["base_values"] if name in estimated
+    }
     effects = [{k: e[k] for k in ("name", "interval_90", "confusable_with")} for e in record["effects"]]
     error = {of: {e: record["error"][of][e] for e in _ERRORS} for of in ("before", "after", "noise_floor")}
-    rest = {"effects": effects, "error": error, "remainder": {"matters": record["remainder"]["matters"]}}
+    rest = {"effects": effects, "base_parameters": known, "error": error}
+    rest |= {"remainder": {"matters": record["remainder"]["matters"]}}
     return _rounded({k: record[k] for k in kept} | rest)
 
 
 def _rounded(value):
-    """The same with four digits of every number that is no integer."""
+    """The same with six digits of every number that is no integer."""
     if isinstance(value, dict):
         return {k: _rounded(v) for k, v in value.items()}
     if isinstance(value, list):
         return [_rounded(v) for v in value]
-    return float(f"{value:.4g}") if isinstance(value, float) else value
+    return float(f"{value:.6g}") if isinstance(value, float) else value

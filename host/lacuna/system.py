@@ -33,7 +33,9 @@ class Parameter:
     fits, for a parameter whose isolating trials fit equally well at several values. `factor_of`: of a nuisance, the
     parameters that it multiplies in its trial; its derivatives are theirs then, to the last digit, and data do not
     seem to tell a change of all trials' factors from one of the parameters. `periodic`: of an effect's own parameter,
-    `lower` and `upper` mean the same and are no bounds (a phase).
+    `lower` and `upper` mean the same and are no bounds (a phase). `prior_from_trials`: what is known of it beforehand
+    comes from the trials that are fitted, by a base model that knew of no effect; it guides the search, and stands back
+    where the parameters are finally told.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Parameter:
     elsewhere: tuple[float, ...] = ()
     factor_of: tuple[str, ...] = ()
     periodic: bool = False
+    prior_from_trials: bool = False
 
     def __post_init__(self) -> None:
         if not self.lower < self.upper:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
+from lacuna.diagnosis.named import Estimated
 from lacuna.diagnosis.record import as_record
 from lacuna.function_system import FunctionSystem
 from lacuna.records import read, stretched
@@ -101,7 +102,7 @@ class Verdict:
 
 
 def told(system: System, diagnosis: Diagnosis) -> Diagnosis:
-    """`diagnosis` with its effects' sizes and intervals in the person's own parameters."""
+    """`diagnosis` with its sizes, values and intervals in the person's own parameters."""
     if not isinstance(system, FunctionSystem):
         return diagnosis
     effects = []
@@ -110,4 +111,8 @@ def told(system: System, diagnosis: Diagnosis) -> Diagnosis:
         values = {name: coordinates[name].told(value) for name, value in one.parameters.items()}
         intervals = {name: coordinates[name].interval(*ends) for name, ends in one.interval.items()}
         effects.append(replace(one, parameters=values, interval=intervals))
-    return replace(diagnosis, effects=tuple(effects))
+    base = {
+        name: Estimated(system.told(name, one.value), system.coordinate(name).interval(*one.interval))
+        for name, one in diagnosis.base_parameters.items()
+    }
+    return replace(diagnosis, effects=tuple(effects), base_parameters=base)

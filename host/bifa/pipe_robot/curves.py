@@ -47,7 +47,9 @@ class FittedCurve:
     def parameters(self) -> tuple[Parameter, ...]:
         source = "one standard deviation of the static fit each"
         return tuple(
-            Parameter(n, "sd", 0.0, -_WIDEST, _WIDEST, scale=_SCALE, source=source, prior_sd=_PRIOR_SD)
+            Parameter(
+                n, "sd", 0.0, -_WIDEST, _WIDEST, scale=_SCALE, source=source, prior_sd=_PRIOR_SD, prior_from_trials=True
+            )
             for n in self.names
         )
 

@@ -278,8 +278,8 @@ class RobotSystem(System):
             scale,
             entry.source,
             prior_sd,
-            at_least,
-            _PLACES.get(name, ()),
+            at_least=at_least,
+            elsewhere=_PLACES.get(name, ()),
         )
 
     def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple:

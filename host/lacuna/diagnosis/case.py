@@ -12,9 +12,10 @@ from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, renewed, spread_starts
+from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, released, renewed, spread_starts
 from lacuna.estimation.intervals import intervals
 from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.settle import settle
 from lacuna.estimation.structure import Structure
 from lacuna.system import System
 
@@ -67,9 +68,15 @@ class Case:
         return refit_on(candidate.fitted, self.split.known, near=near, relative=_FINE)
 
     @_once
+    def settled(self, candidate: Candidate) -> Fit:
+        """The same at its very optimum, with derivatives that say how well its parameters are known: what these are
+        told from."""
+        return settle(released(self.on_known(candidate)))
+
+    @_once
     def intervals(self, candidate: Candidate) -> dict[str, tuple[float, float]]:
         """90 % interval of every parameter of the explanation, from all known trials."""
-        return intervals(self.on_known(candidate))
+        return intervals(self.settled(candidate))
 
     @_once
     def converged(self, candidate: Candidate) -> Fit:

@@ -13,7 +13,7 @@ from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.learn import holds, learn_correction
-from lacuna.diagnosis.named import Named, Rival, describe_effects, drop_absent, nearest
+from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, drop_absent, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder
@@ -50,12 +50,14 @@ class Diagnosis:
 
     `verdict`: "none" (nothing that matters), "identified" (the mechanisms in `effects` are supported), or "unexplained"
     (something matters and no mechanism is supported). `base`, `explained` and `final` are fitted to all known trials:
-    the base model, that with the named effects, and that with the curves `learnt` on top where they hold. `signature`:
-    where what the base model lacks lives; `left`: what the named effects leave.
+    the base model, that with the named effects, and that with the curves `learnt` on top where they hold.
+    `base_parameters`: of the base model in company of the named effects; none where the data remain unexplained.
+    `signature`: where what the base model lacks lives; `left`: what the named effects leave.
     """
 
     verdict: str
     effects: tuple[Named, ...]
+    base_parameters: dict[str, Estimated]
     base: Fit
     explained: Fit
     final: Fit
@@ -149,6 +151,7 @@ def _reported(
     return Diagnosis(
         verdict=judged.verdict,
         effects=describe_effects(case, found, choice) if identified else (),
+        base_parameters=_base_parameters(case, choice, found, judged.verdict),
         base=judged.base,
         explained=judged.explained,
         final=final,
@@ -211,6 +214,12 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew:
         return judged.explained
     final = case.converged(best)
     return final if not split.final or holds(final, judged.explained, split) else judged.explained
+
+
+def _base_parameters(case: Case, choice: Choice, found: Search, verdict: str) -> dict[str, Estimated]:
+    if verdict == "unexplained":
+        return {}
+    return describe_base(case, choice.candidate if verdict == "identified" else found.base)
 
 
 def _next(choice: Choice, found: Search) -> NextExperiment:

@@ -34,6 +34,14 @@ class Named:
 
 
 @dataclass(frozen=True)
+class Estimated:
+    """A parameter of the base model, fitted together with the named effects. `interval`: 90 %."""
+
+    value: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Rival:
     """Another explanation, and the share of the gap that it would close."""
 
@@ -44,8 +52,8 @@ class Rival:
 def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
     """`choice` without effects whose interval holds the value at which they are absent, and without which nothing is
     explained any worse: the least certain first."""
-    fitted, within = case.on_known(choice.candidate), case.intervals(choice.candidate)
-    idle = [e for e in choice.candidate.effects if _may_be_absent(fitted.structure.system.effects[e], within)]
+    library, within = case.system.effects, case.intervals(choice.candidate)
+    idle = [e for e in choice.candidate.effects if _may_be_absent(library[e], within)]
     for least in sorted(idle, key=lambda e: choice.probability[e]):
         rest = tuple(e for e in choice.candidate.effects if e != least)
         refitted = _refitted_without(case, choice.candidate, rest)
@@ -60,7 +68,7 @@ def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
 def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, ...]:
     """Every effect of the choice, in the order of what it explains."""
     candidate = choice.candidate
-    fitted, within = case.on_known(candidate), case.intervals(candidate)
+    fitted, within = case.settled(candidate), case.intervals(candidate)
     named = []
     for effect, share in _shares(case, found, choice):
         described = fitted.structure.system.effects[effect]
@@ -76,6 +84,12 @@ def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, 
             )
         )
     return tuple(named)
+
+
+def describe_base(case: Case, candidate: Candidate) -> dict[str, Estimated]:
+    """Every parameter of the base model by name, as fitted in company of the candidate's effects."""
+    fitted, within = case.settled(candidate), case.intervals(candidate)
+    return {p.name: Estimated(fitted.theta[p.name], within[p.name]) for p in case.system.parameters}
 
 
 def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Rival, ...]:

@@ -31,6 +31,10 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for e in d.effects
         ],
+        "base_parameters": {
+            name: {"value": _number(e.value), "interval_90": [_number(v) for v in e.interval]}
+            for name, e in d.base_parameters.items()
+        },
         "remainder": _left(d.left),
         "nearest": [{"effects": list(r.effects), "share_of_gap": _number(r.share_of_gap)} for r in d.nearest],
         "warnings": list(d.warnings),
@@ -100,4 +104,4 @@ def _sides(error: Error | Floor) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | None:
-    return float(f"{value:.4g}") if math.isfinite(value) else None
+    return float(f"{value:.6g}") if math.isfinite(value) else None

@@ -163,6 +163,13 @@ def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL
     return solution
 
 
+def released(fitted: Fit) -> Fit:
+    """The fit as it stands, what was known from its trials beforehand standing back."""
+    problem = fitted.problem.released()
+    cost = cost_of(problem, fitted.solution.point)
+    return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
+
+
 def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     """The same structure and trials against another floor, by a few steps with the derivatives that there are; without
     any steps it has no derivatives either."""

@@ -7,25 +7,19 @@ from scipy.stats import t as student
 
 from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit
-from lacuna.estimation.solve import solve
 from lacuna.estimation.uncertainty import uncertainty
 
 _CONFIDENCE = 0.9
-_AGAIN = {"max_iterations": 40, "relative": 1e-6}
 
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """90 % interval of every fitted parameter, within its bounds: by the curvature of the likelihood or by what
-    conditions disagree about, whichever is wider, and by how far from it another search ends that is begun anew (where
-    feet slip, the likelihood is rough, and its lowest place as good as several others); Student's t with as many
-    degrees of freedom as conditions, less one."""
+    """90 % interval of every parameter of a settled fit, within its bounds: by the curvature of the likelihood or by
+    what conditions disagree about, whichever is wider; Student's t with as many degrees of freedom as conditions, less
+    one."""
     known = uncertainty(fitted)
     variance = np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted)))
-    here, free = fitted.solution.point.values, list(fitted.solution.free)
-    again = solve(fitted.problem, fitted.problem.start(here), **_AGAIN).point.values
-    sd = np.sqrt(variance + (again - here)[free] ** 2)
     conditions = len({(t.experiment, t.condition) for t in fitted.problem.trials})
-    half = sd * student.ppf(0.5 + _CONFIDENCE / 2, max(conditions - 1, 1))
+    half = np.sqrt(variance) * student.ppf(0.5 + _CONFIDENCE / 2, max(conditions - 1, 1))
     found = {}
     for estimate, index, width in zip(known.estimates, fitted.solution.free, half, strict=True):
         parameter = fitted.structure.parameters[index]

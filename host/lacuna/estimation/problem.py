@@ -140,6 +140,12 @@ class Problem:
         other.view = view
         return other
 
+    def released(self) -> Problem:
+        """The same problem, what was known from its trials beforehand standing back (`Parameter.prior_from_trials`)."""
+        other = copy(self)
+        other._prior = self.structure.prior_precision(released=True)
+        return other
+
     def over(self, trials: Sequence[Record]) -> Problem:
         """The same problem with other trials."""
         return Problem(self.structure, trials, self.floor, self.view)

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from lacuna.system import Correction, CorrectionSite, Parameter, Record, System, Theta
 
+_RELEASED = 20.0  # times its standard deviation: a prior that hardly counts, and yet holds what nothing else does
 _TABLE_INTERVALS = 64  # at least
 
 
@@ -110,10 +111,13 @@ class Structure:
         """The learnt curves, knots interpolated by a natural cubic spline onto a uniform table."""
         return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
 
-    def prior_precision(self) -> np.ndarray:
+    def prior_precision(self, released: bool = False) -> np.ndarray:
         """Precision of the prior around the parameters' starts, shape (P, P): what was known of each, and for learnt
-        curves knots within 10 scales of zero and bending within 3 scales a knot."""
-        precision = np.diag([p.prior_sd**-2.0 if p.prior_sd else 0.0 for p in self.parameters])
+        curves knots within 10 scales of zero and bending within 3 scales a knot. `released`: what was known from the
+        trials themselves hardly counts, or they would count twice."""
+        wider = [_RELEASED if released and p.prior_from_trials else 1.0 for p in self.parameters]
+        sds = zip((p.prior_sd for p in self.parameters), wider, strict=True)
+        precision = np.diag([(sd * factor) ** -2.0 if sd else 0.0 for sd, factor in sds])
         for name in self.sites:
             site = self.system.correction_sites[name]
             bend = np.diff(np.eye(site.knots), 2, axis=0)

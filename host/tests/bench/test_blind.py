@@ -17,6 +17,12 @@ def record(seed: int, *named: str, kind: str = "single", truth: str = "leak", ma
         "truth": [truth] if kind != "none" else [],
         "sizes": {truth: 0.8},
         "values": {truth: {"rate_per_s": 0.05}},
+        "base_values": {"mu_s": 0.45, "mu_k": 0.35},
+        "base_parameters": {
+            "mu_s": {"value": 0.46, "interval_90": [0.44, 0.48]},
+            "mu_k": {"value": 0.34, "interval_90": [0.33, 0.349]},
+            "body_shape_01": {"value": 0.1, "interval_90": [-1.0, 1.2]},
+        },
         "verdict": "identified" if named else "none",
         "effects": [{"name": name} | effect for name in named],
         "error": {"before": error | {"held_out": 3.0}, "after": error | {"held_out": 1.1}, "noise_floor": error},
@@ -39,6 +45,7 @@ def test_rates_count_what_was_named_and_what_was_not(capsys):
         "no effect: verdict none 2/2 = 1.00 [0.34, 1.00]",
     ]
     assert "90 % intervals of sizes hold the truth 2/2 = 1.00 [0.34, 1.00]" in said
+    assert "90 % intervals of base parameters hold the truth 3/6 = 0.50 [0.19, 0.81]" in said
     assert "1 leak backlash + leak" in said
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from lacuna.estimation.fit import fit
+from lacuna.estimation.fit import fit, released
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
@@ -199,3 +199,20 @@ def test_a_phase_may_leave_its_range():
     ]
     assert costs[0] == pytest.approx(0.5 * 3 * len(T), rel=0.1)
     assert costs[1] > 1.3 * costs[0]
+
+
+@pytest.mark.parametrize("from_trials", [True, False])
+def test_a_prior_from_the_trials_themselves_stands_back_where_parameters_are_told(from_trials):
+    """Two standard deviations off the truth, and as sure of itself as the data are."""
+    pulled, told = [], []
+    for seed in SEEDS:
+        system = Lines(runs=4, seed=seed)
+        slope, bent = system.parameters
+        sd = expected_sd(4)[1]
+        told_before = replace(bent, value=TRUTH["bent"] + 2.0 * sd, prior_sd=sd, prior_from_trials=from_trials)
+        system.parameters = (slope, told_before)
+        found = fitted(system)
+        for one, errors in ((settle(found), pulled), (settle(released(found)), told)):
+            errors.append((one.theta["bent"] - TRUTH["bent"]) / sd)
+    assert np.mean(pulled) == pytest.approx(1.0, abs=0.35)
+    assert np.mean(told) == pytest.approx(0.0 if from_trials else 1.0, abs=0.5)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import ToySystem, hide
+from toy import ToySystem, draw_base, hide
 
 from lacuna.diagnosis.diagnose import TooLittleDataError, diagnose
 from lacuna.diagnosis.record import as_record
@@ -29,6 +29,17 @@ def test_names_a_hidden_effect_and_its_size(effect):
     assert found.effects[0].parameters[name.split(".")[1]] == pytest.approx(size, rel=0.1)
     assert found.after.held_out <= 1.2 * found.floor.held_out
     assert found.before.held_out > 1.5 * found.after.held_out
+
+
+def test_intervals_hold_the_truth_about_as_often_as_they_say():
+    held = []
+    for seed in range(40, 50):
+        found = diagnose(hide(SIZES["coulomb"], seed=seed))
+        known = {name: one.interval for name, one in found.base_parameters.items()}
+        known["force_N"] = found.effects[0].interval["force_N"]
+        truth = draw_base(np.random.default_rng(seed)) | {"force_N": SIZES["coulomb"]["coulomb.force_N"]}
+        held += [known[name][0] <= true <= known[name][1] for name, true in truth.items()]
+    assert 0.8 <= np.mean(held) <= 0.99, "40 intervals of 90 %"
 
 
 def test_names_two_effects_together():
@@ -101,6 +112,8 @@ def test_record_has_the_agreed_form():
         "share_of_gap",
         "confusable_with",
     }
+    assert set(record["base_parameters"]) == {"mass_kg", "stiffness_N_m", "damping_Ns_m"}
+    assert set(record["base_parameters"]["mass_kg"]) == {"value", "interval_90"}
     assert set(record["error"]) == {"unit", "before", "after", "noise_floor"}
     assert set(record["error"]["before"]) == {
         "fitted",

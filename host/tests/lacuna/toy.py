@@ -213,11 +213,7 @@ def hide(
     stiffness over the session; `noise_correlation` between neighbouring samples of the sensor's noise.
     """
     draw = np.random.default_rng(seed)
-    truth = {
-        "mass_kg": 1.0 * np.exp(0.05 * draw.standard_normal()),
-        "stiffness_N_m": 40 * np.exp(0.05 * draw.standard_normal()),
-        "damping_Ns_m": 2 * np.exp(0.1 * draw.standard_normal()),
-    }
+    truth = draw_base(draw)
     plan = [(e, s, r) for r in range(repeats) for e in ("steps", "sweep") for s in sizes]
     trials = []
     for order, (experiment, size, repeat) in enumerate(plan):
@@ -230,3 +226,12 @@ def hide(
         trials.append(_trial(experiment, size, repeat + 1, order, clean + noise))
     library = {name: e for name, e in _EFFECTS.items() if name not in withhold}
     return ToySystem(tuple(trials), library)
+
+
+def draw_base(draw: np.random.Generator) -> dict[str, float]:
+    """The base model's parameters of a mass on a spring."""
+    return {
+        "mass_kg": 1.0 * np.exp(0.05 * draw.standard_normal()),
+        "stiffness_N_m": 40 * np.exp(0.05 * draw.standard_normal()),
+        "damping_Ns_m": 2 * np.exp(0.1 * draw.standard_normal()),
+    }
