@@ -12,10 +12,11 @@ from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.link import Uno
 from bifa.measure.locomotion import record_walk
 from bifa.measure.plan import PlannedTrial
+from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of
 from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model
 from bifa.robot.gait import Gait
-from bifa.simulate import walk
+from bifa.simulate import of_gait, walk
 
 Progress = Callable[[str, float], None]
 
@@ -69,8 +70,11 @@ def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:
 
 
 def predict(model: Model, trial: Trial) -> dict:
-    """The model's own record of the walk that `trial` holds: the same columns."""
-    return walk(model, Gait(**trial.gait), time_s=trial.time_s).columns
+    """The model's own record of the walk that `trial` holds, on the trial's clock: the same columns."""
+    gait = Gait(**trial.gait)
+    commands = valves_of(of_gait(gait, trial.time_s[-1] + gait.period_s), trial)
+    columns = walk(model, commands=commands, time_s=trial.time_s * seconds_per_uno_s(trial)).columns
+    return dict(columns) | {"time_s": trial.time_s}
 
 
 def predicted_speed(model: Model, trial: Trial) -> float:

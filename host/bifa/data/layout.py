@@ -74,6 +74,14 @@ EXPERIMENTS: dict[str, Layout] = {
 # Settings of a single trial that are not fields of their own; they live in Trial.extra.
 SETTINGS = ("load_cell_N_m", "inclination_deg", "direction")
 
+# Notes that fits make use of, and between what they must lie. A clock that is off by more is no clock.
+NOTED = {
+    "set_point_psi": PRESSURE_RANGE_PSI,
+    "command_age_s": (-0.1, 0.1),
+    "clock_rate": (0.9, 1.1),
+    "dead_time_s": (0.0, 0.1),
+}
+
 
 def is_command(column: str) -> bool:
     """Whether a column holds a valve command (1 positive, 0 vacuum)."""

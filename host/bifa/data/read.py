@@ -18,6 +18,7 @@ from .layout import (
     FORMAT,
     GAIT,
     GAIT_OPTIONAL,
+    NOTED,
     PRESSURE_RANGE_PSI,
     SETTINGS,
     TABLE_FILE,
@@ -97,6 +98,9 @@ def _trial_head(entry: Any, source: Source, number: int) -> dict[str, Any]:
     for key in noted:
         if key in SETTINGS:
             raise fields.error("extra", f"{key} is a key of the trial itself and does not belong in extra")
+    notes = Fields(noted, source, trial=number, table="extra")
+    for key in NOTED.keys() & noted.keys():
+        notes.number(key, *NOTED[key])
     fields.finish(also=layout.optional + _COMMON_OPTIONAL)
     return {**head, "extra": {**noted, **extra}}
 

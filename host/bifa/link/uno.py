@@ -22,6 +22,7 @@ CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
 PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means about so long after its strobe (docs/firmware.md)
+DEAD_TIME_S = 4e-3  # from one supply to the other a chamber is vented: kDeadTime_ms and the tick that it waits for
 MARK_PAUSE = 10  # strobes that a mark leaves out (kMarkPause in lib/controller/controller.h)
 CONNECTIONS = ("off", "positive", "vacuum", "both")  # by the two valves of a chamber
 SCHEDULE_ENTRIES = 16  # lib/controller/schedule.h

@@ -7,7 +7,7 @@ import numpy as np
 
 from bifa.errors import BifaError
 from bifa.link import Uno
-from bifa.link.uno import PRESSURES_AFTER_S
+from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, resampled
 from bifa.measure.recording import LEAD_S, Recording, mount
 from bifa.robot.cpg import CHAMBERS
@@ -32,8 +32,8 @@ class RecordedWalk:
 
 
 def noted(clock: ClockLine) -> dict[str, float]:
-    """What every trial notes of how its clocks were lined up."""
-    return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate}
+    """What every trial notes of how its clocks were lined up, and of what the Uno does besides its commands."""
+    return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate, "dead_time_s": DEAD_TIME_S}
 
 
 def record_walk(

@@ -12,7 +12,15 @@ import numpy as np
 from bifa import simulate
 from bifa.data import Trial
 from bifa.pipe_robot.motion import imposed_motion
-from bifa.pipe_robot.switches import elapsed_s, shifted, step_timeline, switch_sd_s, walk_timeline
+from bifa.pipe_robot.switches import (
+    elapsed_s,
+    seconds_per_uno_s,
+    shifted,
+    step_timeline,
+    switch_sd_s,
+    valves_of,
+    walk_timeline,
+)
 from bifa.pipe_robot.unmeasured import LOAD_CELL
 from bifa.simulate import Plant, Timeline
 from lacuna.system import Theta
@@ -213,13 +221,18 @@ def _pressure_psi(trial: Trial) -> float | None:
     return trial.extra.get("set_point_psi", trial.pressure_psi)
 
 
+def _time_s(trial: Trial) -> np.ndarray:
+    return elapsed_s(trial) * seconds_per_uno_s(trial)
+
+
 def _static(trial: Trial) -> StaticInputs:
     x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
-    return StaticInputs(trial.actuator, elapsed_s(trial), x, direction, _pressure_psi(trial))
+    return StaticInputs(trial.actuator, _time_s(trial), x, direction, _pressure_psi(trial))
 
 
 def _step(trial: Trial) -> StepInputs:
-    return StepInputs(trial.actuator, elapsed_s(trial), step_timeline(trial), _pressure_psi(trial), switch_sd_s(trial))
+    commands = valves_of(step_timeline(trial), trial)
+    return StepInputs(trial.actuator, _time_s(trial), commands, _pressure_psi(trial), switch_sd_s(trial))
 
 
 def _pull(trial: Trial) -> PullInputs:
@@ -227,7 +240,7 @@ def _pull(trial: Trial) -> PullInputs:
     backward = trial.extra.get("direction") == "backward"
     pulled_mm = np.abs(trial.columns["displacement_mm"])
     return PullInputs(
-        pulled_s=_pulled_time(elapsed_s(trial), pulled_mm, rate),
+        pulled_s=_pulled_time(_time_s(trial), pulled_mm, rate),
         rate_mm_s=-rate if backward else rate,
         pressure_psi=_pressure_psi(trial),
         load_cell_N_m=float(trial.extra.get(LOAD_CELL, simulate.records.LOAD_CELL_N_M)),
@@ -244,8 +257,8 @@ def _walk(trial: Trial) -> WalkInputs:
     pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
     displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
     return WalkInputs(
-        time_s=elapsed_s(trial),
-        commands=walk_timeline(trial),
+        time_s=_time_s(trial),
+        commands=valves_of(walk_timeline(trial), trial),
         inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
         positive_psi=_pressure_psi(trial),
         channels=(*displacements, *pressures),

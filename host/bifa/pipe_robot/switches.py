@@ -15,7 +15,7 @@ import numpy as np
 from bifa.data import Trial
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
-from bifa.simulate import Timeline, of_gait, of_samples, recorded_commands, refine, timeline
+from bifa.simulate import Timeline, of_gait, of_samples, recorded_commands, refine, timeline, vented_between
 from bifa.simulate.timeline import COMMANDS
 
 _SPARE_S = 1e-6  # for times that fall on a sample
@@ -38,8 +38,20 @@ def shifted(commands: Timeline, late_s: float) -> Timeline:
 
 def delayed(commands: Timeline, to_vacuum_s: float, to_positive_s: float) -> Timeline:
     """As valves switch that take so long. Not sorted anew: a simulation does that."""
-    delay_s = np.where(commands.command == COMMANDS["positive"], to_positive_s, to_vacuum_s)
+    delay_s = np.where(commands.command % 2 == COMMANDS["positive"], to_positive_s, to_vacuum_s)
     return Timeline(commands.time_s + delay_s, commands.chamber, commands.command)
+
+
+def seconds_per_uno_s(trial: Trial) -> float:
+    """How long a second of the Uno lasts by the instrument's quartz: the Uno's resonator is good to 0.5 % only."""
+    return 1.0 / trial.extra.get("clock_rate", 1.0)
+
+
+def valves_of(commands: Timeline, trial: Trial) -> Timeline:
+    """What the valves do at these commands, which are on the trial's own clock, in seconds."""
+    unit = seconds_per_uno_s(trial)
+    elapsed = Timeline(commands.time_s * unit, commands.chamber, commands.command)
+    return vented_between(elapsed, trial.extra.get("dead_time_s", 0.0) * unit)
 
 
 def switch_sd_s(trial: Trial) -> float:

@@ -29,6 +29,7 @@ from bifa.simulate.timeline import (
     recorded_commands,
     refine,
     timeline,
+    vented_between,
 )
 
 __all__ = [
@@ -64,6 +65,7 @@ __all__ = [
     "terrain",
     "timeline",
     "tunnel",
+    "vented_between",
     "walk",
     "walks",
 ]

@@ -16,7 +16,7 @@ from bifa.robot import cpg
 from bifa.robot.gait import Gait
 from bifa.simulate.compiled import kernel
 from bifa.simulate.hooks import chains
-from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
+from bifa.simulate.stepper import OFF, OFF_BEFORE_POSITIVE, POSITIVE, VACUUM
 
 _TWO_PI = 2.0 * math.pi
 _RESOLUTION_S = 1e-3
@@ -28,7 +28,8 @@ class TimelineError(BifaError):
 
 @dataclass(frozen=True)
 class Timeline:
-    """`time_s` (n,) rising, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive, 0 vacuum, 2 off."""
+    """`time_s` (n,) rising, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive, 0 vacuum, 2 off (or 3,
+    where positive follows after a dead time)."""
 
     time_s: np.ndarray
     chamber: np.ndarray
@@ -43,6 +44,24 @@ class Timeline:
             last = np.searchsorted(self.time_s[mine], time_s, side="right") - 1
             state[last >= 0, chamber] = self.command[mine][last[last >= 0]]
         return state
+
+
+def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
+    """The same where a chamber is vented for `dead_time_s` from one supply to the other, as the Uno does it: break
+    before make. The vent begins when the command says."""
+    rows = []
+    for chamber in range(3):
+        before = OFF
+        mine = commands.chamber == chamber
+        for time_s, command in zip(commands.time_s[mine], commands.command[mine], strict=True):
+            if OFF not in (before, command) and before != command and dead_time_s > 0.0:
+                rows.append((time_s, chamber, OFF_BEFORE_POSITIVE if command == POSITIVE else OFF))
+                rows.append((time_s + dead_time_s, chamber, command))
+            else:
+                rows.append((time_s, chamber, command))
+            before = command
+    times, chambers, states = (np.array(column) for column in zip(*sorted(rows, key=lambda row: row[0]), strict=True))
+    return Timeline(times, chambers, states.astype(np.int64))
 
 
 def timeline(switches) -> Timeline:
@@ -161,7 +180,7 @@ def delayed(plant, times, command):
     late = times.copy()
     if plant.active & chains.DELAY:
         for i in range(times.size):
-            late[i] += chains.delay(plant.active, plant.q, command[i] == 1)
+            late[i] += chains.delay(plant.active, plant.q, command[i] % 2 == 1)
     return late, np.argsort(late, kind="mergesort")
 
 

@@ -187,6 +187,11 @@ MALFORMED_TOML = {
         "'tensile' is unknown",
     ),
     "unknown key": (replace("repeat = 2", "repeat = 2\nspeed = 1"), "trial 2, speed", "unknown key"),
+    "clock out of the question": (
+        replace("repeat = 2", "repeat = 2\nextra = { clock_rate = 2.0 }"),
+        "trial 2, extra.clock_rate",
+        "1.1",
+    ),
     "misspelt actuator": (replace('"large"', '"big"'), "trial 1, actuator", "large, small"),
     "misplaced actuator": (
         replace('"anchor_pull"', '"anchor_pull"\nactuator = "small"'),

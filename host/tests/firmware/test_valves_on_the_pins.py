@@ -8,6 +8,7 @@ from wild_host import WildHost
 
 from bifa.link import frames
 from bifa.link.table import COMMANDS
+from bifa.link.uno import DEAD_TIME_S
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -107,6 +108,19 @@ def exercise(bench, seconds: float, seed: int) -> None:
     assert bench.board.resets == 1
     assert not bench.board.crashed
     assert bench.board.untouched_ram > STACK_KEPT_FREE
+
+
+def test_a_chamber_is_vented_for_the_dead_time_that_recordings_note(bench):
+    bench.board.send(b"clear\nhold body vacuum\n")
+    bench.wait(0.2)
+    first = bench.board.event_count
+    for supply in ("positive", "vacuum") * 3:
+        bench.board.send(f"hold body {supply}\n".encode())
+        bench.wait(0.1)
+    edges = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in CHAMBERS[0]]
+    assert [e.value for e in edges] == [0, 1] * 6
+    vented_s = [(on.cycle - off.cycle) / CLOCK_HZ for off, on in zip(edges[::2], edges[1::2], strict=True)]
+    assert vented_s == pytest.approx([DEAD_TIME_S] * 6, abs=5e-5)
 
 
 def test_a_minute_of_random_input(bench):

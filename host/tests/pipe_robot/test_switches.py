@@ -8,7 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bifa.data import Trial
-from bifa.pipe_robot.switches import step_timeline, switch_sd_s, walk_timeline
+from bifa.pipe_robot.inputs import inputs_of
+from bifa.pipe_robot.switches import step_timeline, switch_sd_s, valves_of, walk_timeline
+from bifa.simulate import timeline, vented_between
+from bifa.simulate.stepper import OFF
 
 TIME = np.arange(2000) * 0.01
 CHAMBERS = ("body", "head", "tail")
@@ -124,3 +127,42 @@ def test_a_command_that_never_changes_has_no_switches():
     columns = {"time_s": TIME, "command": np.zeros(len(TIME))}
     timeline = step_timeline(Trial("s.csv", "step_response", columns, actuator="large", pressure_psi=8.5))
     assert (list(timeline.time_s), list(timeline.command)) == ([0.0], [0])
+
+
+@settings(max_examples=40, deadline=None)
+@given(gait=gaits, dead_time_s=st.floats(1e-3, 0.02))
+def test_from_one_supply_to_the_other_a_chamber_is_vented(gait, dead_time_s):
+    commands = walk_timeline(walk(gait))
+    valves = vented_between(commands, dead_time_s)
+    assert (np.diff(valves.time_s) >= 0.0).all()
+    for chamber in range(3):
+        commanded = commands.time_s[commands.chamber == chamber][1:]
+        commanded = commanded[np.diff(commanded, append=np.inf) > 2 * dead_time_s]
+        vented = valves.at(commanded + 0.5 * dead_time_s)[:, chamber]
+        assert (vented >= OFF).all()
+        expected = commands.at(commanded)[:, chamber]
+        np.testing.assert_array_equal(vented % 2, expected % 2)  # delayed as the edge that follows
+        np.testing.assert_array_equal(valves.at(commanded + 1.001 * dead_time_s)[:, chamber], expected)
+        np.testing.assert_array_equal(
+            valves.at(commanded - 1e-6)[:, chamber], commands.at(commanded - 1e-6)[:, chamber]
+        )
+
+
+def test_a_chamber_that_is_off_waits_for_no_dead_time():
+    commands = timeline([(0.0, 0, OFF), (1.0, 0, 1), (2.0, 0, OFF), (3.0, 0, 0)])
+    np.testing.assert_array_equal(vented_between(commands, 0.004).time_s, commands.time_s)
+
+
+def test_valves_are_told_in_seconds_of_the_quartz():
+    trial = step(0.5, switch_time_s=[0.5, 3.5], clock_rate=1.002, dead_time_s=0.004)
+    valves = valves_of(step_timeline(trial), trial)
+    assert valves.time_s * 1.002 == pytest.approx([0.0, 0.5, 0.504, 3.5, 3.504])
+    assert list(valves.command) == [0, 3, 1, 2, 0]
+    inputs = inputs_of(trial)
+    assert inputs.time_s[-1] * 1.002 == pytest.approx(TIME[-1])
+    np.testing.assert_array_equal(inputs.commands.time_s, valves.time_s)
+
+
+def test_without_notes_the_commands_are_what_the_valves_do():
+    trial = step(0.5, switch_time_s=[0.5, 3.5])
+    np.testing.assert_array_equal(valves_of(step_timeline(trial), trial).time_s, step_timeline(trial).time_s)

@@ -56,7 +56,7 @@ def _switches(timeline):
 
 
 def _experiments(plants):
-    walk = _switches(simulate.of_gait(FAST, 10.0))
+    walk = _switches(simulate.vented_between(simulate.of_gait(FAST, 10.0), 0.004))
     step = _switches(simulate.timeline([(0.5, 0, 1), (3.5, 0, 0)]))
     n = len(plants)
 

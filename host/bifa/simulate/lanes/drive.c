@@ -114,7 +114,7 @@ static int sort_switches(Schedule *s, double to_positive_s, double otherwise_s) 
         if (!s->late_s || !s->order) return 0;
     }
     for (int64_t k = 0; k < job->switches; k++) {
-        const double late_s = job->switch_s[k] + (job->command[k] == 1 ? to_positive_s : otherwise_s);
+        const double late_s = job->switch_s[k] + (job->command[k] & 1 ? to_positive_s : otherwise_s);
         int64_t at = k;
         for (; at > 0 && s->late_s[at - 1] > late_s; at--) {
             s->late_s[at] = s->late_s[at - 1];
