@@ -27,7 +27,7 @@ HOST = Path(__file__).parents[2]
 ROBOT = nominal()
 SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * ROBOT.values["mu_s"]})
 FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
-FASTER = Gait(2.6, 204.5, 331.7, 0.6535, 0.439, 0.439)
+FASTER = Gait(2.68, 204.5, 331.7, 0.6535, 0.439, 0.439)
 EFFORT = Effort(quick=True, cycles=4, repeats=1)
 
 
