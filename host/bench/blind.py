@@ -94,7 +94,7 @@ def diagnose_sealed(job: Job, out: Path, threads: int) -> dict:
         record = json.loads(verdict.read_text())
         truth = tomllib.loads(label.read_text())
     record |= {"seed": job.seed, "kind": job.kind, "truth": sorted(truth["effects"]), "sizes": truth["sizes"]}
-    record |= {"values": truth["effects"], "base_values": truth["parameters"]}
+    record |= {"values": truth["effects"], "base_values": truth.get("parameters", {})}
     kept.write_text(json.dumps(record, indent=1))
     return record
 

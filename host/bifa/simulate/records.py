@@ -113,7 +113,7 @@ def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tup
 def _walked(flat: Plant, commands: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
     (columns,) = _seen(flat, commands, rows[lanes.SEEN_OF_WALK], time_s)
     shown = commands.at(time_s).astype(float)
-    shown[shown >= OFF] = np.nan
+    shown[shown == OFF] = np.nan
     columns |= {"command_body": shown[:, 0], "command_head": shown[:, 1], "command_tail": shown[:, 2]}
     return columns, {
         "velocity_head_m_s": rows[V_HEAD],
@@ -183,7 +183,7 @@ def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
     """A stand's command at times; before the first it is at vacuum."""
     shown = command.at(time_s)[:, 0].astype(float)
     shown[time_s < command.time_s[0] if command.time_s.size else np.ones(time_s.size, bool)] = 0.0
-    shown[shown >= OFF] = np.nan
+    shown[shown == OFF] = np.nan
     return shown
 
 

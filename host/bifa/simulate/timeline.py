@@ -36,13 +36,13 @@ class Timeline:
     command: np.ndarray
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """(m, 3) commands in force at times, off before the first."""
+        """(m, 3) commands in force at times, 0 to 2; off before the first."""
         time_s = np.asarray(time_s, dtype=float)
         state = np.full((time_s.size, 3), OFF)
         for chamber in range(3):
             mine = self.chamber == chamber
             last = np.searchsorted(self.time_s[mine], time_s, side="right") - 1
-            state[last >= 0, chamber] = self.command[mine][last[last >= 0]]
+            state[last >= 0, chamber] = np.minimum(self.command[mine][last[last >= 0]], OFF)
         return state
 
 

@@ -10,7 +10,7 @@ from bifa.data import Dataset
 from bifa.identify.start import prepare
 from bifa.pipe_robot.sites import corrected, learnt_curves, modules
 from bifa.robot.learnt import ROWS
-from bifa.simulate import plant
+from bifa.simulate import plant, vented_between
 from lacuna.system import Correction
 
 
@@ -131,17 +131,25 @@ ALIKE = {
 }
 
 
+def with_dead_time(trial):
+    if trial.experiment not in ("step_response", "locomotion"):
+        return trial
+    return replace(trial, payload=replace(trial.payload, commands=vented_between(trial.payload.commands, 0.004)))
+
+
+@pytest.mark.parametrize("as_recorded", [lambda trial: trial, with_dead_time], ids=["plain", "with dead time"])
 @pytest.mark.parametrize(("site", "experiment"), [(name, where) for name, alike in ALIKE.items() for where in alike[2]])
-def test_a_curve_in_the_shape_of_an_effect_is_that_effect(system, theta, site, experiment):
+def test_a_curve_in_the_shape_of_an_effect_is_that_effect(system, theta, site, experiment, as_recorded):
     rows, effect, _ = ALIKE[site]
     here = system.correction_sites[site]
     at = np.linspace(here.lower, here.upper, 257)
     every = rows if len(rows) == len(here.rows) else rows * len(here.rows)
     learnt = Correction(site, np.array([np.broadcast_to(row(at), at.shape) for row in every]))
     names = tuple({name.split(".")[0] for name in effect})
-    plain = system.predict(theta, (), trial_of(system, experiment))
-    want = system.predict(theta | effect, names, trial_of(system, experiment))
-    got = system.predict(theta, (), trial_of(system, experiment), corrections=(learnt,))
+    trial = as_recorded(trial_of(system, experiment))
+    plain = system.predict(theta, (), trial)
+    want = system.predict(theta | effect, names, trial)
+    got = system.predict(theta, (), trial, corrections=(learnt,))
     moved = {channel: np.abs(want[channel] - plain[channel]).max() for channel in want}
     assert max(moved.values()) > 0.05
     for channel, much in moved.items():
