@@ -10,6 +10,7 @@ from typing import Any
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.named import Estimated
 from lacuna.diagnosis.record import as_record
+from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
 from lacuna.records import read, stretched
 from lacuna.system import Record, System
@@ -27,7 +28,7 @@ class Model:
         final = diagnosis.final
         self._system, self._theta, self._effects = system, final.theta, final.structure.effects
         self._corrections = final.structure.corrections(final.theta)
-        names = [p.name for p in final.structure.parameters if not p.name.startswith("correction.")]
+        names = [p.name for p in final.structure.parameters if not is_learnt(p.name)]
         self.theta = Values({name: system.told(name, final.theta[name]) for name in names})
 
     def __call__(self, record: Any, theta: Mapping[str, float] | None = None) -> Any:

@@ -124,15 +124,24 @@ class Case:
         for fitted, _ in sketches(profiles(parent, own, self.split, parent.problem.floor, crew), crew):
             other = judge(fitted, self.split, near=candidate.checked)
             gained = candidate.cost - other.cost
-            if gained > self.policy.gain and self._excess(candidate, other) > self.policy.relevance:
+            both = (candidate.fitted, other.fitted), (candidate.checked, other.checked)
+            if gained > self.policy.gain and self._exceeds(*both):
                 return True
         return False
 
-    def _excess(self, candidate: Candidate, other: Candidate) -> float:
-        return max(
-            excess_over(mine, others, self.system.accuracy)
-            for mine, others in ((candidate.fitted, other.fitted), (candidate.checked, other.checked))
-        )
+    def outdone(self, candidate: Candidate, better: Candidate) -> bool:
+        """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by
+        their friction differ so much from repeat to repeat that what these share may pass for chance."""
+        mine, others = self.converged(candidate), self.converged(better)
+        both = [(mine, others)]
+        if unseen := self.split.unseen:
+            both.append((evaluate_on(mine, unseen), evaluate_on(others, unseen)))
+        return self._exceeds(*both)
+
+    def _exceeds(self, *both: tuple[Fit, Fit]) -> bool:
+        """Whether the first fit of any pair leaves by more than is relevant more than the second."""
+        worst = max(excess_over(mine, others, self.system.accuracy) for mine, others in both)
+        return worst > self.policy.relevance
 
     @_once
     def nearly(self, candidate: Candidate) -> bool:

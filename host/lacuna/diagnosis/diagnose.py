@@ -116,15 +116,15 @@ def diagnose(
 @dataclass(frozen=True)
 class _Judged:
     """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), and what each
-    leaves; `unshared`: whether the base model leaves what matters and is not shared by repeats (`Case.hides`). `floor`
-    and `drifts` are seen with the chosen effects, whatever the verdict."""
+    leaves; `besides`: where the base model leaves what matters and repeats do not surely share, a sentence that says
+    so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict."""
 
     verdict: str
     base: Fit
     explained: Fit
     remainder: Remainder
     left: Remainder
-    unshared: bool
+    besides: str
     floor: Floor
     drifts: tuple[Drift, ...]
 
@@ -132,10 +132,23 @@ class _Judged:
 def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
-    unshared = not remainder.matters and case.hides(found.base)
-    verdict = _verdict(case, choice, found, remainder.matters or unshared, drifts)
+    besides = "" if remainder.matters else _besides(case, choice, found)
+    verdict = _verdict(case, choice, found, remainder.matters or bool(besides), drifts)
     explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
-    return _Judged(verdict, base, explained, remainder, left, unshared, floor_of(chosen, case.split), drifts)
+    return _Judged(verdict, base, explained, remainder, left, besides, floor_of(chosen, case.split), drifts)
+
+
+def _besides(case: Case, choice: Choice, found: Search) -> str:
+    if case.hides(found.base):
+        return "What repeats differ by is no noise: an effect explains it that has values of its own in every trial."
+    if _supported(case, choice) and case.outdone(found.base, choice.explanation):
+        named = " and ".join(choice.candidate.effects)
+        return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
+    return ""
+
+
+def _supported(case: Case, choice: Choice) -> bool:
+    return bool(choice.probability) and min(choice.probability.values()) >= case.policy.supported
 
 
 def _reported(
@@ -159,7 +172,7 @@ def _reported(
         after=error_of(final, split),
         floor=judged.floor,
         remainder_before=judged.remainder,
-        signature=describe(judged.base, judged.remainder, judged.drifts, unshared=judged.unshared),
+        signature=describe(judged.base, judged.remainder, judged.drifts, besides=judged.besides),
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(*said, *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ())),
@@ -194,7 +207,7 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
 def _verdict(case: Case, choice: Choice, found: Search, matters: bool, drifts: tuple[Drift, ...]) -> str:
     if not matters:
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
-    if not choice.probability or min(choice.probability.values()) < case.policy.supported:
+    if not _supported(case, choice):
         return "unexplained"
     return "identified" if case.closed(choice.explanation, found.base) >= case.policy.half else "unexplained"
 

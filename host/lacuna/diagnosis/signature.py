@@ -40,7 +40,7 @@ class Signature:
     text: str
 
 
-def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, unshared: bool = False) -> Signature:
+def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, besides: str = "") -> Signature:
     """The signature of the residual of `fitted`, given its test for structure, the drifts over the session, and whether
     repeats differ by what is no noise."""
     top = remainder.largest
@@ -55,7 +55,7 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
     if drifts:
         depends_on.append("order of the session")
     return Signature(
-        experiments, tuple(depends_on), tuple(dependences), _sentence(places, remainder, dependences, drifts, unshared)
+        experiments, tuple(depends_on), tuple(dependences), _sentence(places, remainder, dependences, drifts, besides)
     )
 
 
@@ -130,8 +130,8 @@ def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
-def _sentence(places, remainder: Remainder, dependences, drifts, unshared: bool) -> str:
-    if not places and not drifts and not unshared:
+def _sentence(places, remainder: Remainder, dependences, drifts, besides: str) -> str:
+    if not places and not drifts and not besides:
         return "The residual contains nothing beyond the differences between repeats."
     parts = []
     if places:
@@ -147,10 +147,8 @@ def _sentence(places, remainder: Remainder, dependences, drifts, unshared: bool)
         )
     if places and not dependences:
         parts.append("No single quantity of the model explains it.")
-    if unshared:
-        parts.append(
-            "What repeats differ by is no noise: an effect explains it that has values of its own in every trial."
-        )
+    if besides:
+        parts.append(besides)
     if drifts:
         parts.append(
             f"{', '.join(d.parameter for d in drifts)} drift{'s' if len(drifts) == 1 else ''} over the session."

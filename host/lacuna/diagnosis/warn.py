@@ -5,6 +5,7 @@ from __future__ import annotations
 from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import uncertainty
 
 _NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably absorbs model error
@@ -37,9 +38,9 @@ def _parameters(fitted: Fit) -> list[str]:
         for e in known.estimates
         if e.implausible and not e.at_bound
     ]
-    for direction in known.undetermined:
-        found.append(f"The data do not determine a combination of {_listed(list(direction))}.")
-    return found
+    # between its data a learnt curve is what its prior makes of it, in any number of directions
+    own = [[name for name in direction if not is_learnt(name)] for direction in known.undetermined]
+    return [*found, *(f"The data do not determine a combination of {_listed(names)}." for names in own if names)]
 
 
 def _strayed(fits: list[Fit]) -> list[str]:

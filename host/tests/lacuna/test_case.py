@@ -55,6 +55,16 @@ def test_a_fit_that_plain_least_squares_lead_astray_is_not_what_a_verdict_rests_
     assert (case.converged(candidate) is ended) is believed
 
 
+def test_what_a_better_explanation_takes_away_matters_whatever_repeats_share(case, monkeypatch):
+    """A tenth of the floor, RMS, of the noise alone is no more than is relevant."""
+    right = case.judge(case.fit_base(1))
+    a_little, much = (case.judge(moved(right.fitted, by)) for by in (0.003, 0.3))
+    monkeypatch.setattr(Case, "converged", lambda self, candidate: candidate.fitted)
+    assert not case.outdone(right, much)
+    assert not case.outdone(a_little, right)
+    assert case.outdone(much, right)
+
+
 def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
     right = case.judge(case.fit_base(1))
     astray = case.judge(moved(right.fitted, 0.3))
