@@ -96,9 +96,10 @@ class Policy:
     )
     lost: float = _rule(
         2.0,
-        "floors, RMS",
-        "if the base model leaves more, and no effect explains enough from there, its fit may be so wrong that the"
-        " missing effect does not improve it: effects are fitted again from the initial values",
+        "floors, RMS, on trials not fitted",
+        "if the base model leaves more there, large residuals at their full size, and no effect explains enough from"
+        " there, its fit may be so wrong that the missing effect does not improve it: effects are fitted again from the"
+        " initial values",
         "simulation",
     )
 

@@ -221,7 +221,7 @@ def _sketched_afar(before: Candidate, near, ranked: Sequence[Profile], split, en
     too, since a base model that makes up for what it lacks may leave the effect no room. Where it leaves so much that
     it may be in the wrong minimum, effects are begun anew."""
     count = _SKETCHED_TWICE[1]
-    if before.rms > policy.lost:
+    if before.checked_error > (0, policy.lost):
         fresh = anew(before.fitted, ranked, policy, crew)
         begun = {fitted.structure.effects for fitted, _ in fresh}
         most = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)

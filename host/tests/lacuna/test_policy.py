@@ -265,7 +265,9 @@ def test_effects_are_begun_anew_where_the_base_leaves_much(monkeypatch):
     system = hide({"coulomb.force_N": 0.6}, seed=5, withhold=["coulomb"])
     left = diagnose(system, policy=replace(POLICY, lost=1e6)).search
     assert begun == []
-    for lost, anew in ((1.01 * left.base.rms, False), (0.99 * left.base.rms, True)):
+    unpredicted, error = left.base.checked_error
+    assert not unpredicted
+    for lost, anew in ((1.01 * error, False), (0.99 * error, True)):
         diagnose(system, policy=replace(POLICY, lost=lost))
         assert bool(begun) is anew
 
