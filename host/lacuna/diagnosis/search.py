@@ -138,7 +138,7 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
             }
             freed = [reweighed(c, split, floor) for c in freed]
         before = min(tried[frozenset(c.effects)].excess for c in beam)
-        beam = _ranked(tried, size)[: _BEAM[size]]
+        beam = _best_to_grow(tried, size, split, floor)
         best = beam[0]
         if not enough(best) and case.may_be_lost(best):
             crew.say(f"fitting {' + '.join(best.effects)} from elsewhere, too")
@@ -158,6 +158,14 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
 
 def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate]:
     return sorted((c for s, c in tried.items() if len(s) == size), key=lambda c: c.cost)
+
+
+def _best_to_grow(tried: dict[frozenset[str], Candidate], size: int, split: Split, floor: NoiseFloor):
+    """The beam, each with the derivatives that growing it takes: some may have come up as they were weighed again."""
+    for candidate in _ranked(tried, size)[: _BEAM[size]]:
+        if not candidate.fitted.solution.sensitivities:
+            tried[frozenset(candidate.effects)] = reweighed(candidate, split, floor)
+    return _ranked(tried, size)[: _BEAM[size]]
 
 
 def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:

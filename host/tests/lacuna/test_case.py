@@ -14,12 +14,14 @@ from lacuna.diagnosis.candidate import (
     anew,
     finish_elsewhere,
     finished_afresh,
+    judge,
     profiles,
 )
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.search import _best_to_grow
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.graduated import fit_isolated
@@ -111,6 +113,17 @@ class Bench(ToySystem):
 
     def isolates(self, trial):
         return trial.experiment == "steps"
+
+
+def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
+    system = hide({"delay.delay_s": 0.03}, seed=32)
+    split = split_trials(system.trials, system.spare())
+    base = Case(system, split, POLICY, 0).fit_base(1)
+    floor = base.problem.floor
+    bare = judge(reweigh(fit(Structure(system, ("delay",)), split.fit, floor), floor, max_iterations=0), split)
+    assert not bare.fitted.solution.sensitivities
+    (grown,) = _best_to_grow({frozenset(["delay"]): bare}, 1, split, floor)
+    assert profiles(grown.fitted, ["coulomb"], split, floor, NOBODY)
 
 
 def test_effects_that_isolated_trials_cannot_show_are_begun_anew_where_the_others_leave_more():
