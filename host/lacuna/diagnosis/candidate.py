@@ -13,7 +13,7 @@ from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.residual_error import at_full_size
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, spread_starts, starting_point
+from lacuna.estimation.fit import Fit, best_of, evaluate_on, fit, renewed, spread_starts, starting_point
 from lacuna.estimation.graduated import Isolated, fit_isolated, fit_together, solve_graduated
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
@@ -29,6 +29,7 @@ _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of th
 _FOLLOWED = 4  # of those begun anew, the ones that are followed to the end
 _NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
+_CONTINUED = 1e-3  # of the cost: where a refit without some effect may stop
 _ELSEWHERE = 2  # further sizes that a refit is begun at
 _SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
@@ -278,6 +279,28 @@ def finished_afresh(candidate: Candidate, split: Split, seed: int, crew: Crew) -
     found = renewed(problem, solve(problem, found.point, **_REFIT), **_REFIT)
     best = best_of(problem, [finished.solution, found])
     return min(candidate, judge(best, split, near=candidate.checked), key=lambda c: c.cost)
+
+
+def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split) -> Candidate:
+    """`candidate` with these of its effects only, fitted from where it stands."""
+    parent = candidate.fitted
+    structure = Structure(parent.structure.system, tuple(e for e in candidate.effects if e in effects))
+    start = [starting_point(parent, structure)]
+    fitted = fit(structure, split.fit, parent.problem.floor, starts=start, relative=_CONTINUED)
+    return judge(fitted, split, near=candidate.checked)
+
+
+def led_back(base: Candidate, larger: Sequence[Candidate], split: Split) -> Candidate:
+    """The better of `base` and its refits from where the fits with an effect ended: with one, whichever, the base's
+    parameters may have left a wrong minimum that they were in without it."""
+    problem, costs = base.fitted.problem, {}
+    for one in larger:
+        start = problem.start(starting_point(one.fitted, base.fitted.structure), one.fitted.solution.point.nuisances)
+        costs[one] = cost_of(problem, start)
+    nearest = min(costs, key=costs.get, default=None)
+    if nearest is None or costs[nearest] > _NEAR * base.fitted.cost:
+        return base
+    return min(base, refitted_without(nearest, (), split), key=lambda c: c.cost)
 
 
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:

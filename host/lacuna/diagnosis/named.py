@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Choice, dispersion_of, weigh, worth_adding
 from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search
-from lacuna.estimation.fit import fit, starting_point
-from lacuna.estimation.structure import Structure
 from lacuna.system import Effect
 
 _NEAREST = 5
@@ -56,7 +53,7 @@ def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
     idle = [e for e in choice.candidate.effects if _may_be_absent(library[e], within)]
     for least in sorted(idle, key=lambda e: choice.probability[e]):
         rest = tuple(e for e in choice.candidate.effects if e != least)
-        refitted = _refitted_without(case, choice.candidate, rest)
+        refitted = refitted_without(choice.candidate, rest, case.split)
         # what was tried of these effects may have ended in another minimum than they have in company
         smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
         # intervals are wide where fits end in several places; that the effect is there may still be sure
@@ -120,21 +117,13 @@ def _shares(case: Case, found: Search, choice: Choice) -> list[tuple[str, float]
                 ahead[effect] = closes(case.on_known(choice.explanation))
                 continue
             smaller = found.with_effects((*chosen, effect))
-            smaller = smaller or _refitted_without(case, candidate, (*chosen, effect))
+            smaller = smaller or refitted_without(candidate, (*chosen, effect), case.split)
             ahead[effect] = closes(smaller.fitted)
         best = max(ahead, key=ahead.get)
         shares.append((best, ahead[best] - closed))
         chosen, closed = (*chosen, best), ahead[best]
         rest.remove(best)
     return shares
-
-
-def _refitted_without(case: Case, candidate: Candidate, effects: Sequence[str]) -> Candidate:
-    """`candidate` with these of its effects only, fitted from where it stands."""
-    parent = candidate.fitted
-    structure = Structure(parent.structure.system, tuple(e for e in candidate.effects if e in effects))
-    start = [starting_point(parent, structure)]
-    return case.judge(fit(structure, case.split.fit, parent.problem.floor, starts=start, relative=1e-3))
 
 
 def _form(effect: Effect, choice: Choice) -> str:

@@ -16,6 +16,7 @@ from lacuna.diagnosis.candidate import (
     finished_afresh,
     from_initial_guess,
     judge,
+    led_back,
     profiles,
     sketches,
 )
@@ -126,6 +127,14 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
     for size in range(1, LARGEST_SET + 1):
         if not _grow(beam, library, split, floor, tried, enough, policy, crew):
             break
+        if size == 1 and (better := _led_out(tried, split, policy)):
+            crew.say("the base model was in a wrong minimum: from the better one")
+            screened, tried[frozenset()] = screen(better.fitted, split, floor), better
+            if enough(better):
+                break
+            found = {frozenset(): better}
+            _grow([better], library, split, floor, found, enough, policy, crew)
+            tried |= {s: min(c, tried.get(s, c), key=lambda c: c.cost) for s, c in found.items()}
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
         if lower.share_of(floor) < _LOWER:
             floor = lower
@@ -154,6 +163,14 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
                 break
         beam = [c for c in beam if c.excess <= policy.hopeful * best.excess]
     return Search(tried[frozenset()], floor, tuple(tried.values()), tuple(screened), tuple(freed))
+
+
+def _led_out(tried: dict[frozenset[str], Candidate], split: Split, policy: Policy) -> Candidate | None:
+    """The base model from where the fits with an effect lead it, if that explains more: then what these seemed to
+    explain was the base fit's failure, or some of it."""
+    base = tried[frozenset()]
+    better = led_back(base, _ranked(tried, 1), split)
+    return better if base.cost - better.cost > max(policy.promising * base.excess, _LEAST) else None
 
 
 def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate]:
@@ -187,17 +204,18 @@ def _grow(
     """Every parent of the beam with one effect more: the most promising of all, with equal effort."""
     size = len(beam[0].effects) + 1
     profiled: dict[frozenset[str], Profile] = {}
+    effects = beam[0].fitted.structure.system.effects
     for parent in beam:
         fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
         if parent.effects:
             gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
-            effects = parent.fitted.structure.system.effects
             # a regression knows nothing of values that each trial has of its own, nor of what does nothing as yet
             blind = [e for e in fresh if effects[e].own or effects[e].apart]
             fresh = [*blind, *sorted((e for e in fresh if e not in blind), key=lambda e: -gains[e])[:_PROFILED]]
         least = policy.promising * max(parent.fitted.cost - 0.5 * effective_samples(parent.fitted), 0.0)
         for found in profiles(parent.fitted, fresh, split, floor, crew):
-            if parent.effects and parent.fitted.cost - found.cost < least:
+            # what does nothing as yet may need the rest to give way first
+            if parent.effects and parent.fitted.cost - found.cost < least and not effects[found.effect].apart:
                 continue
             same = frozenset(found.problem.structure.effects)
             if same not in profiled or found.cost < profiled[same].cost:

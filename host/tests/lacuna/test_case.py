@@ -15,13 +15,14 @@ from lacuna.diagnosis.candidate import (
     finish_elsewhere,
     finished_afresh,
     judge,
+    led_back,
     profiles,
 )
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
-from lacuna.diagnosis.search import _best_to_grow
+from lacuna.diagnosis.search import _best_to_grow, search
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.graduated import fit_isolated
@@ -106,6 +107,23 @@ def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):
     assert len(again.solution.sensitivities) == len(case.split.fit)
     basis, remaining = remaining_after(bare)
     assert np.abs(basis.T @ remaining).max() < 1e-6 * np.linalg.norm(remaining)
+
+
+def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case):
+    right = case.judge(case.fit_base(1))
+    floor = right.fitted.problem.floor
+    delayed = case.judge(fit(Structure(case.system, ("delay",)), case.split.fit, floor))
+    astray = case.judge(moved(right.fitted, 0.3))
+    assert led_back(astray, [delayed], case.split).cost < right.cost + 1.0
+    assert led_back(astray, [], case.split) is astray
+    assert led_back(right, [delayed], case.split).cost <= right.cost
+
+
+def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case):
+    right = case.judge(case.fit_base(1))
+    found = search(case, case.judge(moved(right.fitted, 0.3)), enough=case.suffices, crew=NOBODY)
+    assert found.base.cost < right.cost + 1.0
+    assert case.suffices(found.base)
 
 
 class Bench(ToySystem):
