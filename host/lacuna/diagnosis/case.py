@@ -12,7 +12,7 @@ from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, refit_on, released, renewed, spread_starts
+from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, foreseen, refit_on, released, renewed, spread_starts
 from lacuna.estimation.intervals import intervals
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.settle import settle
@@ -107,27 +107,28 @@ class Case:
             self.nearly(candidate)
             and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
             and not self.remainder(self.converged(candidate)).matters
-            and not self.hides(candidate)
+            and not self.hidden(candidate)
         )
 
     @_once
-    def hides(self, candidate: Candidate) -> bool:
-        """Whether repeats differ by something that matters and is no noise: what an effect explains that has values of
-        its own in every trial. Nothing of it need be shared, and the floor then contains it."""
-        library, crew = self.system.effects, Crew(lambda _: None)
-        parent = candidate.fitted
-        own = [
+    def hidden(self, candidate: Candidate) -> str | None:
+        """An effect that takes away what matters though repeats need not share it, so that the floor contains it: one
+        that has values of its own in every trial, or one that the parameters shut out (`Effect.apart`), whose part the
+        nuisances of each run take over."""
+        library, crew, parent = self.system.effects, Crew(lambda _: None), candidate.fitted
+        able = [
             name
             for name, effect in library.items()
-            if effect.own and name not in candidate.effects and helps_at_once(parent, name, self.policy.gain)
+            if name not in candidate.effects
+            and (effect.apart or (effect.own and helps_at_once(parent, name, self.policy.gain)))
         ]
-        for fitted, _ in sketches(profiles(parent, own, self.split, parent.problem.floor, crew), crew):
+        least = self.policy.least_gain(1, candidate.pieces)
+        for fitted, profile in sketches(profiles(parent, able, self.split, parent.problem.floor, crew), crew):
             other = judge(fitted, self.split, near=candidate.checked)
-            gained = candidate.cost - other.cost
             both = (candidate.fitted, other.fitted), (candidate.checked, other.checked)
-            if gained > self.policy.gain and self._exceeds(*both):
-                return True
-        return False
+            if candidate.cost - other.cost > least and self._exceeds(*both):
+                return profile.effect
+        return None
 
     def outdone(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by
@@ -139,9 +140,10 @@ class Case:
         return self._exceeds(*both)
 
     def _exceeds(self, *both: tuple[Fit, Fit]) -> bool:
-        """Whether the first fit of any pair leaves by more than is relevant more than the second."""
-        worst = max(excess_over(mine, others, self.system.accuracy) for mine, others in both)
-        return worst > self.policy.relevance
+        """Whether the first fit of any pair leaves by more than is relevant more than the second, or would have left so
+        if a run's factors had to be foreseen."""
+        told = [pair for mine, others in both for pair in ((mine, others), (foreseen(mine), foreseen(others)))]
+        return max(excess_over(*pair, self.system.accuracy) for pair in told) > self.policy.relevance
 
     @_once
     def nearly(self, candidate: Candidate) -> bool:
@@ -150,7 +152,7 @@ class Case:
 
     def may_be_lost(self, candidate: Candidate) -> bool:
         """Whether what an explanation leaves may be its fit's failure."""
-        return self.nearly(candidate) and not self.suffices(candidate) and not self.hides(candidate)
+        return self.nearly(candidate) and not self.suffices(candidate)
 
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may

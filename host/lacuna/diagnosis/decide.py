@@ -37,18 +37,25 @@ class Choice:
         return self.freed or self.candidate
 
 
-def choose(search: Search, split: Split, policy: Policy, suffices: Callable[[Candidate], bool]) -> Choice:
-    """The set that explains best, no larger than the evidence carries; nothing is added to one that `suffices`. Another
-    effect must explain more than the chosen ones do in a form of their own."""
+def choose(
+    search: Search,
+    split: Split,
+    policy: Policy,
+    suffices: Callable[[Candidate], bool],
+    outdone: Callable[[Candidate, Candidate], bool] = lambda held, better: False,
+) -> Choice:
+    """The set that explains best, no larger than the evidence carries. Nothing is added to one that `suffices`, but
+    what it is `outdone` by. Another effect must explain more than the chosen ones do in a form of their own."""
     dispersion = dispersion_of(search.tried)
     chosen = held = search.base
-    while not suffices(held):
+    while True:
         larger = [
             c
             for c in search.tried
             if len(c.effects) > len(chosen.effects)
-            and worth_adding(held, c, dispersion, policy)
-            and (_share(held, c, search.base) > policy.share_of_gap or suffices(c))
+            and _beyond_doubt(held, c, dispersion, policy)
+            and (_closes_much(held, c, search.base, policy) or suffices(c))
+            and (not suffices(held) or outdone(held, c))
         ]
         if not larger:
             break
@@ -67,15 +74,29 @@ def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
 
 
 def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:
-    """Whether the larger explanation is better beyond the doubt of noise and remaining misfit, also on trials that it
-    was not fitted to, and closes a share of what was left for every effect more."""
-    extra = len(larger.effects) - len(smaller.effects)
+    """Whether the larger explanation is better beyond the doubt of noise and remaining misfit, and closes a share of
+    what was left for every effect more."""
+    return _beyond_doubt(smaller, larger, dispersion, policy) and _closes_its_share(smaller, larger, policy)
+
+
+def _beyond_doubt(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:
+    """Better by more than noise and remaining misfit make of nothing, also on trials that it was not fitted to."""
     gain = (smaller.cost - larger.cost) / dispersion
     unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
+    least = policy.least_gain(len(larger.effects) - len(smaller.effects), smaller.pieces)
+    return gain > least and unseen > policy.unseen_gain * least and larger.checked_error < smaller.checked_error
+
+
+def _closes_its_share(smaller: Candidate, larger: Candidate, policy: Policy) -> bool:
+    """Whether each effect more closes a share of what the smaller explanation leaves."""
+    extra = len(larger.effects) - len(smaller.effects)
     share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
-    least = extra * max(policy.gain, policy.gain_per_piece * smaller.pieces)
-    better = unseen > policy.unseen_gain * least and larger.checked_error < smaller.checked_error
-    return gain > least and better and share > min(extra * policy.share, 0.9)
+    return share > min(extra * policy.share, 0.9)
+
+
+def _closes_much(smaller: Candidate, larger: Candidate, base: Candidate, policy: Policy) -> bool:
+    """The same, and each effect more closes a share of the base model's gap, too."""
+    return _closes_its_share(smaller, larger, policy) and _share(smaller, larger, base) > policy.share_of_gap
 
 
 def dispersion_of(tried: Sequence[Candidate]) -> float:

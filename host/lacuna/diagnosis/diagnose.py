@@ -104,7 +104,7 @@ def diagnose(
     crew.say("fitting the base model")
     base = case.fit_base(starts)
     found, stopped = _explanations(case, base, crew)
-    choice = drop_absent(case, found, choose(found, split, policy, case.suffices))
+    choice = drop_absent(case, found, choose(found, split, policy, case.suffices, case.outdone))
     judged = _judged(case, found, choice)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
@@ -133,14 +133,14 @@ def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
     besides = "" if remainder.matters else _besides(case, choice, found)
-    verdict = _verdict(case, choice, found, remainder.matters or bool(besides), drifts)
+    verdict = _verdict(case, choice, found, remainder.matters, besides, drifts)
     explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
     return _Judged(verdict, base, explained, remainder, left, besides, floor_of(chosen, case.split), drifts)
 
 
 def _besides(case: Case, choice: Choice, found: Search) -> str:
-    if case.hides(found.base):
-        return "What repeats differ by is no noise: an effect explains it that has values of its own in every trial."
+    if hidden := case.hidden(found.base):
+        return f"What repeats differ by, or what the nuisances of each take up, is no noise: {hidden} would explain it."
     if _supported(case, choice) and case.outdone(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
         return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
@@ -204,12 +204,14 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
         return finished.search(first, case.split), True
 
 
-def _verdict(case: Case, choice: Choice, found: Search, matters: bool, drifts: tuple[Drift, ...]) -> str:
-    if not matters:
+def _verdict(case: Case, choice: Choice, found: Search, matters: bool, besides: str, drifts: tuple[Drift, ...]) -> str:
+    if not matters and not besides:
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
     if not _supported(case, choice):
         return "unexplained"
-    return "identified" if case.closed(choice.explanation, found.base) >= case.policy.half else "unexplained"
+    # of what passes for noise there is no gap to close half of
+    explains = case.closed(choice.explanation, found.base) >= case.policy.half
+    return "identified" if explains or (besides and case.suffices(choice.explanation)) else "unexplained"
 
 
 def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew: Crew | None) -> Fit:

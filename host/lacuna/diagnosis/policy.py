@@ -108,6 +108,10 @@ class Policy:
         0.1, "of what is left on unseen trials beyond noise", "what one more curve must remove", "simulation"
     )
 
+    def least_gain(self, extra: int, pieces: float) -> float:
+        """Log-likelihood over dispersion that `extra` effects more must gain on so many pieces of data."""
+        return extra * max(self.gain, self.gain_per_piece * pieces)
+
     @classmethod
     def table(cls) -> list[tuple[str, float, str, str, str]]:
         """(name, value, unit, reason, origin) of every rule."""

@@ -170,6 +170,19 @@ def released(fitted: Fit) -> Fit:
     return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
 
 
+def foreseen(fitted: Fit) -> Fit:
+    """The fit with each run's factors of parameters (`Parameter.factor_of`) at their means: what could be said of a
+    run before it is made."""
+    problem, point = fitted.problem, fitted.solution.point
+    expected = tuple(
+        np.array([p.value if p.factor_of else value for value, p in zip(values, parameters, strict=True)])
+        for values, parameters in zip(point.nuisances, problem.nuisances, strict=True)
+    )
+    point = replace(point, nuisances=expected)
+    solution = replace(fitted.solution, point=point, cost=cost_of(problem, point))
+    return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
+
+
 def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     """The same structure and trials against another floor, by a few steps with the derivatives that there are; without
     any steps it has no derivatives either."""

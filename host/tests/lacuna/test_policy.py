@@ -154,10 +154,10 @@ def tried(effects, excess, *, unseen=0.5, conditions=8):
     return Tried(effects, fitted, (half + unseen * excess / conditions,) * conditions)
 
 
-def chosen(*candidates, suffices=lambda c: c.excess < 1.0, policy=POLICY):
+def chosen(*candidates, suffices=lambda c: c.excess < 1.0, policy=POLICY, **more):
     base = candidates[0]
     split = SimpleNamespace(unseen=(), select=base.checked.problem.trials)
-    return choose(Search(base, NoiseFloor({}), tuple(candidates), ()), split, policy, suffices)
+    return choose(Search(base, NoiseFloor({}), tuple(candidates), ()), split, policy, suffices, **more)
 
 
 def test_gain_an_effect_must_bring_more_than_chance():
@@ -215,6 +215,18 @@ def test_a_further_effect_that_leaves_nothing_is_named_however_little_it_closes(
 def test_nothing_is_added_to_what_suffices():
     base, one, two = tried((), 1000.0), tried(("a",), 400.0), tried(("a", "b"), 0.0)
     assert chosen(base, one, two, suffices=lambda c: c is one or c is two).candidate is one
+
+
+def test_what_outdoes_an_explanation_that_suffices_is_named():
+    base, one, two = tried((), 1000.0), tried(("a",), 400.0), tried(("b",), 300.0)
+    assert chosen(base, one, two, suffices=lambda c: True).candidate is base
+    assert chosen(base, one, two, suffices=lambda c: True, outdone=lambda held, c: c is one).candidate is one
+
+
+def test_an_effect_that_leaves_nothing_need_not_close_a_share_of_what_the_floor_is_wrong_by():
+    base, one = tried((), 1000.0), tried(("a",), 1000.0 * (1 - 0.5 * POLICY.share))
+    assert chosen(base, one, suffices=lambda c: False).candidate is base
+    assert chosen(base, one, suffices=lambda c: c is one).candidate is one
 
 
 def test_an_effect_without_which_unfitted_conditions_are_predicted_as_well_is_not_supported():
