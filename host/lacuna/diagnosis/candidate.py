@@ -10,7 +10,7 @@ import numpy as np
 
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import POLICY, Policy
-from lacuna.diagnosis.residual_error import at_full_size
+from lacuna.diagnosis.residual_error import at_full_size, rms
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, best_of, evaluate_on, fit, renewed, spread_starts, starting_point
@@ -85,6 +85,12 @@ class Candidate:
             for fit in (self.fitted, self.checked)
             for trial, r in zip(fit.problem.trials, fit.problem.residuals(fit.solution.point), strict=True)
         }
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        """Of each trial that it was not fitted to, by name, the RMS residual, large ones at their full size."""
+        trials = self.checked.problem.trials
+        return {t.name: rms([z]) for t, z in zip(trials, self.checked.scaled_residuals(), strict=True)}
 
     @property
     def excess(self) -> float:

@@ -117,16 +117,27 @@ def _supported(chosen: Candidate, search: Search, split: Split, dispersion: floa
     unseen = split.unseen or split.select
     for effect in chosen.effects:
         smaller = search.with_effects([e for e in chosen.effects if e != effect])
-        if smaller is None:
-            continue
-        gain = (_cost_on(smaller, unseen) - _cost_on(chosen, unseen)) / dispersion
-        if gain <= policy.unseen_gain * policy.gain:
+        if smaller is not None and not _predicts_better(chosen, smaller, unseen, dispersion, policy):
             return _supported(smaller, search, split, dispersion, policy)
     return chosen
 
 
+def _predicts_better(chosen: Candidate, smaller: Candidate, unseen, dispersion: float, policy: Policy) -> bool:
+    """By likelihood, or by a share of what is left, large residuals at their full size: these are few, and count for
+    little where they are compressed."""
+    gain = (_cost_on(smaller, unseen) - _cost_on(chosen, unseen)) / dispersion
+    before, after = _square_on(smaller, unseen), _square_on(chosen, unseen)
+    return gain > policy.unseen_gain * policy.gain or before - after > policy.share * max(
+        before - 1.0, policy.relevance
+    )
+
+
 def _cost_on(candidate: Candidate, trials) -> float:
     return sum(candidate.by_trial[trial.name] for trial in trials)
+
+
+def _square_on(candidate: Candidate, trials) -> float:
+    return float(np.mean([candidate.errors[trial.name] ** 2 for trial in trials]))
 
 
 def _weights(search: Search, chosen: Candidate, dispersion: float) -> dict[tuple[str, ...], float]:

@@ -135,6 +135,12 @@ class Tried:
         return 0, np.sqrt(np.mean(self.checked_costs) + self.beyond)
 
     @property
+    def errors(self):
+        costs = zip(self.checked.problem.trials, self.checked_costs, strict=True)
+        each = self.pieces / len(self.trials)
+        return {t.name: np.sqrt(2.0 * cost / each + self.beyond) for t, cost in costs}
+
+    @property
     def cost(self):
         return sum(self.fitted_costs) + sum(self.checked_costs)
 
@@ -154,9 +160,10 @@ def tried(effects, excess, *, unseen=0.5, conditions=8):
     return Tried(effects, fitted, (half + unseen * excess / conditions,) * conditions)
 
 
-def chosen(*candidates, suffices=lambda c: c.excess < 1.0, policy=POLICY, **more):
+def chosen(*candidates, suffices=lambda c: c.excess < 1.0, policy=POLICY, unseen=0, **more):
     base = candidates[0]
-    split = SimpleNamespace(unseen=(), select=base.checked.problem.trials)
+    trials = base.checked.problem.trials
+    split = SimpleNamespace(unseen=trials[len(trials) - unseen :], select=trials[: len(trials) - unseen])
     return choose(Search(base, NoiseFloor({}), tuple(candidates), ()), split, policy, suffices, **more)
 
 
@@ -233,6 +240,15 @@ def test_an_effect_without_which_unfitted_conditions_are_predicted_as_well_is_no
     base, one = tried((), 1000.0), tried(("a",), 400.0)
     helped_only_where_fitted = Tried(("a", "b"), tuple(c - 30.0 for c in one.fitted_costs), one.checked_costs)
     assert chosen(base, one, helped_only_where_fitted).candidate is one
+
+
+def test_an_effect_that_takes_large_residuals_away_is_supported_though_compressed_they_cost_little():
+    base, one = tried((), 1000.0), tried(("a",), 400.0)
+    fewer = tuple(c - 30.0 for c in one.fitted_costs)
+    two = Tried(("a", "b"), fewer, (*(c - 10.0 for c in one.checked_costs[:4]), *one.checked_costs[4:]))
+    assert chosen(base, one, two, unseen=4).candidate is one
+    one.beyond = 10.0
+    assert chosen(base, one, two, unseen=4).candidate is two
 
 
 def test_confusable_an_exchange_is_named_where_it_is_probable():
