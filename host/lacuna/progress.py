@@ -8,9 +8,9 @@ from typing import TextIO
 
 _QUIET_S = 2.0  # what is over before then says nothing
 # At most, by the size of the sets that are tried: parents grown, effects tried on each (None: the whole library),
-# and explanations refitted: quickly, from the initial guess, and to convergence. In the first stage each effect may
+# and explanations refitted: quickly, from the initial guess, and to convergence. In the first two stages effects may
 # also be begun anew.
-_STAGES = ((2, None, 19), (3, 7, 14), (3, 7, 10))
+_STAGES = ((2, None, 24), (3, 7, 52), (3, 7, 10))
 
 
 def most_steps(effects: int) -> int:

@@ -9,29 +9,28 @@ from functools import cached_property
 import numpy as np
 
 from lacuna.diagnosis.crew import Crew
-from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import at_full_size, rms
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, best_of, evaluate_on, fit, renewed, spread_starts, starting_point
-from lacuna.estimation.graduated import Isolated, fit_isolated, fit_together, solve_graduated
+from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
-from lacuna.estimation.uncertainty import effective_samples, pieces_of
+from lacuna.estimation.uncertainty import effective_samples
 from lacuna.system import Effect, Parameter
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
 _ABSURD = 10.0  # times the parent's cost: of a size that begins beyond, nothing is to be hoped
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
-_FOLLOWED = 4  # of those begun anew, the ones that are followed to the end
 _NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
 _CONTINUED = 1e-3  # of the cost: where a refit without some effect may stop
 _ELSEWHERE = 2  # further sizes that a refit is begun at
-_SKETCH = {"max_iterations": 12, "relative": 3e-3}
+SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
 
 
@@ -127,11 +126,6 @@ class Profile:
     cost: float
     points: tuple[Point, ...]
 
-    def at_typical_size(self) -> np.ndarray:
-        """The base model's own start, with the effect as large as it usually is."""
-        structure = self.problem.structure
-        return structure.values(structure.theta(structure.start()))
-
     def from_initial_guess(self) -> np.ndarray:
         """The base model's initial guess, with the effect as it is at the best point: what has been fitted without the
         effect may be in the wrong minimum."""
@@ -201,50 +195,12 @@ def from_initial_guess(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> l
     return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, again, strict=True)]
 
 
-def anew(parent: Fit, profiled: Sequence[Profile], policy: Policy, crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Sketches that owe nothing to `parent`: from the initial guess, the effect at its typical size, the best first.
-    The trials that isolate parameters go first; the few that take most away there are followed to the end, and so are
-    those that cannot be seen there where the other trials leave more."""
-    alone = fit_isolated(parent.problem, parent.structure.start())
-    names = [p.problem.structure.effects for p in profiled]
-    begun = crew.map("restarting with", names, fit_isolated, [(p.problem, p.at_typical_size()) for p in profiled])
-    leading = sorted(range(len(begun)), key=lambda k: begun[k].cost)[:_FOLLOWED]
-    most = min((1.0 - policy.promising) * alone.cost, policy.reach * begun[leading[0]].cost)
-    leading = [k for k in leading if begun[k].cost < most]
-    if _more_is_left_together(parent, alone):
-        leading += [k for k, p in enumerate(profiled) if k not in leading and not _is_isolated(p)]
-    jobs = [(profiled[k].problem, begun[k]) for k in leading]
-    found = crew.map("following up", [names[k] for k in leading], _sketched_further, jobs)
-    fits = [(best_of(profiled[k].problem, [solution]), profiled[k]) for k, solution in zip(leading, found, strict=True)]
-    return sorted(fits, key=lambda pair: pair[0].cost)
-
-
-def _more_is_left_together(parent: Fit, alone: Isolated) -> bool:
-    """Whether trials that do not isolate parameters leave more of the cost than those that do leave by themselves."""
-    isolates, floor = parent.structure.system.isolates, parent.problem.floor
-    pieces = sum(pieces_of(trial, floor) for trial in parent.problem.trials if isolates(trial))
-    left = parent.cost - 0.5 * effective_samples(parent)
-    return left > 2.0 * max(alone.cost - 0.5 * pieces, 0.0)
-
-
-def _is_isolated(profiled: Profile) -> bool:
-    """Whether a trial that isolates parameters can show the effect."""
-    structure, trials = profiled.problem.structure, profiled.problem.trials
-    effect = structure.system.effects[profiled.effect]
-    shown = [t for t in trials if not effect.experiments or t.experiment in effect.experiments]
-    return any(map(structure.system.isolates, shown))
-
-
 def _sketched(problem: Problem, start: Point) -> Solution:
-    return solve(problem, start, **_SKETCH)
+    return solve(problem, start, **SKETCH)
 
 
 def _sketched_graduated(problem: Problem, values: np.ndarray) -> Solution:
-    return solve_graduated(problem, values, **_SKETCH)
-
-
-def _sketched_further(problem: Problem, begun: Isolated) -> Solution:
-    return fit_together(problem, begun, **_SKETCH)
+    return solve_graduated(problem, values, **SKETCH)
 
 
 def finish(sketched: Fit) -> Fit:
@@ -266,7 +222,7 @@ def finish_elsewhere(finished: Fit, profiled: Profile, crew: Crew) -> Fit:
 
 def _finished_from(problem: Problem, point: Point, near: float) -> Solution:
     """Followed to the end where a quick refit comes near."""
-    sketched = solve(problem, point, **_SKETCH)
+    sketched = solve(problem, point, **SKETCH)
     return finish(best_of(problem, [sketched])).solution if sketched.cost < near else sketched
 
 
@@ -313,18 +269,24 @@ def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
     """Starting vectors: the parent's values, the effect at a grid of sizes of either sign."""
     described = structure.system.effects[effect]
     base = structure.parted(starting_point(parent, structure), effect)
-    at = [structure.names.index(name) for name in described.size_names]
-    vectors = []
-    for factor in described.start_factors:
-        for signs in _signs(described.parameters[: described.sizes]):
-            vector = base.copy()
-            for index, parameter, sign in zip(at, described.parameters, signs, strict=False):
-                size = described.absent + sign * factor * (parameter.value - described.absent)
-                vector[index] = np.clip(size, parameter.lower, parameter.upper)
-            vectors.append(vector)
+    vectors = [v for factor in described.start_factors for v in sized(structure, base, effect, factor)]
     if described.frequency is None:
         return vectors
     return [v for vector in vectors for v in _at_peaks(parent, structure, described, vector)]
+
+
+def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) -> list[np.ndarray]:
+    """The vector `base` with an effect at `factor` times its typical size, of either sign."""
+    described = structure.system.effects[effect]
+    parameters = described.parameters[: described.sizes]
+    at, vectors = [structure.names.index(name) for name in described.size_names], []
+    for signs in _signs(parameters):
+        vector = base.copy()
+        for index, parameter, sign in zip(at, parameters, signs, strict=True):
+            size = described.absent + sign * factor * (parameter.value - described.absent)
+            vector[index] = np.clip(size, parameter.lower, parameter.upper)
+        vectors.append(vector)
+    return vectors
 
 
 def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndarray) -> list[np.ndarray]:

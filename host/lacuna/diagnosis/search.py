@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lacuna.diagnosis.anew import Anew
 from lacuna.diagnosis.candidate import (
     Candidate,
     Profile,
-    anew,
     finish,
     finish_elsewhere,
     finished_afresh,
@@ -123,9 +123,9 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     beam = [first]
     freed: list[Candidate] = []
-    library = list(base.structure.system.effects)
+    afar = Anew(base.structure.system, split, policy, crew)
     for size in range(1, LARGEST_SET + 1):
-        if not _grow(beam, library, split, floor, tried, enough, policy, crew):
+        if not _grow(beam, afar, split, floor, tried, enough, policy, crew):
             break
         if size == 1 and (better := _led_out(tried, split, policy)):
             crew.say("the base model was in a wrong minimum: from the better one")
@@ -133,7 +133,7 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
             if enough(better):
                 break
             found = {frozenset(): better}
-            _grow([better], library, split, floor, found, enough, policy, crew)
+            _grow([better], afar, split, floor, found, enough, policy, crew)
             tried |= {s: min(c, tried.get(s, c), key=lambda c: c.cost) for s, c in found.items()}
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
         if lower.share_of(floor) < _LOWER:
@@ -199,14 +199,14 @@ def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thorough
 
 
 def _grow(
-    beam: Sequence[Candidate], library, split, floor, tried, enough, policy: Policy, crew: Crew
+    beam: Sequence[Candidate], afar: Anew, split, floor, tried, enough, policy: Policy, crew: Crew
 ) -> list[Candidate]:
     """Every parent of the beam with one effect more: the most promising of all, with equal effort."""
     size = len(beam[0].effects) + 1
     profiled: dict[frozenset[str], Profile] = {}
     effects = beam[0].fitted.structure.system.effects
     for parent in beam:
-        fresh = [e for e in library if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
+        fresh = [e for e in effects if e not in parent.effects and frozenset((*parent.effects, e)) not in tried]
         if parent.effects:
             gains = {s.effect: s.gain for s in screen(parent.fitted, split, floor)}
             # a regression knows nothing of values that each trial has of its own, nor of what does nothing as yet
@@ -222,11 +222,11 @@ def _grow(
                 profiled[same] = found
     ranked = sorted(profiled.values(), key=lambda p: p.cost)
     before = min(beam, key=lambda c: c.cost)
-    sketched = _sketched(before, ranked, split, enough, policy, crew)
+    sketched = _sketched(before, ranked, afar, split, enough, policy, crew)
     return _finish(before, sketched, _FINISHED[size], split, tried, enough, policy, crew)
 
 
-def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, policy: Policy, crew: Crew):
+def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, enough, policy: Policy, crew: Crew):
     """A quick refit of the most promising, the best first. Where one explains enough as it is (it restarts when it is
     finished), those that could reach it are refitted from the initial guess as well; where none does, the best few."""
     size = len(before.effects) + 1
@@ -236,19 +236,21 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], split, enough, polic
         reach = policy.reach * twice[0][0].cost
         far = from_initial_guess([pair for pair in twice[1:] if pair[0].cost < reach], crew)
     elif twice and not before.effects:
-        far = _sketched_afar(before, near, ranked, split, enough, policy, crew)
+        far = _sketched_afar(before, near, afar, split, enough, policy, crew)
     else:
         far = from_initial_guess(twice, crew)
+        if before.effects and before.checked_error > (0, policy.lost):
+            far += afar.follow(before)
     return _best_of_each([*near, *far])
 
 
-def _sketched_afar(before: Candidate, near, ranked: Sequence[Profile], split, enough, policy: Policy, crew: Crew):
+def _sketched_afar(before: Candidate, near, afar: Anew, split, enough, policy: Policy, crew: Crew):
     """Refits from the initial guess: of the best sketches and, if none of these explains enough then, of the others,
     too, since a base model that makes up for what it lacks may leave the effect no room. Where it leaves so much that
     it may be in the wrong minimum, effects are begun anew."""
     count = _SKETCHED_TWICE[1]
     if before.checked_error > (0, policy.lost):
-        fresh = anew(before.fitted, ranked, policy, crew)
+        fresh = afar.follow(before)
         begun = {fitted.structure.effects for fitted, _ in fresh}
         most = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
         again = [pair for pair in near[:count] if pair[0].structure.effects not in begun and pair[0].cost < most]

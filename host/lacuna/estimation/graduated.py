@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lacuna.estimation.problem import SHARP, Problem, View
-from lacuna.estimation.solve import RELATIVE, Solution, solve
+from lacuna.estimation.solve import RELATIVE, Solution, cost_of, solve
 
 _FAR, _NEARER, _CLOSE = View(1 / 20, 30.0, 30.0), View(1 / 60, 10.0, 30.0), View(1 / 200, 3.0, 30.0)
 _ISOLATED = (_FAR, _NEARER, _CLOSE)
@@ -69,6 +69,12 @@ def fit_together(problem: Problem, begun: Isolated, *, max_iterations: int, rela
     # alike: where it began stays
     best = found[0] if least > _BETTER * found[0].cost else min(found, key=lambda one: one.cost)
     return solve(problem, problem.start(best.point.values), max_iterations=max_iterations, relative=relative)
+
+
+def glance(problem: Problem, values: np.ndarray) -> float:
+    """What all trials cost at `values` from so far off that what comes at another time still counts."""
+    distant = problem.seen(_NEARER)
+    return cost_of(distant, distant.start(values))
 
 
 def _free(problem: Problem) -> tuple[int, ...]:

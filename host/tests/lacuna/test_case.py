@@ -10,8 +10,6 @@ from lacuna.diagnosis import candidate as candidate_module
 from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis.candidate import (
     Profile,
-    _more_is_left_together,
-    anew,
     finish_elsewhere,
     finished_afresh,
     judge,
@@ -25,7 +23,6 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.search import _best_to_grow, search
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, fit, reweigh
-from lacuna.estimation.graduated import fit_isolated
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
@@ -142,17 +139,3 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
     assert not bare.fitted.solution.sensitivities
     (grown,) = _best_to_grow({frozenset(["delay"]): bare}, 1, split, floor)
     assert profiles(grown.fitted, ["coulomb"], split, floor, NOBODY)
-
-
-def test_effects_that_isolated_trials_cannot_show_are_begun_anew_where_the_others_leave_more():
-    hidden = hide({"quadratic_drag.drag_Ns2_m2": 8.0}, seed=34)
-    late = replace(hidden.effects["quadratic_drag"], name="late_drag", experiments=("sweep",))
-    system = Bench(hidden.trials, {**hidden.effects, "late_drag": late})
-    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
-    base = case.fit_base(1)
-    effects = ("delay", "late_drag")
-    found = profiles(base, effects, case.split, base.problem.floor, NOBODY)
-    alone = fit_isolated(base.problem, base.structure.start())
-    assert _more_is_left_together(base, alone)
-    assert not _more_is_left_together(base, alone._replace(cost=1e9))
-    assert "late_drag" in {fitted.structure.effects[0] for fitted, _ in anew(base, found, POLICY, NOBODY)}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from toy import hide
 
-from lacuna.diagnosis import search
+from lacuna.diagnosis.anew import Anew
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import choose, weigh, worth_adding
@@ -289,7 +289,7 @@ def test_implausible_costs_as_stated_half_a_range_outside():
 
 def test_effects_are_begun_anew_where_the_base_leaves_much(monkeypatch):
     begun = []
-    monkeypatch.setattr(search, "anew", lambda parent, profiled, policy, crew: begun.append(len(profiled)) or [])
+    monkeypatch.setattr(Anew, "follow", lambda self, before: begun.append(before.effects) or [])
     system = hide({"coulomb.force_N": 0.6}, seed=5, withhold=["coulomb"])
     left = diagnose(system, policy=replace(POLICY, lost=1e6)).search
     assert begun == []

@@ -1,0 +1,118 @@
+"""What owes nothing to the fits before it: begun at the initial guess, judged from a distance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy import ToySystem, hide
+
+from lacuna.diagnosis.anew import Anew
+from lacuna.diagnosis.candidate import Candidate, judge
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.split import split_trials
+from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.solve import cost_of
+from lacuna.estimation.structure import Structure
+
+NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
+
+
+class Tangled(ToySystem):
+    """Every trial shows all parameters together."""
+
+    def isolates(self, trial):
+        return False
+
+
+class Bench(ToySystem):
+    """Steps isolate parameters; sweeps show all together."""
+
+    def isolates(self, trial):
+        return trial.experiment == "steps"
+
+
+class DragsInSweeps(Bench):
+    """Drag that steps do not show."""
+
+    def predict(self, theta, effects, trial, **how):
+        known = theta if trial.experiment == "sweep" else {**theta, "quadratic_drag.drag_Ns2_m2": 0.0}
+        return super().predict(known, effects, trial, **how)
+
+
+def bench(effects, seed) -> Case:
+    hidden = hide(effects, seed=seed)
+    system = Bench(hidden.trials, hidden.effects)
+    return Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+
+
+def lost(case: Case, effects=()) -> Candidate:
+    """A fit of these effects that is nowhere near, and continues from nothing."""
+    base = case.fit_base(1)
+    problem = Problem(Structure(case.system, effects), case.split.fit, base.problem.floor)
+    point = problem.start(problem.structure.values({"mass_kg": 4.0, "stiffness_N_m": 190.0, "damping_Ns_m": 19.0}))
+    solution = replace(base.solution, point=point, cost=cost_of(problem, point), sensitivities=())
+    fitted = Fit(problem, solution, 1, 1)
+    return Candidate(fitted, evaluate_on(fitted, case.split.judging))
+
+
+def begin(case: Case) -> Anew:
+    return Anew(case.system, case.split, POLICY, NOBODY)
+
+
+def test_of_single_effects_the_right_one_is_followed_whatever_the_base_fit_was():
+    case = bench({"delay.delay_s": 0.05}, 61)
+    best = min((fitted for fitted, _ in begin(case).follow(lost(case))), key=lambda fitted: fitted.cost)
+    assert best.structure.effects == ("delay",)
+    assert best.theta["delay.delay_s"] == pytest.approx(0.05, rel=0.1)
+
+
+def test_an_effect_that_isolated_trials_cannot_show_is_followed_where_all_together_do():
+    drag = {"quadratic_drag.drag_Ns2_m2": 8.0}
+    quiet, dragged = (hide(effects, seed=34) for effects in ({}, drag))
+    trials = [d if d.experiment == "sweep" else q for q, d in zip(quiet.trials, dragged.trials, strict=True)]
+    late = replace(quiet.effects["quadratic_drag"], experiments=("sweep",))
+    system = DragsInSweeps(tuple(trials), {**quiet.effects, "quadratic_drag": late})
+    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    best = min((fitted for fitted, _ in begin(case).follow(lost(case))), key=lambda fitted: fitted.cost)
+    assert best.structure.effects == ("quadratic_drag",)
+    assert best.theta["quadratic_drag.drag_Ns2_m2"] == pytest.approx(8.0, rel=0.2)
+
+
+def test_a_pair_is_begun_from_its_better_half_and_not_from_a_lost_fit():
+    case = bench({"delay.delay_s": 0.06, "cubic_spring.stiffness_N_m3": 8000.0}, 62)
+    found = [fitted for fitted, _ in begin(case).follow(lost(case, ("coulomb",)))]
+    best = min(found, key=lambda fitted: fitted.cost)
+    assert set(best.structure.effects) == {"delay", "cubic_spring"}
+    assert judge(best, case.split).checked_error < (0, 1.1)
+
+
+def test_where_no_trial_isolates_parameters_every_single_effect_is_followed_and_no_pair():
+    hidden = hide({"delay.delay_s": 0.05}, seed=63)
+    system = Tangled(hidden.trials, hidden.effects)
+    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    assert len(begin(case).follow(lost(case))) == len(system.effects)
+    assert begin(case).follow(lost(case, ("coulomb",))) == []
+
+
+def test_either_sign_of_an_effect_is_begun():
+    case = bench({"asymmetric_friction.difference_N": -0.8}, 64)
+    found = {fitted.structure.effects: fitted for fitted, _ in begin(case).follow(lost(case))}
+    assert found[("asymmetric_friction",)].theta["asymmetric_friction.difference_N"] == pytest.approx(-0.8, abs=0.1)
+
+
+def test_what_has_been_begun_is_weighed_again_against_another_floor():
+    case = bench({"delay.delay_s": 0.05}, 65)
+    before, anew = lost(case), begin(case)
+    anew.follow(before)
+    problem = before.fitted.problem
+    halved = replace(
+        problem.floor,
+        channels={key: replace(channel, sd=0.5 * channel.sd) for key, channel in problem.floor.channels.items()},
+    )
+    sharper = Fit(Problem(problem.structure, problem.trials, halved), before.fitted.solution, 1, 1)
+    followed = [fitted for fitted, _ in anew.follow(Candidate(sharper, before.checked))]
+    assert all(fitted.problem.floor is halved for fitted in followed)
+    assert np.isfinite([fitted.cost for fitted in followed]).all()
