@@ -82,7 +82,18 @@ class Bench:
 
 
 @pytest.fixture
-def bench(tmp_path) -> Iterator[Bench]:
+def as_from_a_terminal() -> Iterator[None]:
+    """Commands inherit what is ignored: under `nohup`, a closed terminal would end none of them."""
+    ignored = [n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is signal.SIG_IGN]
+    for number in ignored:
+        signal.signal(number, signal.SIG_DFL)
+    yield
+    for number in ignored:
+        signal.signal(number, signal.SIG_IGN)
+
+
+@pytest.fixture
+def bench(tmp_path, as_from_a_terminal) -> Iterator[Bench]:
     if not FIRMWARE.is_file():
         pytest.fail(f"{FIRMWARE} is missing: run `make test`, or `pio run -e uno` first")
     bench = Bench(tmp_path)
