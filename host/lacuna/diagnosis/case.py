@@ -116,6 +116,8 @@ class Case:
         that has values of its own in every trial, or one that the parameters shut out (`Effect.apart`), whose part the
         nuisances of each run take over."""
         library, crew, parent = self.system.effects, Crew(lambda _: None), candidate.fitted
+        if parent.structure.sites:  # nothing is grown on a learnt curve
+            return None
         able = [
             name
             for name, effect in library.items()

@@ -13,8 +13,9 @@ from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.split import split_trials
-from lacuna.estimation.fit import foreseen
-from lacuna.system import Effect, Parameter, Record, System
+from lacuna.estimation.fit import fit, foreseen
+from lacuna.estimation.structure import Structure
+from lacuna.system import CorrectionSite, Effect, Parameter, Record, System
 
 SCATTER = 0.01  # of the friction, from run to run
 SD = 0.02  # N
@@ -54,6 +55,11 @@ class Pulls(System):
 
     def sensor_noise(self, experiment, channel):
         return SD
+
+    @property
+    def correction_sites(self):
+        site = CorrectionSite("friction", "friction", "speed (mm/s)", "N", 0.0, 20.0, 0.05, experiments=())
+        return {site.name: site}
 
 
 def measured(fading_mm_s: float, seed: int) -> Pulls:
@@ -95,6 +101,13 @@ def test_an_effect_that_the_factors_of_each_run_take_up_is_found(fading_mm_s, se
     assert not left.matters, "nothing of it is left in the residual"
     assert data.case.hidden(data.base) == found
     assert data.case.suffices(data.base) is (found is None)
+
+
+def test_an_explanation_with_a_learnt_curve_is_asked_too():
+    data = Diagnosed(10.0, 7)
+    curved = Structure(data.system, (), ("friction",))
+    floor = data.base.fitted.problem.floor
+    assert data.case.hidden(data.case.judge(fit(curved, data.case.split.fit, floor))) is None
 
 
 @pytest.mark.parametrize(("fading_mm_s", "seed", "verdict"), [(10.0, 5, "identified"), (0.0, 6, "none")])
