@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +54,7 @@ class Anew:
         """Sketches of sets with one effect more than `before`: the few that promise most, if they promise to take their
         share away. Pairs are only begun where it is other trials that may have misled the fits of single effects; where
         no trial isolates parameters, nothing tells, and every single effect is followed."""
-        size, floor, isolates = len(before.effects) + 1, before.fitted.problem.floor, self._isolates
+        size, floor = len(before.effects) + 1, before.fitted.problem.floor
         if size > 2 or (size == 2 and not self._mixed):
             return []
         self._weigh(floor)
@@ -62,7 +63,7 @@ class Anew:
             seeds = [begun.problem.structure.effects for begun in self._leading(smaller)[:_SEEDS]]
             self._begin([(*seed, e) for seed in seeds for e in self.system.effects if e not in seed], floor)
         chosen = self._leading(size)
-        if any(isolates):
+        if any(self._isolates):
             most = (1.0 - self.policy.promising) * self._leading(size - 1)[0].glanced
             chosen = [begun for begun in chosen[: _FOLLOWED[size]] if begun.glanced < most]
         names = [begun.problem.structure.effects for begun in chosen]
@@ -70,7 +71,7 @@ class Anew:
         found = self.crew.map("following up", names, _followed, jobs)
         return [_sketch(begun.problem, solution) for begun, solution in zip(chosen, found, strict=True)]
 
-    @property
+    @cached_property
     def _isolates(self) -> list[bool]:
         return [self.system.isolates(trial) for trial in self.split.fit]
 

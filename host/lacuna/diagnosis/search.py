@@ -263,9 +263,9 @@ def _sketched_afar(before: Candidate, near, afar: Anew, split, enough, policy: P
 
 def _best_of_each(sketched: Sequence[tuple[Fit, Profile]]) -> list[tuple[Fit, Profile]]:
     """The best fit of each set of effects, the best set first."""
-    best: dict[tuple[str, ...], tuple[Fit, Profile]] = {}
+    best: dict[frozenset[str], tuple[Fit, Profile]] = {}
     for fitted, profile in sketched:
-        effects = fitted.structure.effects
+        effects = frozenset(fitted.structure.effects)
         if effects not in best or fitted.cost < best[effects][0].cost:
             best[effects] = (fitted, profile)
     return sorted(best.values(), key=lambda pair: pair[0].cost)

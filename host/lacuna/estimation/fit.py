@@ -174,6 +174,8 @@ def foreseen(fitted: Fit) -> Fit:
     """The fit with each run's factors of parameters (`Parameter.factor_of`) at their means: what could be said of a
     run before it is made."""
     problem, point = fitted.problem, fitted.solution.point
+    if not any(p.factor_of for parameters in problem.nuisances for p in parameters):
+        return fitted
     expected = tuple(
         np.array([p.value if p.factor_of else value for value, p in zip(values, parameters, strict=True)])
         for values, parameters in zip(point.nuisances, problem.nuisances, strict=True)

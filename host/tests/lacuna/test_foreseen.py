@@ -103,7 +103,7 @@ def test_an_effect_that_the_factors_of_each_run_take_up_is_found(fading_mm_s, se
     assert data.case.suffices(data.base) is (found is None)
 
 
-def test_an_explanation_with_a_learnt_curve_is_asked_too():
+def test_nothing_is_grown_on_an_explanation_with_a_learnt_curve():
     data = Diagnosed(10.0, 7)
     curved = Structure(data.system, (), ("friction",))
     floor = data.base.fitted.problem.floor
