@@ -244,9 +244,10 @@ def finished_afresh(candidate: Candidate, split: Split, seed: int, crew: Crew) -
 
 
 def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split) -> Candidate:
-    """`candidate` with these of its effects only, fitted from where it stands."""
+    """`candidate` with these of its effects only, and all its curves, fitted from where it stands."""
     parent = candidate.fitted
-    structure = Structure(parent.structure.system, tuple(e for e in candidate.effects if e in effects))
+    kept = tuple(e for e in candidate.effects if e in effects)
+    structure = Structure(parent.structure.system, kept, parent.structure.sites)
     start = [starting_point(parent, structure)]
     fitted = fit(structure, split.fit, parent.problem.floor, starts=start, relative=_CONTINUED)
     return judge(fitted, split, near=candidate.checked)

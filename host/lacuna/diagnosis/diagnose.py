@@ -12,8 +12,9 @@ from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
 from lacuna.diagnosis.drift import Drift, find_drift
+from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.learn import holds, learn_correction
-from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, drop_absent, nearest
+from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder
@@ -104,7 +105,7 @@ def diagnose(
     crew.say("fitting the base model")
     base = case.fit_base(starts)
     found, stopped = _explanations(case, base, crew)
-    choice = drop_absent(case, found, choose(found, split, policy, case.suffices, case.outdone))
+    found, choice = eliminate(case, found, choose(found, split, policy, case.suffices, case.outdone))
     judged = _judged(case, found, choice)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
@@ -220,7 +221,9 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew:
     never worse than that."""
     split, unexplained = case.split, judged.verdict == "unexplained"
     parents = list(dict.fromkeys((found.base, choice.explanation))) if unexplained else [choice.explanation]
-    learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew) if crew else None
+    learnt = None
+    if crew and not any(case.suffices(parent) for parent in parents):
+        learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew)
     offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
     if unexplained:
         offered += (*found.tried, *found.freed)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.decide import Choice, dispersion_of, weigh, worth_adding
+from lacuna.diagnosis.decide import Choice
 from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search
 from lacuna.system import Effect
@@ -44,22 +44,6 @@ class Rival:
 
     effects: tuple[str, ...]
     share_of_gap: float
-
-
-def drop_absent(case: Case, found: Search, choice: Choice) -> Choice:
-    """`choice` without effects whose interval holds the value at which they are absent, and without which nothing is
-    explained any worse: the least certain first."""
-    library, within = case.system.effects, case.intervals(choice.candidate)
-    idle = [e for e in choice.candidate.effects if _may_be_absent(library[e], within)]
-    for least in sorted(idle, key=lambda e: choice.probability[e]):
-        rest = tuple(e for e in choice.candidate.effects if e != least)
-        refitted = refitted_without(choice.candidate, rest, case.split)
-        # what was tried of these effects may have ended in another minimum than they have in company
-        smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
-        # intervals are wide where fits end in several places; that the effect is there may still be sure
-        if not worth_adding(smaller, choice.candidate, dispersion_of(found.tried), case.policy):
-            return drop_absent(case, found, weigh(found, smaller, case.policy))
-    return choice
 
 
 def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, ...]:
@@ -130,7 +114,3 @@ def _form(effect: Effect, choice: Choice) -> str:
     structure = choice.explanation.fitted.structure
     own = [structure.system.correction_sites[site] for site in structure.sites if site in effect.freed_at]
     return f"freed: {', '.join(f'{s.term} over {s.variable}' for s in own)}" if own else "as in the library"
-
-
-def _may_be_absent(effect: Effect, within: dict[str, tuple[float, float]]) -> bool:
-    return all(within[name][0] <= effect.absent <= within[name][1] for name in effect.size_names)

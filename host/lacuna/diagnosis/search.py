@@ -67,7 +67,8 @@ class Screened:
 @dataclass(frozen=True)
 class Search:
     """Every explanation that was refitted, all against the same `floor`, and the screening of the library. `freed`:
-    the best of each size again, with the curve that helps most where its own mechanisms act."""
+    the best of each size again, with the curve that helps most where its own mechanisms act (or that curve alone, where
+    it does their work)."""
 
     base: Candidate
     floor: NoiseFloor
