@@ -38,7 +38,7 @@ def shifted(commands: Timeline, late_s: float) -> Timeline:
 
 def delayed(commands: Timeline, to_vacuum_s: float, to_positive_s: float) -> Timeline:
     """As valves switch that take so long. Not sorted anew: a simulation does that."""
-    delay_s = np.where(commands.command % 2 == COMMANDS["positive"], to_positive_s, to_vacuum_s)
+    delay_s = np.where(commands.command == COMMANDS["positive"], to_positive_s, to_vacuum_s)
     return Timeline(commands.time_s + delay_s, commands.chamber, commands.command)
 
 

@@ -83,7 +83,7 @@ def progress_row(plant, rig, run, row):
 def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
     """(n, COLUMNS) at `sample_times` (rising, from 0), of a walk that starts at rest at time 0."""
     run = rest(plant, rig, states_of_effects)
-    late, order = delayed(plant, times, command)
+    late, order = delayed(plant, times, chamber, command)
     out = np.empty((sample_times.size, COLUMNS))
     i = 0
     for k in range(sample_times.size):
@@ -96,7 +96,7 @@ def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_t
 def progress_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
     """(n, 2) of the same walk: `progress_row` at `sample_times`."""
     run = rest(plant, rig, states_of_effects)
-    late, order = delayed(plant, times, command)
+    late, order = delayed(plant, times, chamber, command)
     out = np.empty((sample_times.size, 2))
     i = 0
     for k in range(sample_times.size):

@@ -85,7 +85,7 @@ def step_record(plant, rig, states_of_effects, times, command, sample_times, tol
     actuator, block, _, _ = _places(rig)
     contracted = plant.q[block + layout.CONTRACTED]
     run = _settled(plant, rig, states_of_effects, contracted, VACUUM, SETTLE_S, tolerance)
-    late, order = delayed(plant, times, command)
+    late, order = delayed(plant, times, np.zeros_like(command), command)
     out = np.empty((sample_times.size, 3))
     i = 0
     for k in range(sample_times.size):

@@ -26,7 +26,7 @@ STATES = 11
 # Parts of the robot that are there
 HAS_BODY, HAS_HEAD, HAS_TAIL = 1, 2, 4
 # Commands of a chamber
-VACUUM, POSITIVE, OFF, OFF_BEFORE_POSITIVE = 0, 1, 2, 3  # even ones are delayed as edges to vacuum are
+VACUUM, POSITIVE, OFF = 0, 1, 2
 
 _GRAVITY = 9.80665
 _WALL_COUNT = 3.0  # eq. (7): three actuators a segment

@@ -16,7 +16,7 @@ from bifa.robot import cpg
 from bifa.robot.gait import Gait
 from bifa.simulate.compiled import kernel
 from bifa.simulate.hooks import chains
-from bifa.simulate.stepper import OFF, OFF_BEFORE_POSITIVE, POSITIVE, VACUUM
+from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
 
 _TWO_PI = 2.0 * math.pi
 _RESOLUTION_S = 1e-3
@@ -28,21 +28,20 @@ class TimelineError(BifaError):
 
 @dataclass(frozen=True)
 class Timeline:
-    """`time_s` (n,) rising, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive, 0 vacuum, 2 off (or 3,
-    where positive follows after a dead time)."""
+    """`time_s` (n,) rising, `chamber` (n,) 0 body, 1 head, 2 tail, `command` (n,) 1 positive, 0 vacuum, 2 off."""
 
     time_s: np.ndarray
     chamber: np.ndarray
     command: np.ndarray
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """(m, 3) commands in force at times, 0 to 2; off before the first."""
+        """(m, 3) commands in force at times; off before the first."""
         time_s = np.asarray(time_s, dtype=float)
         state = np.full((time_s.size, 3), OFF)
         for chamber in range(3):
             mine = self.chamber == chamber
             last = np.searchsorted(self.time_s[mine], time_s, side="right") - 1
-            state[last >= 0, chamber] = np.minimum(self.command[mine][last[last >= 0]], OFF)
+            state[last >= 0, chamber] = self.command[mine][last[last >= 0]]
         return state
 
 
@@ -55,7 +54,7 @@ def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
         mine = commands.chamber == chamber
         for time_s, command in zip(commands.time_s[mine], commands.command[mine], strict=True):
             if OFF not in (before, command) and before != command and dead_time_s > 0.0:
-                rows.append((time_s, chamber, OFF_BEFORE_POSITIVE if command == POSITIVE else OFF))
+                rows.append((time_s, chamber, OFF))
                 rows.append((time_s + dead_time_s, chamber, command))
             else:
                 rows.append((time_s, chamber, command))
@@ -175,12 +174,14 @@ def gait_switches(gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: fl
 
 
 @kernel
-def delayed(plant, times, command):
-    """When the valves switch, and the order in which they do."""
+def delayed(plant, times, chamber, command):
+    """When the valves switch, and the order in which they do. An edge that a later command overtakes ends with it."""
     late = times.copy()
     if plant.active & chains.DELAY:
-        for i in range(times.size):
-            late[i] += chains.delay(plant.active, plant.q, command[i] % 2 == 1)
+        next_s = np.full(3, np.inf)
+        for i in range(times.size - 1, -1, -1):
+            late[i] += chains.delay(plant.active, plant.q, command[i] == POSITIVE)
+            late[i] = next_s[chamber[i]] = min(late[i], next_s[chamber[i]])
     return late, np.argsort(late, kind="mergesort")
 
 

@@ -23,7 +23,7 @@ typedef struct {
 
 enum { WALK, SEEN, PROGRESS, STEP, ANCHOR };
 enum { HOLD, SWITCH, SAMPLE };
-enum { OFF = 2, MOST_COLUMNS = 32 };
+enum { POSITIVE = 1, OFF = 2, MOST_COLUMNS = 32 };
 static const int COLUMNS_OF[] = {WALK_COLUMNS, 7, 2, 3, 5};
 
 typedef struct {
@@ -102,7 +102,8 @@ static int plan(Bench *bench, int i) {
     return 1;
 }
 
-// Switching times with the valves' delays, in order; of equal ones the earlier command first.
+// Switching times with the valves' delays, in order; of equal ones the earlier command first. An edge that a later
+// command overtakes ends with it.
 static int sort_switches(Schedule *s, double to_positive_s, double otherwise_s) {
     const Job *job = s->job;
     if (s->room < job->switches) {
@@ -113,8 +114,14 @@ static int sort_switches(Schedule *s, double to_positive_s, double otherwise_s) 
         s->room = job->switches;
         if (!s->late_s || !s->order) return 0;
     }
+    double next_s[] = {INFINITY, INFINITY, INFINITY};
+    for (int64_t k = job->switches - 1; k >= 0; k--) {
+        const double late_s = job->switch_s[k] + (job->command[k] == POSITIVE ? to_positive_s : otherwise_s);
+        double *next = &next_s[job->chamber[k]];
+        s->late_s[k] = *next = late_s < *next ? late_s : *next;
+    }
     for (int64_t k = 0; k < job->switches; k++) {
-        const double late_s = job->switch_s[k] + (job->command[k] & 1 ? to_positive_s : otherwise_s);
+        const double late_s = s->late_s[k];
         int64_t at = k;
         for (; at > 0 && s->late_s[at - 1] > late_s; at--) {
             s->late_s[at] = s->late_s[at - 1];
