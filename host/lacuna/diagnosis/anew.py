@@ -29,6 +29,7 @@ from lacuna.system import System
 
 _FOLLOWED = {1: 4, 2: 2}  # to the end, by the size of the set
 _SEEDS = 2  # sets that the next ones grow from
+_SIZES = (1.0, 0.15)  # times an effect's typical size: where it is begun
 
 
 class _Begun(NamedTuple):
@@ -99,7 +100,8 @@ class Anew:
         self._begun |= {s: _Begun(p, *pair) for s, p, pair in zip(new, problems, found, strict=True)}
 
     def _starts(self, structure: Structure) -> list[np.ndarray]:
-        """The initial guess, the last effect at its typical size of either sign, those before it as they were begun."""
+        """The initial guess, the last effect at its typical size and a fraction of it, of either sign, those before it
+        as they were begun. From its typical size an effect may lead astray what it is to be fitted with."""
         if not structure.effects:
             return [structure.start()]
         *others, last = structure.effects
@@ -108,7 +110,8 @@ class Anew:
             problem, isolated, _ = self._begun[frozenset(others)]
             known = problem.structure.theta(isolated.values)
             start |= {name: value for name, value in known.items() if name.split(".")[0] in others}
-        return sized(structure, structure.parted(structure.values(start), last), last, 1.0)
+        base = structure.parted(structure.values(start), last)
+        return [vector for factor in _SIZES for vector in sized(structure, base, last, factor)]
 
 
 def _isolated(problem: Problem, starts: Sequence[np.ndarray], mixed: bool) -> tuple[Isolated, float]:
