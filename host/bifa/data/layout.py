@@ -77,6 +77,7 @@ SETTINGS = ("load_cell_N_m", "inclination_deg", "direction")
 # Notes that fits make use of, and between what they must lie. A clock that is off by more is no clock.
 NOTED = {
     "set_point_psi": PRESSURE_RANGE_PSI,
+    "extended_psi": PRESSURE_RANGE_PSI,
     "command_age_s": (-0.1, 0.1),
     "clock_rate": (0.9, 1.1),
     "dead_time_s": (0.0, 0.1),

@@ -83,7 +83,8 @@ def _pull(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         tape.wait_while(lambda: rig.instruments.moving, PULL_MM / planned.rate_mm_s)
         tape.wait(LEAD_S)
     moved = _moving_span(tape)
-    return _machine_columns(tape, "head", moved), noted(tape.clock), tape.lost_samples
+    known = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}
+    return _machine_columns(tape, "head", moved), noted(tape.clock) | known, tape.lost_samples
 
 
 def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):

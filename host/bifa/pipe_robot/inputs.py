@@ -126,7 +126,8 @@ class StepInputs:
 
 @dataclass(frozen=True)
 class PullInputs:
-    """`grip`: factor of the friction's coefficients, (n,) or one for all samples."""
+    """`extended_psi`: by how much the head was extended before, if that is more; `grip`: factor of the friction's
+    coefficients, (n,) or one for all samples."""
 
     pulled_s: np.ndarray
     rate_mm_s: float
@@ -136,6 +137,7 @@ class PullInputs:
     actuator: None = None
     positive_psi: None = None
     grip: np.ndarray | float = 1.0
+    extended_psi: float = 0.0
 
     @property
     def sample_s(self) -> float:
@@ -143,7 +145,7 @@ class PullInputs:
 
     @property
     def bench(self) -> Hashable:
-        return ANCHOR, self.rate_mm_s, self.load_cell_N_m
+        return ANCHOR, self.rate_mm_s, self.load_cell_N_m, self.extended_psi
 
     @staticmethod
     def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
@@ -154,6 +156,7 @@ class PullInputs:
             first.rate_mm_s,
             [case.inputs.pressure_psi for case in cases],
             first.load_cell_N_m,
+            first.extended_psi,
             tolerance_m,
             together,
         )
@@ -244,6 +247,7 @@ def _pull(trial: Trial) -> PullInputs:
         rate_mm_s=-rate if backward else rate,
         pressure_psi=_pressure_psi(trial),
         load_cell_N_m=float(trial.extra.get(LOAD_CELL, simulate.records.LOAD_CELL_N_M)),
+        extended_psi=float(trial.extra.get("extended_psi", 0.0)),
     )
 
 

@@ -230,13 +230,16 @@ def anchor_pull(
     rate_mm_s: float,
     pressure_psi: float,
     load_cell_N_m: float = LOAD_CELL_N_M,
+    extended_psi: float = 0.0,
     tolerance_m: float = TOLERANCE_M,
 ) -> SimulatedTrial:
     """A pressurised head pulled through the pipe (negative rate: backward) through a load cell's spring.
 
-    Quasi-static. The head was extended first; `displacement_mm` is that of the pulling end.
+    Quasi-static. The head was extended first, by `extended_psi` if that is more than it is then held at;
+    `displacement_mm` is that of the pulling end.
     """
-    return anchor_pulls([model], [_times(time_s)], rate_mm_s, [pressure_psi], load_cell_N_m, tolerance_m)[0]
+    pull = (rate_mm_s, [pressure_psi], load_cell_N_m, extended_psi)
+    return anchor_pulls([model], [_times(time_s)], *pull, tolerance_m)[0]
 
 
 def anchor_pulls(
@@ -245,6 +248,7 @@ def anchor_pulls(
     rate_mm_s: float,
     pressures_psi: Sequence[float],
     load_cell_N_m: float = LOAD_CELL_N_M,
+    extended_psi: float = 0.0,
     tolerance_m: float = TOLERANCE_M,
     together: bool = False,
 ) -> list[SimulatedTrial]:
@@ -254,7 +258,7 @@ def anchor_pulls(
     flats = [plant(model) for model in models]
     mounted = [rigs.anchor(flat, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
     still = [NO_COMMANDS] * len(flats)
-    pull = {"rate_m_s": rate_mm_s / _MM, "load_cell_N_m": float(load_cell_N_m)}
+    pull = {"extended_psi": extended_psi, "rate_m_s": rate_mm_s / _MM, "load_cell_N_m": float(load_cell_N_m)}
     found = _marched(lanes.ANCHOR, flats, mounted, still, times_s, tolerance_m, together, **pull)
     return [_pulled(rate_mm_s, *one) for one in zip(found, times_s, strict=True)]
 

@@ -18,6 +18,7 @@ from bifa.simulate.stepper import (
     VACUUM,
     X_HEAD,
     X_SMALL_HEAD,
+    Rig,
     coefficient,
     grip,
     sources,
@@ -26,7 +27,7 @@ from bifa.simulate.timeline import delayed
 from bifa.simulate.together import anywhere
 
 SETTLE_S = 30.0  # of a step response's vacuum, many times every time constant
-HOLD_S = 20.0  # of the pressure before a static loading or a pull
+HOLD_S = 20.0  # of the pressure before a static loading or a pull, and of the one before that which extended the head
 _SUBSTEP_S = 0.005
 
 
@@ -64,10 +65,15 @@ def under_vacuum(plant, rig, run):
     held(plant, rig, run, plant.q[block + layout.CONTRACTED], VACUUM, SETTLE_S)
 
 
+@kernel
+def _supplied(rig, positive_psi):
+    return Rig(rig.parts, rig.free, rig.wall, rig.incline_rad, positive_psi, rig.negative_psi, rig.share, rig.terrain)
+
+
 @merged
 def anchored(plant, rig, run):
-    """Put a new run where an anchor pull starts."""
-    held(plant, rig, run, plant.q[layout.WALL_OFFSET], POSITIVE, HOLD_S)
+    """Put a new run where the head of an anchor pull is extended."""
+    held(plant, rig, run, plant.q[layout.WALL_OFFSET], POSITIVE, 2.0 * HOLD_S)
 
 
 @merged
@@ -151,14 +157,18 @@ def static_rows(plant, rig, run, displacement, sample_times, out):
 
 
 @kernel
-def anchor_record(plant, rig, states_of_effects, rate, load_cell, sample_times, tolerance):
+def anchor_record(plant, rig, states_of_effects, extended_psi, rate, load_cell, sample_times, tolerance):
     """(n, 5): resistance in N, reading in psi, of a head pulled at `rate` m/s (its sign: direction); then what the load
     cell would pull if the head held, what the head holds at most, and its friction when it slides, in N.
 
-    The head has been extended by pressure and then held at `rig.positive_psi`. Quasi-static: the load cell's spring
-    takes up force until static friction gives, then kinetic friction at the speed of pulling remains.
+    The head has been extended by `extended_psi`, if that is more, and then held at `rig.positive_psi`. Quasi-static:
+    the load cell's spring takes up force until static friction gives, then kinetic friction at the speed of pulling
+    remains.
     """
-    run = _settled(plant, rig, states_of_effects, plant.q[layout.WALL_OFFSET], POSITIVE, HOLD_S, tolerance)
+    run = new_run(states_of_effects)
+    anchored(plant, rig, run)
+    march(plant, _supplied(rig, max(rig.positive_psi, extended_psi)), run, -HOLD_S, tolerance)
+    march(plant, rig, run, 0.0, tolerance)
     out = np.empty((sample_times.size, 5))
     for k in range(sample_times.size):
         if sample_times[k] > run.clock[0]:

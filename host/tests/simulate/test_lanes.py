@@ -69,8 +69,9 @@ def _experiments(plants):
         "small step": one(lanes.STEP, [rigs.stand(p, "small", 8.5) for p in plants], step),
         "pull": one(
             lanes.ANCHOR,
-            [rigs.anchor(p, 8.5) for p in plants],
+            [rigs.anchor(p, 8.5 - 0.5 * k) for k, p in enumerate(plants)],
             kernel.NO_SWITCHES,
+            extended_psi=8.0,
             rate_m_s=0.02,
             load_cell_N_m=5000.0,
         ),

@@ -109,6 +109,24 @@ def test_late_valves_agree_where_chambers_are_vented_between_supplies(model, dif
         assert np.sqrt(np.mean(error**2)) < 0.5 * NOISE["pressure"], chamber
 
 
+@pytest.mark.parametrize("effect", ["backlash", "hysteresis"])
+def test_a_spring_that_remembers_agrees_on_how_the_head_was_extended(model, effect):
+    """As bifa's own experiment does it: snapped out by pressure, vented, and pulled."""
+    effects, time_s = {effect: EFFECTS[effect].defaults()}, np.arange(100) / 50
+    plant = Plant(NOMINAL | plant_parameters(effects))
+    plant.mount("anchor_pull", "head", "positive")
+    plant.connect(10.0, "head", "off")
+    plant.record([30.0])
+    plant.move(30.0, 0.04, 0.02, there_and_back=False)
+    seen = plant.record(30.0 + time_s)["force_N"]
+    plant.close()
+    right = model.with_effects(effects)
+    extended = simulate.anchor_pull(right, time_s, 20.0, 0.0, extended_psi=NOMINAL["supply_positive_psi"])["force_N"]
+    directly = simulate.anchor_pull(right, time_s, 20.0, 0.0)["force_N"]
+    assert np.sqrt(np.mean((seen - extended) ** 2)) < 0.5 * NOISE["force_N"]
+    assert np.sqrt(np.mean((seen - directly) ** 2)) > NOISE["force_N"]
+
+
 def test_the_wrong_effect_does_not_agree(model):
     """The comparison above can fail: without its effect the simulator misses the record by far."""
     lab = Lab(NOMINAL | plant_parameters({"hysteresis": {}}), noise=Noise(0, 0, 0, 0))

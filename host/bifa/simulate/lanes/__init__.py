@@ -111,7 +111,7 @@ def _in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
     if what.kind == STEP:
         return entries.step_record(*place, times, command, *end).T
     if what.kind == ANCHOR:
-        return entries.anchor_record(*place, what.rate_m_s, what.load_cell_N_m, *end).T
+        return entries.anchor_record(*place, what.extended_psi, what.rate_m_s, what.load_cell_N_m, *end).T
     if what.kind == PROGRESS:
         return entries.progress_record(*place, times, chamber, command, *end).T
     rows = entries.walk_record(*place, times, chamber, command, *end).T

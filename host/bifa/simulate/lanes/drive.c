@@ -18,11 +18,11 @@ typedef struct {
 typedef struct {
     int64_t parts, free, wall, terrain_columns, curve_rows, learnt_terms, learnt_columns, experiment, together;
     const double *terrain;
-    double rate_m_s, load_cell_N_m, tolerance_m;
+    double extended_psi, rate_m_s, load_cell_N_m, tolerance_m;
 } Setting;
 
 enum { WALK, SEEN, PROGRESS, STEP, ANCHOR };
-enum { HOLD, SWITCH, SAMPLE };
+enum { EXTEND, HOLD, SWITCH, SAMPLE };
 enum { POSITIVE = 1, OFF = 2, MOST_COLUMNS = 32 };
 static const int COLUMNS_OF[] = {WALK_COLUMNS, 7, 2, 3, 5};
 
@@ -148,7 +148,11 @@ static int begin(Bench *bench, const Setting *setting, const Job *job, int i) {
         default: start_walk(m, plant, &bench->rig, &bench->run);
     }
     int more = 1;
-    if (setting->experiment == STEP || setting->experiment == ANCHOR) {
+    if (setting->experiment == ANCHOR) {
+        s->what = EXTEND; // for the first half of the time before time 0
+        set_lane(&bench->rig.positive_psi, i, fmax(job->positive_psi, setting->extended_psi));
+        set_lane(&bench->until, i, 0.5 * at_lane(bench->run.clock[0], i));
+    } else if (setting->experiment == STEP) {
         s->what = HOLD;
         set_lane(&bench->until, i, 0.0);
     } else {
@@ -195,6 +199,12 @@ static int happen(Bench *bench, const Setting *setting, Mask arrived, const Job 
             const int64_t k = s->order[s->next_switch++];
             const int64_t chamber = setting->experiment == STEP ? (setting->parts & HAS_BODY ? 0 : 1) : s->job->chamber[k];
             set_lane(&bench->run.command[chamber], i, (double)s->job->command[k]);
+        }
+        if (s->what == EXTEND) {
+            s->what = HOLD;
+            set_lane(&bench->rig.positive_psi, i, s->job->positive_psi);
+            set_lane(&bench->until, i, 0.0);
+            continue;
         }
         if (plan(bench, i)) continue;
         bench->run.live = andnot(lane(i), bench->run.live);

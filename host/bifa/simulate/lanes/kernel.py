@@ -40,7 +40,7 @@ class _Setting(ctypes.Structure):
             )
         ),
         ("terrain", ctypes.c_void_p),
-        *((name, ctypes.c_double) for name in ("rate_m_s", "load_cell_N_m", "tolerance_m")),
+        *((name, ctypes.c_double) for name in ("extended_psi", "rate_m_s", "load_cell_N_m", "tolerance_m")),
     ]
 
 
@@ -57,6 +57,7 @@ class Experiment:
     switches: Sequence[Switches]
     sample_s: Sequence[np.ndarray]
     tolerance_m: float
+    extended_psi: float = 0.0
     rate_m_s: float = 0.0
     load_cell_N_m: float = 0.0
 
@@ -79,6 +80,7 @@ class Kernel:
         has its own, and takes up the next robot when it has finished one."""
         jobs, setting, kept = _jobs(plants, what.rigs)
         setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
+        setting.extended_psi = what.extended_psi
         setting.rate_m_s, setting.load_cell_N_m = what.rate_m_s, what.load_cell_N_m
         for name, k in (("switch_s", 0), ("chamber", 1), ("command", 2)):
             jobs[name] = _addresses([one[k] for one in what.switches])
