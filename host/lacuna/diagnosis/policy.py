@@ -55,7 +55,10 @@ class Policy:
         0.25, "of the gain required", "part of it must come from trials that were not fitted", "simulation"
     )
     share: float = _rule(
-        0.15, "of what is left", "one more effect must close this share of what the smaller set leaves", "simulation"
+        0.15,
+        "of what is left",
+        "one more effect must close this share of what the smaller set leaves, unless it leaves nothing that matters",
+        "simulation",
     )
     share_of_gap: float = _rule(
         0.03,
@@ -64,7 +67,13 @@ class Policy:
         " unless it leaves nothing that matters",
         "simulation",
     )
-    half: float = _rule(0.5, "of the gap", "mechanisms that together close less do not explain the data", "convention")
+    half: float = _rule(
+        0.5,
+        "of the gap",
+        "mechanisms that together close less do not explain the data; nor does one beside a curve that does its work,"
+        " if its own formula explains less",
+        "convention",
+    )
     confusable: float = _rule(
         0.05, "probability", "swapping in an effect at least this probable is not ruled out", "convention"
     )
@@ -98,8 +107,8 @@ class Policy:
         2.0,
         "floors, RMS, on trials not fitted",
         "if the base model leaves more there, large residuals at their full size, and no effect explains enough from"
-        " there, its fit may be so wrong that the missing effect does not improve it: effects are fitted again from the"
-        " initial values",
+        " there, its fit may be so wrong that the missing effect does not improve it: effects (pairs, where one"
+        " leaves as much) are begun anew from the initial values",
         "simulation",
     )
 
