@@ -13,7 +13,7 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import at_full_size, rms
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, best_of, evaluate_on, fit, renewed, spread_starts, starting_point
+from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, spread_starts, starting_point
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Point, Problem
@@ -26,9 +26,8 @@ _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
 _ABSURD = 10.0  # times the parent's cost: of a size that begins beyond, nothing is to be hoped
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
-_NEAR = 1.3  # times the cost of a finished refit
+NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
-_CONTINUED = 1e-3  # of the cost: where a refit without some effect may stop
 _ELSEWHERE = 2  # further sizes that a refit is begun at
 SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
@@ -215,7 +214,7 @@ def finish_elsewhere(finished: Fit, profiled: Profile, crew: Crew) -> Fit:
     """The best of a finished refit and those from the profile's next points: at the best one the effect may be so small
     that it does nothing."""
     problem = profiled.problem
-    jobs = [(problem, point, _NEAR * finished.cost) for point in profiled.points[1 : 1 + _ELSEWHERE]]
+    jobs = [(problem, point, NEAR * finished.cost) for point in profiled.points[1 : 1 + _ELSEWHERE]]
     others = crew.map("from another size, finishing", [problem.structure.effects] * len(jobs), _finished_from, jobs)
     return best_of(problem, [finished.solution, *others])
 
@@ -236,34 +235,11 @@ def finished_afresh(candidate: Candidate, split: Split, seed: int, crew: Crew) -
     names = [structure.effects or ("nothing",)] * _AFRESH
     jobs = [(problem, start) for start in starts]
     found = min(crew.map("from elsewhere, refitting with", names, _sketched_graduated, jobs), key=lambda s: s.cost)
-    if found.cost > _NEAR * finished.cost:
+    if found.cost > NEAR * finished.cost:
         return candidate
     found = renewed(problem, solve(problem, found.point, **_REFIT), **_REFIT)
     best = best_of(problem, [finished.solution, found])
     return min(candidate, judge(best, split, near=candidate.checked), key=lambda c: c.cost)
-
-
-def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split) -> Candidate:
-    """`candidate` with these of its effects only, and all its curves, fitted from where it stands."""
-    parent = candidate.fitted
-    kept = tuple(e for e in candidate.effects if e in effects)
-    structure = Structure(parent.structure.system, kept, parent.structure.sites)
-    start = [starting_point(parent, structure)]
-    fitted = fit(structure, split.fit, parent.problem.floor, starts=start, relative=_CONTINUED)
-    return judge(fitted, split, near=candidate.checked)
-
-
-def led_back(base: Candidate, larger: Sequence[Candidate], split: Split) -> Candidate:
-    """The better of `base` and its refits from where the fits with an effect ended: with one, whichever, the base's
-    parameters may have left a wrong minimum that they were in without it."""
-    problem, costs = base.fitted.problem, {}
-    for one in larger:
-        start = problem.start(starting_point(one.fitted, base.fitted.structure), one.fitted.solution.point.nuisances)
-        costs[one] = cost_of(problem, start)
-    nearest = min(costs, key=costs.get, default=None)
-    if nearest is None or costs[nearest] > _NEAR * base.fitted.cost:
-        return base
-    return min(base, refitted_without(nearest, (), split), key=lambda c: c.cost)
 
 
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:

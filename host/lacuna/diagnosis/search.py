@@ -16,11 +16,11 @@ from lacuna.diagnosis.candidate import (
     finished_afresh,
     from_initial_guess,
     judge,
-    led_back,
     profiles,
     sketches,
 )
 from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.continued import led_back
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.linear import remaining_after

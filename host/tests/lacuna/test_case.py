@@ -8,15 +8,9 @@ from toy import ToySystem, hide
 
 from lacuna.diagnosis import candidate as candidate_module
 from lacuna.diagnosis import case as case_module
-from lacuna.diagnosis.candidate import (
-    Profile,
-    finish_elsewhere,
-    finished_afresh,
-    judge,
-    led_back,
-    profiles,
-)
+from lacuna.diagnosis.candidate import Profile, finish_elsewhere, finished_afresh, judge, profiles
 from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.continued import led_back
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
