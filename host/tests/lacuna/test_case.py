@@ -133,3 +133,19 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
     assert not bare.fitted.solution.sensitivities
     (grown,) = _best_to_grow({frozenset(["delay"]): bare}, 1, split, floor)
     assert profiles(grown.fitted, ["coulomb"], split, floor, NOBODY)
+
+
+@pytest.mark.parametrize(
+    ("known", "ahead", "exceeds"),
+    [((0.3, 0.0), (0.0, 0.0), True), ((0.1, 0.1), (0.5, 0.1), False), ((0.1, 0.1), (0.5, 0.3), True)],
+)
+def test_what_has_to_be_foreseen_counts_only_where_it_is_so_of_every_pair(monkeypatch, known, ahead, exceeds):
+    """Of a few runs, one pair of fits may differ so by chance."""
+    pairs = [(0, "other"), (1, "other")]
+    monkeypatch.setattr(case_module, "foreseen", lambda fitted: ("ahead", fitted))
+    monkeypatch.setattr(
+        case_module, "excess_over", lambda mine, *_: ahead[mine[1]] if isinstance(mine, tuple) else known[mine]
+    )
+    system = hide({})
+    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    assert case._exceeds(*pairs) is exceeds
