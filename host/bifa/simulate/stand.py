@@ -39,15 +39,6 @@ def _places(rig):
     return 1, layout.SMALL, X_SMALL_HEAD, P_BODY + 3
 
 
-@kernel
-def _settled(plant, rig, states_of_effects, start, command, seconds, tolerance):
-    """A run that has held `command` until time 0, from rest and vented at `start`."""
-    run = new_run(states_of_effects)
-    held(plant, rig, run, start, command, seconds)
-    march(plant, rig, run, 0.0, tolerance)
-    return run
-
-
 @merged
 def held(plant, rig, run, start, command, seconds):
     """Put a new run at `start`, at rest and vented, where `command` is given `seconds` before time 0."""
@@ -88,9 +79,10 @@ def step_row(plant, rig, run, row):
 @kernel
 def step_record(plant, rig, states_of_effects, times, command, sample_times, tolerance):
     """(n, 3): displacement from contracted in m, velocity, reading in psi; at rest under vacuum at time 0."""
-    actuator, block, _, _ = _places(rig)
-    contracted = plant.q[block + layout.CONTRACTED]
-    run = _settled(plant, rig, states_of_effects, contracted, VACUUM, SETTLE_S, tolerance)
+    actuator, _, _, _ = _places(rig)
+    run = new_run(states_of_effects)
+    under_vacuum(plant, rig, run)
+    march(plant, rig, run, 0.0, tolerance)
     late, order = delayed(plant, times, np.zeros_like(command), command)
     out = np.empty((sample_times.size, 3))
     i = 0

@@ -91,14 +91,14 @@ def test_late_valves_agree_where_chambers_are_vented_between_supplies(model, dif
     dead_time_s, effects = 0.004, {"valve_asymmetry": {"difference_s": difference_s}}
     time_s = np.arange(round(2 * EASY.period_s * 100)) / 100
     switches = EASY.switches(2 * EASY.period_s)
-    plant, before = Plant(NOMINAL | plant_parameters(effects)), {}
+    plant, supplied = Plant(NOMINAL | plant_parameters(effects)), set()
     plant.mount("locomotion")
     for at, chamber, state in switches:
-        if chamber in before:
+        if chamber in supplied:
             plant.connect(at, chamber, "off")
             at += dead_time_s
         plant.connect(at, chamber, state)
-        before[chamber] = state
+        supplied.add(chamber)
     seen = plant.record(time_s)
     plant.close()
     commanded = simulate.timeline([(at, CHAMBERS.index(c), COMMANDS[state]) for at, c, state in switches])

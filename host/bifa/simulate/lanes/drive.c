@@ -118,7 +118,7 @@ static int sort_switches(Schedule *s, double to_positive_s, double otherwise_s) 
     for (int64_t k = job->switches - 1; k >= 0; k--) {
         const double late_s = job->switch_s[k] + (job->command[k] == POSITIVE ? to_positive_s : otherwise_s);
         double *next = &next_s[job->chamber[k]];
-        s->late_s[k] = *next = late_s < *next ? late_s : *next;
+        s->late_s[k] = *next = fmin(late_s, *next);
     }
     for (int64_t k = 0; k < job->switches; k++) {
         const double late_s = s->late_s[k];
