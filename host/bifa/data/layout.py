@@ -79,6 +79,7 @@ NOTED = {
     "set_point_psi": PRESSURE_RANGE_PSI,
     "extended_psi": PRESSURE_RANGE_PSI,
     "command_age_s": (-0.1, 0.1),
+    "gait_ahead_s": (0.0, 0.1),
     "clock_rate": (0.9, 1.1),
     "dead_time_s": (0.0, 0.1),
 }

@@ -28,7 +28,11 @@ class RecordedWalk:
     @property
     def extra(self) -> dict[str, float]:
         """What a trial notes of its recording."""
-        return noted(self.clock) | {"switch_error_s": TICK_S / 2, "command_age_s": PRESSURES_AFTER_S}
+        return noted(self.clock) | {
+            "switch_error_s": TICK_S / 2,
+            "command_age_s": PRESSURES_AFTER_S,
+            "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
+        }
 
 
 def noted(clock: ClockLine) -> dict[str, float]:
@@ -58,14 +62,15 @@ def record_walk(
 
 
 def _columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:
-    """The Uno's samples while it ran, at the pressures' times since the first cycle's beginning: the displacement then,
+    """The Uno's samples while it ran, at the pressures' times since the valves first switched: the displacement then,
     the commands as they were at the strobe just before."""
     # A sample taken in the very tick that starts the run has no command yet.
     running = [sample for sample in tape.samples if sample.state == "running" and not np.isnan(sample.command).any()]
     if not running:
         raise BifaError("the Uno sent no sample while it ran: check the link's counters with `bifa monitor`")
     uno_s = np.array([sample.time_us for sample in running]) * 1e-6
-    # The body's phase is 0 when a run begins and grows evenly: the first sample tells when that was.
+    # The body's phase grows evenly from 0 on. At a strobe it is still what the tick before has switched the valves by:
+    # when it seems to have been 0, the valves switched for the first time.
     begun_s = uno_s[0] - running[0].phase_rad[0] / (2 * np.pi) * period_s
     keep = uno_s - begun_s <= cycles * period_s + SAMPLE_S
     time_s = (uno_s - begun_s)[keep] + PRESSURES_AFTER_S

@@ -89,7 +89,8 @@ def walk_timeline(trial: Trial) -> Timeline:
     if trial.gait is None:
         return recorded
     gait = Gait(**{name: trial.gait[name] for name in Gait.__dataclass_fields__})
-    settled = _settled(gait, recorded, time_s)
+    ahead_s, error_s = (trial.extra.get(name, 0.0) for name in ("gait_ahead_s", "switch_error_s"))
+    settled = _settled(gait, recorded, time_s, ahead_s, error_s)
     return settled or refine(recorded, gait, float(np.median(np.diff(time_s))))
 
 
@@ -104,11 +105,12 @@ def _with_times(recorded: Timeline, noted: dict[str, Sequence[float]]) -> Timeli
     return timeline(zip(time_s, recorded.chamber, recorded.command, strict=True))
 
 
-def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray) -> Timeline | None:
-    """The gait's own switches, shifted as a whole by no more than a start between two samples requires; None where
-    the recorded ones are not the same switches to a sample."""
+def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray, ahead_s: float, error_s: float) -> Timeline | None:
+    """The gait's own switches, where the gait was `ahead_s` on at time 0, shifted as a whole by no more than a start
+    between two samples requires, as each may be off by `error_s`; None where the recorded ones are not the same
+    switches to a sample."""
     sample_s = float(np.median(np.diff(time_s)))
-    ideal = of_gait(gait, float(time_s[-1]) + sample_s)
+    ideal = of_gait(gait, float(time_s[-1]) + sample_s, 2.0 * np.pi * ahead_s / gait.period_s)
     low, high = -np.inf, np.inf
     for chamber in range(3):
         seen = recorded.time_s[recorded.chamber == chamber][1:]
@@ -122,9 +124,10 @@ def _settled(gait: Gait, recorded: Timeline, time_s: np.ndarray) -> Timeline | N
             return None
         if len(due):
             low, high = max(low, (seen - sample_s - due).max()), min(high, (seen - due).min())
-    if low > high + 2 * _SPARE_S:
+    spare_s = error_s + _SPARE_S
+    if low > high + 2 * spare_s:
         return None
-    shift = float(np.clip(0.0, low - _SPARE_S, high + _SPARE_S))
+    shift = float(np.clip(0.0, low - spare_s, high + spare_s))
     if not np.isfinite(shift):
         return None
     first = ideal.time_s <= 0.0

@@ -14,7 +14,10 @@ from bifa.measure.plan import BRISK, EXPERIMENTS, PlannedTrial, session
 from bifa.measure.recording import Recording
 from bifa.measure.session import run_session
 from bifa.pipe_robot.spare import spare
+from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.rig import open_rig
+from bifa.robot.gait import Gait
+from virtual_robot.uno import CLOCK_HZ
 
 PLAN = (
     PlannedTrial("step_response", "small", 8.5),
@@ -22,6 +25,8 @@ PLAN = (
     PlannedTrial("anchor_pull", None, 8.5, 40.0),
     PlannedTrial("locomotion", gait=BRISK, cycles=1),
 )
+
+VALVE_PINS, STROBE_PIN = range(4, 10), 10
 
 
 def run(rig, folder, trials=PLAN, **more):
@@ -77,6 +82,27 @@ def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(r
     snap = step.time_s[rising][np.argmax(speed[rising])]
     dip = step.time_s[rising][np.argmin(np.gradient(np.gradient(step.columns["pressure_psi"]))[rising])]
     assert abs(snap - dip) < 0.05
+
+
+@pytest.mark.uno
+def test_valves_switch_when_the_record_of_a_walk_has_them_switch():
+    """Held against the edges of the pins in the simulated chip. The Uno switches at whole ticks, so that single edges
+    are off by half a tick either way, and on the average none."""
+    planned = PlannedTrial("locomotion", gait=Gait(3.1234, 263.3, 97.7, 0.47, 0.53, 0.61), cycles=4)
+    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        trial = record_trial(rig, uno, planned)
+        pins = [event for event in rig.uno.iter_events() if event.kind == "pin"]
+    edges_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index in VALVE_PINS])
+    strobes_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index == STROBE_PIN and event.value])
+    seen_s = strobes_s[strobes_s > edges_s[0]][0]  # the strobe of the first sample that knows of the run
+    edges_s = (edges_s - seen_s + trial.time_s[0] - PRESSURES_AFTER_S) * seconds_per_uno_s(trial)
+    modelled_s = valves_of(walk_timeline(trial), trial).time_s
+    modelled_s = modelled_s[modelled_s < trial.time_s[-1] - 0.1]
+    late_s = np.array([edges_s[np.argmin(np.abs(edges_s - t))] for t in modelled_s]) - modelled_s
+    assert len(late_s) > 40
+    assert np.abs(late_s).max() < 0.6e-3
+    assert abs(late_s.mean()) < 0.1e-3
 
 
 @pytest.mark.uno
