@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.from_afar import SKETCH, begin, follow, promising
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import at_full_size, rms
 from lacuna.diagnosis.spectrum import peaks
@@ -29,7 +30,6 @@ _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of th
 NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
 _ELSEWHERE = 2  # further sizes that a refit is begun at
-SKETCH = {"max_iterations": 12, "relative": 3e-3}
 _REFIT = {"max_iterations": 40, "relative": 1e-4}
 
 
@@ -186,20 +186,19 @@ def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile
     return sorted(fits, key=lambda pair: pair[0].cost)
 
 
-def from_initial_guess(sketched: Sequence[tuple[Fit, Profile]], crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Each sketch, or a refit from the initial guess with its effect, whichever is better."""
-    names = [p.problem.structure.effects for _, p in sketched]
-    jobs = [(p.problem, p.from_initial_guess()) for _, p in sketched]
-    again = crew.map("refitting from the initial guess", names, _sketched_graduated, jobs)
-    return [(best_of(p.problem, [near.solution, far]), p) for (near, p), far in zip(sketched, again, strict=True)]
+def from_initial_guess(sketched: Sequence[tuple[Fit, Profile]], crew: Crew, most: int) -> list[tuple[Fit, Profile]]:
+    """Each sketch; or a refit from the initial guess with its effect, of the `most` that promise most, if that is
+    better."""
+    problems = [p.problem for _, p in sketched]
+    begun = begin(crew, "restarting with", problems, [[p.from_initial_guess()] for _, p in sketched])
+    chosen = promising(begun, most)
+    found = follow(crew, "refitting from the initial guess", chosen)
+    far = {one.problem: [solution] for one, solution in zip(chosen, found, strict=True)}
+    return [(best_of(p.problem, [near.solution, *far.get(p.problem, [])]), p) for near, p in sketched]
 
 
 def _sketched(problem: Problem, start: Point) -> Solution:
     return solve(problem, start, **SKETCH)
-
-
-def _sketched_graduated(problem: Problem, values: np.ndarray) -> Solution:
-    return solve_graduated(problem, values, **SKETCH)
 
 
 def finish(sketched: Fit) -> Fit:
@@ -226,15 +225,15 @@ def _finished_from(problem: Problem, point: Point, near: float) -> Solution:
 
 
 def finished_afresh(candidate: Candidate, split: Split, seed: int, crew: Crew) -> Candidate:
-    """The better of a finished explanation and refits of it that begin anywhere plausible, its effects as they are."""
+    """The better of a finished explanation and a refit of it that begins anywhere plausible, its effects as they are:
+    the most promising of several."""
     finished, structure = candidate.fitted, candidate.fitted.structure
     problem, values = finished.problem, finished.solution.point.values
     starts = spread_starts(structure, values, 1 + _AFRESH, seed)[1:]
     for start in starts:
         start[structure.base_size :] = values[structure.base_size :]
-    names = [structure.effects or ("nothing",)] * _AFRESH
-    jobs = [(problem, start) for start in starts]
-    found = min(crew.map("from elsewhere, refitting with", names, _sketched_graduated, jobs), key=lambda s: s.cost)
+    begun = begin(crew, "from elsewhere, restarting with", [problem] * _AFRESH, [[start] for start in starts])
+    found = min(follow(crew, "from elsewhere, refitting with", promising(begun, 1)), key=lambda s: s.cost)
     if found.cost > NEAR * finished.cost:
         return candidate
     found = renewed(problem, solve(problem, found.point, **_REFIT), **_REFIT)

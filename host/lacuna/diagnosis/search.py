@@ -35,7 +35,7 @@ from lacuna.estimation.uncertainty import effective_samples
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
 _SKETCHED = {1: 8, 2: 8, 3: 6}  # sets refitted, by their size: roughly,
-_SKETCHED_TWICE = {1: 4, 2: 1, 3: 1}  # the best of these from the initial guess as well,
+_FROM_INITIAL_GUESS = {1: 4, 2: 1, 3: 1}  # the most promising of these from the initial guess as well,
 _FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
 _ROUNDS = 4  # of finishing at most
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
@@ -223,43 +223,38 @@ def _grow(
                 profiled[same] = found
     ranked = sorted(profiled.values(), key=lambda p: p.cost)
     before = min(beam, key=lambda c: c.cost)
-    sketched = _sketched(before, ranked, afar, split, enough, policy, crew)
-    return _finish(before, sketched, _FINISHED[size], split, tried, enough, policy, crew)
+    sketched, finished = _sketched(before, ranked, afar, split, enough, policy, crew)
+    return _finish(before, sketched, finished, _FINISHED[size], split, tried, enough, policy, crew)
 
 
 def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, enough, policy: Policy, crew: Crew):
-    """A quick refit of the most promising, the best first. Where one explains enough as it is (it restarts when it is
-    finished), those that could reach it are refitted from the initial guess as well; where none does, the best few."""
+    """A quick refit of the most promising, the best first; and the best one finished, if it leaves little. Where that
+    explains enough, those that could reach it are refitted from the initial guess as well; where it does not, the most
+    promising of all, and where the set before leaves so much that it may be in the wrong minimum, effects are begun
+    anew."""
     size = len(before.effects) + 1
     near = sketches(ranked[: _SKETCHED[size]], crew)
-    twice = near[: _SKETCHED_TWICE[size]]
-    if twice and enough(judge(twice[0][0], split)):
-        reach = policy.reach * twice[0][0].cost
-        far = from_initial_guess([pair for pair in twice[1:] if pair[0].cost < reach], crew)
-    elif twice and not before.effects:
-        far = _sketched_afar(before, near, afar, split, enough, policy, crew)
-    else:
-        far = from_initial_guess(twice, crew)
-        if before.effects and before.checked_error > (0, policy.lost):
-            far += afar.follow(before)
-    return _best_of_each([*near, *far])
-
-
-def _sketched_afar(before: Candidate, near, afar: Anew, split, enough, policy: Policy, crew: Crew):
-    """Refits from the initial guess: of the best sketches and, if none of these explains enough then, of the others,
-    too, since a base model that makes up for what it lacks may leave the effect no room. Where it leaves so much that
-    it may be in the wrong minimum, effects are begun anew."""
-    count = _SKETCHED_TWICE[1]
-    if before.checked_error > (0, policy.lost):
+    if not near:
+        return [], None
+    first, finished = judge(near[0][0], split, near=before.checked), None
+    fruitful = before.cost - first.cost > policy.promising * before.excess
+    if fruitful and first.checked_error <= (0, policy.lost):
+        crew.say(f"finishing {' + '.join(first.effects)}")
+        first = finished = _finished(first, split, policy)
+        near[0] = first.fitted, near[0][1]
+    most = _FROM_INITIAL_GUESS[size]
+    if enough(first):
+        reach = policy.reach * first.fitted.cost
+        far = from_initial_guess([pair for pair in near[1:] if pair[0].cost < reach], crew, most)
+    elif before.checked_error > (0, policy.lost):
         fresh = afar.follow(before)
-        begun = {fitted.structure.effects for fitted, _ in fresh}
-        most = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
-        again = [pair for pair in near[:count] if pair[0].structure.effects not in begun and pair[0].cost < most]
-        return [*from_initial_guess(again[: count - len(fresh) or 1], crew), *fresh]
-    found = from_initial_guess(near[:count], crew)
-    if not enough(judge(min(found, key=lambda pair: pair[0].cost)[0], split)):
-        found += from_initial_guess(near[count:], crew)
-    return found
+        begun = {frozenset(fitted.structure.effects) for fitted, _ in fresh}
+        best = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
+        left = [f for f in near if frozenset(f[0].structure.effects) not in begun and f[0].cost < best]
+        far = [*from_initial_guess(left, crew, max(most - len(fresh), 1)), *fresh]
+    else:
+        far = from_initial_guess(near, crew, most)
+    return _best_of_each([*near, *far]), finished
 
 
 def _best_of_each(sketched: Sequence[tuple[Fit, Profile]]) -> list[tuple[Fit, Profile]]:
@@ -284,11 +279,18 @@ def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:
     return candidate
 
 
-def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Policy, crew: Crew) -> list[Candidate]:
-    """Refit to the end the best `count` of those that explain more than the best set so far, `before`; once one of them
-    explains enough, only those that are not out of its reach. What does not explain enough gets a second start, so that
-    it is not the optimiser who failed."""
-    grown = [judge(fitted, split, near=before.checked) for fitted, _ in sketched]
+def _finish(
+    before: Candidate, sketched, finished: Candidate | None, count, split, tried, enough, policy: Policy, crew: Crew
+) -> list[Candidate]:
+    """Refit to the end the best `count` of those that explain more than the best set so far, `before`, but for the one
+    that is `finished` already; once one of them explains enough, only those that are not out of its reach. What does
+    not explain enough gets a second start, so that it is not the optimiser who failed."""
+    grown = [
+        finished
+        if finished and fitted.solution is finished.fitted.solution
+        else judge(fitted, split, near=before.checked)
+        for fitted, _ in sketched
+    ]
     profiled = {candidate.effects: profile for candidate, (_, profile) in zip(grown, sketched, strict=True)}
     waiting = sorted(grown, key=lambda c: c.cost)
     done: list[Candidate] = []
@@ -301,8 +303,9 @@ def _finish(before: Candidate, sketched, count, split, tried, enough, policy: Po
         if not fruitful or hopeless or candidate.cost > policy.reach * explained:
             break
         waiting.pop(0)
-        crew.say(f"finishing {' + '.join(candidate.effects)}")
-        candidate = _finished(candidate, split, policy)
+        if candidate is not finished:
+            crew.say(f"finishing {' + '.join(candidate.effects)}")
+            candidate = _finished(candidate, split, policy)
         suffices = enough(candidate)
         if not suffices:
             other = finish_elsewhere(candidate.fitted, profiled[candidate.effects], crew)

@@ -7,9 +7,12 @@ import pytest
 from toy import ToySystem, hide
 
 from lacuna.diagnosis.anew import Anew
-from lacuna.diagnosis.candidate import Candidate, judge
+from lacuna.diagnosis.candidate import Candidate, from_initial_guess, judge, profiles, sketches
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.from_afar import begin as begin_from_afar
+from lacuna.diagnosis.from_afar import follow as follow_from_afar
+from lacuna.diagnosis.from_afar import promising
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, evaluate_on
@@ -116,3 +119,35 @@ def test_what_has_been_begun_is_weighed_again_against_another_floor():
     followed = [fitted for fitted, _ in anew.follow(Candidate(sharper, before.checked))]
     assert all(fitted.problem.floor is halved for fitted in followed)
     assert np.isfinite([fitted.cost for fitted in followed]).all()
+
+
+def test_of_several_beginnings_those_near_the_truth_look_best_from_afar():
+    case = bench({}, 66)
+    problem = case.fit_base(1).problem
+    right = problem.structure.start()
+    begun = begin_from_afar(NOBODY, "", [problem] * 3, [[right], [3.0 * right], [right]])
+    astray = [one._replace(glanced=one.glanced + 100.0) if k == 1 else one for k, one in enumerate(begun)]
+    assert promising(astray, 2) == [astray[0], astray[2]]
+    (followed,) = follow_from_afar(NOBODY, "", promising(astray, 1))
+    assert followed.cost < 0.7 * sum(r.size for r in problem.residuals(followed.point))
+
+
+def test_where_no_trial_isolates_parameters_nothing_tells_and_all_are_promising():
+    hidden = hide({}, seed=63)
+    system = Tangled(hidden.trials, hidden.effects)
+    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    problem = case.fit_base(1).problem
+    begun = begin_from_afar(NOBODY, "", [problem] * 3, [[problem.structure.start()]] * 3)
+    assert len(promising(begun, 1)) == 3
+
+
+def test_rough_fits_that_do_not_look_promising_stay_as_they_are():
+    case = bench({"delay.delay_s": 0.05}, 67)
+    base = case.fit_base(1)
+    rough = sketches(profiles(base, ["delay", "coulomb"], case.split, base.problem.floor, NOBODY), NOBODY)
+    again = {
+        p.effect: (near, far) for (near, p), (far, _) in zip(rough, from_initial_guess(rough, NOBODY, 1), strict=True)
+    }
+    near, far = again["coulomb"]
+    assert far.solution is near.solution
+    assert again["delay"][1].theta["delay.delay_s"] == pytest.approx(0.05, rel=0.1)
