@@ -55,9 +55,9 @@ def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | N
 
 def _branches(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Displacement [m], force [N], and whether the actuator was being extended; rests take no part."""
-    x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] * 1e-3)
-    moving = direction != 0
-    return x[moving], trial.columns["force_N"][moving], direction[moving] > 0
+    motion = imposed_motion(trial.time_s, trial.columns["displacement_mm"] * 1e-3)
+    moving = motion.direction != 0
+    return motion.displacement_m[moving], trial.columns["force_N"][moving], motion.direction[moving] > 0
 
 
 def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:

@@ -68,17 +68,39 @@ class Inputs(Protocol):
 
 @dataclass(frozen=True)
 class StaticInputs:
+    """`turned_m`: how far the motion went where it turned between samples, each just before the sample number
+    `turned_before`. What remembers travel misses it there."""
+
     actuator: str
     time_s: np.ndarray
     displacement_m: np.ndarray
     direction: np.ndarray
     pressure_psi: float
+    turned_before: tuple[int, ...] = ()
+    turned_m: tuple[float, ...] = ()
     channels: tuple[str, ...] = ("force_N", "pressure_psi")
     positive_psi: None = None
 
     @cached_property
     def bench(self) -> Hashable:
-        return STATIC, self.actuator, self.time_s.tobytes()
+        return STATIC, self.actuator, self.path_s.tobytes(), self.turned_before
+
+    @cached_property
+    def path_s(self) -> np.ndarray:
+        """Times of samples and turns; these in the middle between samples, so that trials share them."""
+        at = np.array(self.turned_before, int)
+        return np.insert(self.time_s, at, 0.5 * (self.time_s[at - 1] + self.time_s[at]))
+
+    @cached_property
+    def path_m(self) -> np.ndarray:
+        return np.insert(self.displacement_m, self.turned_before, self.turned_m)
+
+    def sampled(self, columns: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        """Without the turns."""
+        if not self.turned_before:
+            return columns
+        kept = np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
+        return {name: column[kept] for name, column in columns.items()}
 
     @staticmethod
     def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
@@ -86,11 +108,11 @@ class StaticInputs:
         records = simulate.static_loadings(
             [case.plant for case in cases],
             first.actuator,
-            first.time_s,
-            [(case.inputs.displacement_m - case.zero_m) * _MM for case in cases],
+            first.path_s,
+            [(case.inputs.path_m - case.zero_m) * _MM for case in cases],
             [case.inputs.pressure_psi for case in cases],
         )
-        return [record.columns for record in records]
+        return [first.sampled(record.columns) for record in records]
 
 
 @dataclass(frozen=True)
@@ -229,8 +251,16 @@ def _time_s(trial: Trial) -> np.ndarray:
 
 
 def _static(trial: Trial) -> StaticInputs:
-    x, direction = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
-    return StaticInputs(trial.actuator, _time_s(trial), x, direction, _pressure_psi(trial))
+    motion = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
+    return StaticInputs(
+        trial.actuator,
+        _time_s(trial),
+        motion.displacement_m,
+        motion.direction,
+        _pressure_psi(trial),
+        tuple(int(at) for at in np.searchsorted(trial.time_s, motion.turned_s)),
+        motion.turned_m,
+    )
 
 
 def _step(trial: Trial) -> StepInputs:
@@ -253,7 +283,7 @@ def _pull(trial: Trial) -> PullInputs:
 
 def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
     """For how long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
-    path_m, _ = imposed_motion(time_s, pulled_mm / _MM)
+    path_m = imposed_motion(time_s, pulled_mm / _MM).displacement_m
     return np.maximum.accumulate(np.clip(path_m * _MM / rate_mm_s, 0.0, None))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -16,8 +17,18 @@ _STRAIGHT = 1.2  # times the noise that neighbouring samples show: what straight
 _Line = tuple[float, float]  # level at time 0, slope
 
 
-def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The imposed displacement [m] and its direction (1, 0 at rest, -1), both shape (n,).
+class Motion(NamedTuple):
+    """`displacement_m` and `direction` (1, 0 at rest, -1), shape (n,). `turned_s`, `turned_m`: when and where it went
+    straight from one direction into the other between two samples, as far as that is known."""
+
+    displacement_m: np.ndarray
+    direction: np.ndarray
+    turned_s: tuple[float, ...] = ()
+    turned_m: tuple[float, ...] = ()
+
+
+def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> Motion:
+    """The imposed motion, from its measured displacement.
 
     A cross-head that is driven at constant rates goes by straight lines, which meet where it starts, turns and stops:
     these say where it was more exactly than any smoothing. Where they do not fit, each stretch in one direction is
@@ -26,7 +37,7 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> tuple[np.n
     displacement_m = np.asarray(displacement_m, float)
     n = len(displacement_m)
     if n < 3:
-        return displacement_m.copy(), np.zeros(n, int)
+        return Motion(displacement_m.copy(), np.zeros(n, int))
     window = min(_DIRECTION_WINDOW, n - 1 + n % 2)
     speed = savgol_filter(displacement_m, window, 1, deriv=1) / np.median(np.diff(time_s))
     direction = np.where(np.abs(speed) > 0.25 * np.abs(speed).max(), np.sign(speed), 0).astype(int)
@@ -36,14 +47,12 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> tuple[np.n
     for start, stop in zip(np.r_[0, edges], np.r_[edges, n], strict=True):
         if stop - start >= _SMOOTHING_WINDOW:
             smooth[start:stop] = savgol_filter(displacement_m[start:stop], _SMOOTHING_WINDOW, 1)
-    return _straight(time_s, displacement_m, direction) or (smooth, direction)
+    return _straight(time_s, displacement_m, direction) or Motion(smooth, direction)
 
 
-def _straight(
-    time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """The motion as straight lines, and its direction; None where it was not one, as what they leave shows: it may not
-    exceed what neighbouring samples differ by."""
+def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> Motion | None:
+    """The motion as straight lines; None where it was not one, as what they leave shows: it may not exceed what
+    neighbouring samples differ by."""
     edges = np.flatnonzero(np.diff(direction)) + 1
     stretches = list(zip(np.r_[0, edges], np.r_[edges, len(direction)], strict=True))
     if any(stop - start < 2 * _MARGIN + 3 for start, stop in stretches if direction[start]):
@@ -60,7 +69,10 @@ def _straight(
     noise = np.sqrt(0.5 * np.mean(np.diff(displacement_m - path) ** 2))
     if np.sqrt(np.mean((displacement_m - path) ** 2)) > _STRAIGHT * noise + 1e-9:
         return None
-    return path, np.sign(slope).astype(int)[place]
+    turns = [k for k, (before, after) in enumerate(pairwise(slope)) if before * after < 0.0]
+    turned_s = tuple(corners[k] for k in turns)
+    turned_m = tuple(float(level[k] + slope[k] * corners[k]) for k in turns)
+    return Motion(path, np.sign(slope).astype(int)[place], turned_s, turned_m)
 
 
 def _rest_before(

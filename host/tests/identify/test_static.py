@@ -116,7 +116,9 @@ def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, rest_s, seed):
     time = np.arange(-rest_s, 2 * half + dwell * 0.02 + rest_s, 0.02)
     true = 1e-3 * rate * np.clip(np.minimum(time, 2 * half - (time - dwell * 0.02)), 0, half)
     measured = true + noise * np.random.default_rng(seed).standard_normal(len(time))
-    smooth, direction = imposed_motion(time, measured)
+    smooth, direction, turned_s, turned_m = imposed_motion(time, measured)
+    assert np.abs(np.array(turned_m) - 0.05).max(initial=0.0) < max(5 * noise, 1e-9)
+    assert np.abs(np.array(turned_s) - half).max(initial=0.0) < max(1e4 * noise / rate, 1e-9)
     assert np.abs(smooth - true).max() < max(5 * noise, 2e-3 * rate * 0.02)  # two samples' travel at a short rest
     moving = np.gradient(true, time)
     clear = (np.abs(moving) > 0.9e-3 * rate) & (np.arange(len(time)) > 30) & (np.arange(len(time)) < len(time) - 30)

@@ -10,6 +10,7 @@ from independent_lab import BASELINE, Lab
 from bifa.data import Dataset
 from bifa.identify.start import prepare
 from bifa.pipe_robot.errors import UndeterminedError
+from bifa.pipe_robot.inputs import inputs_of
 from bifa.pipe_robot.library import engine_effects
 from bifa.robot import ModelParameterError
 from lacuna.estimation.fit import spread_starts
@@ -211,6 +212,22 @@ def test_the_identified_model_predicts_what_the_system_does(system, theta):
     path = (inputs.displacement_m - model.body_stiffness.contracted_m) * 1e3
     record = static_loading(model, "large", inputs.time_s, path, inputs.pressure_psi)
     assert record["force_N"] == pytest.approx(system.predict(theta, (), trial)["force_N"], abs=1e-9)
+
+
+def test_what_remembers_travel_sees_a_turn_between_samples(dataset, system, theta):
+    recorded, effect = dataset.trials[0], engine_effects()["hysteresis"]
+    loaded = theta | {effect.full_name(p): p.value for p in effect.parameters}
+    low_mm, half_s = recorded.columns["displacement_mm"].min(), 5.51  # it turns in the middle between two samples
+
+    def force(rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
+        time_s = np.arange(0.0, 2.0 * half_s, 1.0 / rate_hz)
+        path_mm = low_mm + 8.0 * np.minimum(time_s, 2.0 * half_s - time_s)
+        trial = replace(recorded, columns={"time_s": time_s, "displacement_mm": path_mm, "force_N": 0.0 * time_s})
+        record = replace(system.trials[0], time_s=time_s, channels={"force_N": 0.0 * time_s}, payload=inputs_of(trial))
+        return time_s, system.predict(loaded, ("hysteresis",), record)["force_N"]
+
+    coarse_s, coarse = force(50.0)
+    assert coarse == pytest.approx(np.interp(coarse_s, *force(10_000.0)), abs=0.01)
 
 
 def test_an_empty_data_set_is_refused():
