@@ -10,7 +10,7 @@ from scipy.signal import savgol_filter
 
 _DIRECTION_WINDOW = 25  # samples: half a second at 50 Hz
 _SMOOTHING_WINDOW = 11
-_MARGIN = _DIRECTION_WINDOW // 2 + 1  # samples at either end of a stretch that may belong to the next one
+_MARGIN = 17  # samples at either end of a stretch that may belong to the next one: fewer hide in the window's slope
 _OFF = 5.0  # standard deviations from a line: not on it
 _STRAIGHT = 1.2  # times the noise that neighbouring samples show: what straight lines may leave
 

@@ -108,7 +108,7 @@ def test_a_static_test_that_did_not_move_is_refused():
     rate=st.floats(0.5, 20.0),
     noise=st.floats(0.0, 5e-6),
     dwell=st.integers(0, 100),
-    rest_s=st.floats(0.0, 0.2),
+    rest_s=st.floats(0.0, 0.5),
     seed=st.integers(0, 99),
 )
 def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, rest_s, seed):
@@ -117,8 +117,9 @@ def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, rest_s, seed):
     true = 1e-3 * rate * np.clip(np.minimum(time, 2 * half - (time - dwell * 0.02)), 0, half)
     measured = true + noise * np.random.default_rng(seed).standard_normal(len(time))
     smooth, direction, turned_s, turned_m = imposed_motion(time, measured)
-    assert np.abs(np.array(turned_m) - 0.05).max(initial=0.0) < max(5 * noise, 1e-9)
-    assert np.abs(np.array(turned_s) - half).max(initial=0.0) < max(1e4 * noise / rate, 1e-9)
+    beyond = 0.5e-3 * rate * 0.02 * dwell  # lines meet there if a rest at the turn is too short to be seen
+    assert np.abs(np.array(turned_m) - 0.05 - beyond).max(initial=0.0) < max(5 * noise, 1e-9)
+    assert np.abs(np.array(turned_s) - half - 0.01 * dwell).max(initial=0.0) < max(5e3 * noise / rate, 1e-9)
     assert np.abs(smooth - true).max() < max(5 * noise, 2e-3 * rate * 0.02)  # two samples' travel at a short rest
     moving = np.gradient(true, time)
     clear = (np.abs(moving) > 0.9e-3 * rate) & (np.arange(len(time)) > 30) & (np.arange(len(time)) < len(time) - 30)
