@@ -95,12 +95,13 @@ class StaticInputs:
     def path_m(self) -> np.ndarray:
         return np.insert(self.displacement_m, self.turned_before, self.turned_m)
 
+    @cached_property
+    def _is_sample(self) -> np.ndarray:
+        return np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
+
     def sampled(self, columns: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
         """Without the turns."""
-        if not self.turned_before:
-            return columns
-        kept = np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
-        return {name: column[kept] for name, column in columns.items()}
+        return {name: column[self._is_sample] for name, column in columns.items()}
 
     @staticmethod
     def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:

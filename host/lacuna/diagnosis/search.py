@@ -239,8 +239,7 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, e
     first, finished = judge(near[0][0], split, near=before.checked), None
     fruitful = before.cost - first.cost > policy.promising * before.excess
     if fruitful and first.checked_error <= (0, policy.lost):
-        crew.say(f"finishing {' + '.join(first.effects)}")
-        first = finished = _finished(first, split, policy)
+        first = finished = _finished(first, split, policy, crew)
         near[0] = first.fitted, near[0][1]
     most = _FROM_INITIAL_GUESS[size]
     if enough(first):
@@ -249,8 +248,8 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, e
     elif before.checked_error > (0, policy.lost):
         fresh = afar.follow(before)
         begun = {frozenset(fitted.structure.effects) for fitted, _ in fresh}
-        best = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
-        left = [f for f in near if frozenset(f[0].structure.effects) not in begun and f[0].cost < best]
+        reach = min((policy.hopeless * fitted.cost for fitted, _ in fresh), default=np.inf)
+        left = [pair for pair in near if frozenset(pair[0].structure.effects) not in begun and pair[0].cost < reach]
         far = [*from_initial_guess(left, crew, max(most - len(fresh), 1)), *fresh]
     else:
         far = from_initial_guess(near, crew, most)
@@ -267,9 +266,10 @@ def _best_of_each(sketched: Sequence[tuple[Fit, Profile]]) -> list[tuple[Fit, Pr
     return sorted(best.values(), key=lambda pair: pair[0].cost)
 
 
-def _finished(candidate: Candidate, split: Split, policy: Policy) -> Candidate:
+def _finished(candidate: Candidate, split: Split, policy: Policy, crew: Crew) -> Candidate:
     """From the initial guess again for as long as that pays: a friction in the wrong minimum may need to restart more
     than once."""
+    crew.say(f"finishing {' + '.join(candidate.effects)}")
     for _ in range(_ROUNDS):
         further = judge(finish(candidate.fitted), split, near=candidate.checked)
         fruitful = candidate.cost - further.cost > max(policy.promising * candidate.excess, _LEAST)
@@ -304,8 +304,7 @@ def _finish(
             break
         waiting.pop(0)
         if candidate is not finished:
-            crew.say(f"finishing {' + '.join(candidate.effects)}")
-            candidate = _finished(candidate, split, policy)
+            candidate = _finished(candidate, split, policy, crew)
         suffices = enough(candidate)
         if not suffices:
             other = finish_elsewhere(candidate.fitted, profiled[candidate.effects], crew)

@@ -121,15 +121,15 @@ def test_what_has_been_begun_is_weighed_again_against_another_floor():
     assert np.isfinite([fitted.cost for fitted in followed]).all()
 
 
-def test_of_several_beginnings_those_near_the_truth_look_best_from_afar():
-    case = bench({}, 66)
-    problem = case.fit_base(1).problem
-    right = problem.structure.start()
-    begun = begin_from_afar(NOBODY, "", [problem] * 3, [[right], [3.0 * right], [right]])
-    astray = [one._replace(glanced=one.glanced + 100.0) if k == 1 else one for k, one in enumerate(begun)]
-    assert promising(astray, 2) == [astray[0], astray[2]]
-    (followed,) = follow_from_afar(NOBODY, "", promising(astray, 1))
-    assert followed.cost < 0.7 * sum(r.size for r in problem.residuals(followed.point))
+def test_of_several_beginnings_those_with_the_right_effect_look_best_from_afar():
+    case = bench({"delay.delay_s": 0.05}, 66)
+    floor = case.fit_base(1).problem.floor
+    problems = [Problem(Structure(case.system, (name,)), case.split.fit, floor) for name in ("coulomb", "delay")]
+    begun = begin_from_afar(NOBODY, "", problems, [[problem.structure.start()] for problem in problems])
+    assert promising(begun, 2) == begun[::-1]
+    assert begun[1].glanced < 0.1 * begun[0].glanced
+    (followed,) = follow_from_afar(NOBODY, "", promising(begun, 1))
+    assert followed.cost < 0.7 * sum(r.size for r in problems[1].residuals(followed.point))
 
 
 def test_where_no_trial_isolates_parameters_nothing_tells_and_all_are_promising():
