@@ -78,6 +78,7 @@ SETTINGS = ("load_cell_N_m", "inclination_deg", "direction")
 NOTED = {
     "set_point_psi": PRESSURE_RANGE_PSI,
     "extended_psi": PRESSURE_RANGE_PSI,
+    "switch_error_s": (0.0, 0.1),
     "command_age_s": (-0.1, 0.1),
     "gait_ahead_s": (0.0, 0.1),
     "clock_rate": (0.9, 1.1),

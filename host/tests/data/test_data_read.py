@@ -192,6 +192,11 @@ MALFORMED_TOML = {
         "trial 2, extra.clock_rate",
         "1.1",
     ),
+    "the switches' error a word": (
+        replace("repeat = 2", "repeat = 2\nextra = { switch_error_s = 'half a tick' }"),
+        "trial 2, extra.switch_error_s",
+        "a number",
+    ),
     "misspelt actuator": (replace('"large"', '"big"'), "trial 1, actuator", "large, small"),
     "misplaced actuator": (
         replace('"anchor_pull"', '"anchor_pull"\nactuator = "small"'),
