@@ -29,3 +29,9 @@ pip() {
 echo "Installing Python packages from host/requirements.lock"
 pip --require-hashes --no-deps --requirement host/requirements.lock
 pip --no-deps --no-build-isolation --editable host/lacuna --editable host --editable host/virtual_robot
+
+# Where PYTHONDONTWRITEBYTECODE is set, as in many containers, each start would else compile these large ones anew, which
+# takes longer than importing them.
+site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+cd "$site"
+"$OLDPWD/.venv/bin/python" -m compileall -qq -j 0 -x '/tests?/' llvmlite matplotlib numba numpy scipy || true
