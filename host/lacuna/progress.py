@@ -14,8 +14,8 @@ _STAGES = ((2, None, 24), (3, 7, 52), (3, 7, 10))
 
 
 def most_steps(effects: int) -> int:
-    """How many steps a search in a library of so many effects announces at most, the base fit included."""
-    total = 1
+    """How many steps a diagnosis with a library of so many effects announces at most, base fit and verdict included."""
+    total = 3
     for parents, tried, refitted in _STAGES:
         each = effects if tried is None else min(effects, tried)
         total += parents * each + min(parents * each * 3, refitted)

@@ -105,11 +105,14 @@ def diagnose(
     crew.say("fitting the base model")
     base = case.fit_base(starts)
     found, stopped = _explanations(case, base, crew)
+    say = (lambda _: None) if stopped else crew.say  # what was said of stopping stays to be read
+    say("deciding what is supported")
     found, choice = eliminate(case, found, choose(found, split, policy, case.suffices, case.outdone))
     judged = _judged(case, found, choice)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
         final = _corrected(case, found, choice, judged, None if stopped else crew)
+    say("estimating how well the parameters are known")
     said = (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split))
     return _reported(case, found, choice, judged, final, said, time.monotonic() - began)
 

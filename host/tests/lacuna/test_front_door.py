@@ -158,6 +158,7 @@ def test_the_announced_total_is_an_upper_bound():
     hidden = {"sensor_lag__lag_s": 3.0, "offset__power_W": 0.4}
     lacuna.diagnose(heater.system(), heater.records(seed=5, **hidden), progress=said.append)
     assert 5 < len(said) <= most_steps(4)
+    assert [what.split()[0] for what in said[-2:]] == ["deciding", "estimating"]
 
 
 def test_ctrl_c_gives_the_best_so_far():
