@@ -192,23 +192,26 @@ def _jitter(records, differences, moving, sd) -> float:
         return 0.0
 
     def lacking(jitter_s: float) -> float:
-        variances = (_shift_variance(*record, jitter_s, sd) for record in records)
-        return excess - sum(np.nansum(variance[m]) for variance, m in zip(variances, moving, strict=True))
+        variances = (_shift_variance(*record, jitter_s, sd, m) for record, m in zip(records, moving, strict=True))
+        return excess - sum(np.nansum(variance) for variance in variances)
 
     if lacking(_LONGEST_JITTER_S) > 0:
         return _LONGEST_JITTER_S
     return float(brentq(lacking, 0.0, _LONGEST_JITTER_S, xtol=1e-9))
 
 
-def _shift_variance(time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: float) -> np.ndarray:
-    """Mean square change of a smooth record under a random shift in time, less what its own noise adds."""
+def _shift_variance(
+    time_s: np.ndarray, samples: np.ndarray, jitter_s: float, sd: float, where: np.ndarray | slice = slice(None)
+) -> np.ndarray:
+    """Mean square change of a smooth record under a random shift in time, less what its own noise adds; of the samples
+    `where`."""
     known = np.isfinite(samples)
     if known.sum() < 2:
-        return np.zeros(samples.shape)
-    total = np.zeros(samples.shape)
+        return np.zeros(samples[where].shape)
+    rising_s, seen, then_s, before = time_s[known], samples[known], time_s[where], samples[where]
+    total = np.zeros(before.shape)
     for node, weight in zip(_SHIFT_NODES, _SHIFT_WEIGHTS, strict=True):
-        shifted = np.interp(time_s + node * jitter_s, time_s[known], samples[known])
-        total += weight * (shifted - samples) ** 2
+        total += weight * (np.interp(then_s + node * jitter_s, rising_s, seen) - before) ** 2
     return np.nan_to_num(np.maximum(total - sd**2, 0.0))
 
 
