@@ -118,12 +118,14 @@ def judge(fitted: Fit, split: Split, near: Fit | None = None) -> Candidate:
 @dataclass(frozen=True)
 class Profile:
     """How a parent explanation and one more effect do at fixed sizes of that effect, the rest refitted in a
-    few cheap steps. `points` are starts for the full refit, best first."""
+    few cheap steps. `points` are starts for the full refit, best first. `apart`: the parent leaves the effect little
+    to do (`Effect.apart`), and cheap steps would soon do so again, so that none has been taken."""
 
     effect: str
     problem: Problem
     cost: float
     points: tuple[Point, ...]
+    apart: bool = False
 
     def from_initial_guess(self) -> np.ndarray:
         """The base model's initial guess, with the effect as it is at the best point: what has been fitted without the
@@ -138,13 +140,14 @@ class Profile:
 def profiles(parent: Fit, effects: Sequence[str], split: Split, floor: NoiseFloor, crew: Crew) -> list[Profile]:
     """The amplitude profiles of `effects` on top of `parent`, the best first."""
     problems = [Problem(_grown(parent, effect), split.fit, floor) for effect in effects]
+    apart = [_idle(parent, problem.structure, effect) for effect, problem in zip(effects, problems, strict=True)]
     jobs = [
-        (problem, _sizes(parent, problem.structure, effect), parent.solution)
-        for effect, problem in zip(effects, problems, strict=True)
+        (problem, _sizes(parent, problem.structure, effect), parent.solution, idle)
+        for effect, problem, idle in zip(effects, problems, apart, strict=True)
     ]
     found = crew.map("trying", [p.structure.effects for p in problems], _profiled, jobs)
-    each = zip(effects, problems, found, strict=True)
-    return sorted((Profile(e, p, cost, points) for e, p, (cost, points) in each), key=lambda p: p.cost)
+    each = zip(effects, problems, found, apart, strict=True)
+    return sorted((Profile(e, p, cost, points, a) for e, p, (cost, points), a in each), key=lambda p: p.cost)
 
 
 def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
@@ -159,7 +162,15 @@ def _grown(parent: Fit, effect: str) -> Structure:
     return Structure(parent.structure.system, (*parent.structure.effects, effect))
 
 
-def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -> tuple[float, tuple[Point, ...]]:
+def _idle(parent: Fit, structure: Structure, effect: str) -> bool:
+    """Whether an effect has little to do where `parent` stands, since what it needs apart is together."""
+    together = starting_point(parent, structure)
+    return not np.array_equal(structure.parted(together, effect), together)
+
+
+def _profiled(
+    problem: Problem, sizes: Sequence[np.ndarray], parent: Solution, apart: bool
+) -> tuple[float, tuple[Point, ...]]:
     rest = tuple(range(len(parent.free)))
     # the parent's derivatives serve; what the effect has for each trial stays where the start found it
     wider = (len(q) - s.nuisances for q, s in zip(problem.nuisances, parent.sensitivities, strict=True))
@@ -169,6 +180,9 @@ def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -
         return solve(problem, start, free=rest, max_iterations=steps, sensitivities=known)
 
     starts = [problem.start(values, parent.point.nuisances) for values in sizes]
+    if apart:
+        starts.sort(key=lambda start: cost_of(problem, start))
+        return cost_of(problem, starts[0]), tuple(starts)
     # one at a time: the residuals of the last few points are remembered
     found = [released(start, 1) for start in starts if cost_of(problem, start) <= _ABSURD * parent.cost]
     found = found or [released(min(starts, key=lambda start: cost_of(problem, start)), 1)]
@@ -179,10 +193,15 @@ def _profiled(problem: Problem, sizes: Sequence[np.ndarray], parent: Solution) -
 
 
 def sketches(profiled: Sequence[Profile], crew: Crew) -> list[tuple[Fit, Profile]]:
-    """Release everything for as long as it pays quickly, from the best point of each profile. The best first."""
-    names = [p.problem.structure.effects for p in profiled]
-    near = crew.map("refitting", names, _sketched, [(p.problem, p.points[0]) for p in profiled])
-    fits = [(best_of(p.problem, [solution]), p) for solution, p in zip(near, profiled, strict=True)]
+    """Release everything for as long as it pays quickly, from the best point of each profile, or from all of them where
+    nothing has told yet which is best. The best first."""
+    begun = [(p, point) for p in profiled for point in (p.points if p.apart else p.points[:1])]
+    names = [p.problem.structure.effects for p, _ in begun]
+    found = crew.map("refitting", names, _sketched, [(p.problem, point) for p, point in begun])
+    near: dict[Problem, list[Solution]] = {p.problem: [] for p in profiled}
+    for (profile, _), solution in zip(begun, found, strict=True):
+        near[profile.problem].append(solution)
+    fits = [(best_of(p.problem, near[p.problem]), p) for p in profiled]
     return sorted(fits, key=lambda pair: pair[0].cost)
 
 

@@ -233,7 +233,7 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, e
     promising of all, and where the set before leaves so much that it may be in the wrong minimum, effects are begun
     anew."""
     size = len(before.effects) + 1
-    near = sketches(ranked[: _SKETCHED[size]], crew)
+    near = sketches([p for k, p in enumerate(ranked) if k < _SKETCHED[size] or p.apart], crew)
     if not near:
         return [], None
     first, finished = judge(near[0][0], split, near=before.checked), None

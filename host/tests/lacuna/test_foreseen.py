@@ -1,19 +1,22 @@
 """What the factors of each run take up: an effect that goes with the condition is no scatter between runs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from lacuna.diagnosis.candidate import profiles, sketches
 from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import fit, foreseen
+from lacuna.estimation.problem import Point
 from lacuna.estimation.structure import Structure
 from lacuna.system import CorrectionSite, Effect, Parameter, Record, System
 
@@ -22,6 +25,7 @@ SD = 0.02  # N
 REPEATS = 4
 SPEEDS_MM_S = (2.0, 5.0, 8.0, 12.0, 20.0)
 HOLDING_N, SLIDING_N = 1.07, 1.0
+NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
 
 
 def friction(holding_N, sliding_N, speed_mm_s, fading_mm_s):
@@ -108,6 +112,29 @@ def test_nothing_is_grown_on_an_explanation_with_a_learnt_curve():
     curved = Structure(data.system, (), ("friction",))
     floor = data.base.fitted.problem.floor
     assert data.case.hidden(data.case.judge(fit(curved, data.case.split.fit, floor))) is None
+
+
+def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
+    """Steps with derivatives from where both frictions are one would make them one again, whatever the size."""
+    data = Diagnosed(10.0, 8)
+    base = data.base.fitted
+    holding, sliding = (base.structure.names.index(f"{name}_N") for name in ("holding", "sliding"))
+
+    def profiled(gap_N):
+        values = base.solution.point.values.copy()
+        values[holding] = values[sliding] + gap_N
+        moved = replace(base, solution=replace(base.solution, point=Point(values, base.solution.point.nuisances)))
+        return profiles(moved, ["fading"], data.case.split, base.problem.floor, NOBODY)[0]
+
+    assert not profiled(0.1).apart
+    profile = profiled(0.0)
+    assert profile.apart
+    assert len(profile.points) == 3
+    assert all(point.values[holding] > point.values[sliding] for point in profile.points)
+    (refitted, _), *_ = sketches([profile], NOBODY)
+    alone = [sketches([replace(profile, points=(point,))], NOBODY)[0][0].cost for point in profile.points]
+    assert refitted.cost == min(alone)
+    assert max(alone) > min(alone) + POLICY.gain, "only some of the sizes lead there"
 
 
 @pytest.mark.parametrize(("fading_mm_s", "seed", "verdict"), [(10.0, 5, "identified"), (0.0, 6, "none")])
