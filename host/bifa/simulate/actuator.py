@@ -79,6 +79,15 @@ def area_at(plant, block, x):
 
 
 @merged
+def pressure_moved(plant, block, before, after, pressure):
+    """The pressure once the stroke is another: what an area that varies makes of it."""
+    if not plant.active & chains.AIR:
+        return pressure
+    ratio = area_at(plant, block, before) / area_at(plant, block, after)
+    return pressure * chains.air(plant.active, plant.q, ratio)
+
+
+@merged
 def resistance(plant, curve, block, actuator, z, x, v, h):
     """Spring and damper at the end of a step as `force + growth * velocity`; the velocity is that of the end."""
     q, active = plant.q, plant.active

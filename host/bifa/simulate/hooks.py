@@ -13,6 +13,7 @@ the active effects in alphabetical order; an effect costs one test of a bit whil
 | `filling` | convergence factor alpha of (2) | `rate_per_s`, `pressure_psi`, `inlet_psi`, `volume_share` |
 | `loss` | 1/s of pressure lost | |
 | `area` | factor of the area a | `stroke_share` |
+| `air` | factor of the pressure as the area changes over a step | `area_ratio` (before over after) |
 | `play` | position of the spring | `position_m` |
 | `play_state` | new `state` | `position_m` |
 | `spring` | force now, its growth per velocity over the step | `small`, `direction`, `step_s` |
@@ -47,6 +48,7 @@ _HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "filling": (("rate_per_s", "pressure_psi", "inlet_psi", "volume_share"), "replace"),
     "loss": ((), "sum"),
     "area": (("stroke_share",), "product"),
+    "air": (("area_ratio",), "product"),
     "play": ((*_STATEFUL, "position_m"), "replace"),
     "play_state": ((*_STATEFUL, "z_new", "position_m"), "state"),
     "spring": ((*_STATEFUL, "small", "direction", "step_s"), "pair"),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from bifa.simulate import layout
-from bifa.simulate.actuator import area_at, pressure_after, remember, resistance
+from bifa.simulate.actuator import area_at, pressure_after, pressure_moved, remember, resistance
 from bifa.simulate.compiled import kernel, merged
 from bifa.simulate.hooks import chains
 from bifa.simulate.march import march, new_run, pressures, shown, start_effects
@@ -130,7 +130,8 @@ def static_rows(plant, rig, run, displacement, sample_times, out):
             for s in range(steps):
                 reached = before + (target - before) * (s + 1) / steps
                 sources(plant, rig, run.command, y, now + (s + 1) * h, run.source)
-                y[p] = pressure_after(plant, rig, block, actuator, z, z, y[x], y[p], run.source[actuator], h)
+                pressure = pressure_after(plant, rig, block, actuator, z, z, y[x], y[p], run.source[actuator], h)
+                y[p] = pressure_moved(plant, block, y[x], reached, pressure)
                 remember(plant, actuator, z, z, reached, reached - y[x], h)
                 y[x] = reached
                 if plant.active & chains.SENSOR:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bifa.simulate import layout
-from bifa.simulate.actuator import area_at, convergence, pressure_after, remember, resistance
+from bifa.simulate.actuator import area_at, convergence, pressure_after, pressure_moved, remember, resistance
 from bifa.simulate.compiled import inner, merged
 from bifa.simulate.hooks import chains
 from bifa.simulate.learnt import BACKWARD, FORWARD, GRIP_BACKWARD, GRIP_FORWARD, GRIP_PLACE, PLACE, learnt_at
@@ -164,7 +164,9 @@ def _small(plant, rig, actuator, source, y, z, h, y_new, z_new, narrower):
             if stiff * (x + h * pressed - offset) + damping * pressed > 0.0:
                 v_new = pressed
                 touches = 1
-    y_new[at], y_new[at + 1], y_new[at + 2] = x + h * v_new, v_new, p_new
+    x_new = x + h * v_new
+    y_new[at], y_new[at + 1] = x_new, v_new
+    y_new[at + 2] = pressure_moved(plant, layout.SMALL, x, x_new, p_new)
     remember(plant, actuator, z, z_new, y_new[at], h * v_new, h)
     slow = 2 if x > q[layout.SMALL + layout.THRESHOLD] else 0
     forward = 4 if v_new > 0.0 else 0
@@ -231,8 +233,9 @@ def _body(plant, rig, gravity, source, y, z, h, y_new, z_new):
         w_h, w_t, moving = _ends(plant, rig, gravity, tension, growth, y, y_new, h)
     y_new[X_HEAD], y_new[V_HEAD] = y[X_HEAD] + h * w_h, w_h
     y_new[X_TAIL], y_new[V_TAIL] = y[X_TAIL] + h * w_t, w_t
-    y_new[P_BODY] = p_new
-    remember(plant, 0, z, z_new, y_new[X_HEAD] - y_new[X_TAIL], h * (w_h - w_t), h)
+    x_new = y_new[X_HEAD] - y_new[X_TAIL]
+    y_new[P_BODY] = pressure_moved(plant, layout.BODY, x, x_new, p_new)
+    remember(plant, 0, z, z_new, x_new, h * (w_h - w_t), h)
     slow = 9 if x > q[layout.BODY + layout.THRESHOLD] else 0
     forward = 18 if w_h > w_t else 0
     kind = moving + slow + (forward if plant.active & chains.SPRING else 0)

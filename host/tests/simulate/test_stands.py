@@ -10,17 +10,23 @@ from bifa import robot, simulate
 from bifa.simulate import SimulationError
 
 
-def _lsoda_step(model, name, curve, mass, time, on, off, pressure):
-    """Eq. (1)-(3) as they stand; smooth but for x_th."""
-    b, a = model[f"{name}_damping_Ns_m"], model[f"{name}_area_N_psi"]
+def _lsoda_step(model, name, curve, mass, time, on, off, pressure, slope=0.0, force_kept=True):
+    """Eq. (1)-(3) as they stand, or, unless the air keeps its force, with a pressure in the place of (2)'s force;
+    smooth but for x_th. `slope`: of the area over the stroke."""
+    b, nominal = model[f"{name}_damping_Ns_m"], model[f"{name}_area_N_psi"]
     fast, slow = model[f"{name}_alpha_n_per_s"], model[f"{name}_alpha_s_per_s"]
     vacuum = model["supply_negative_psi"]
-    start = np.array([-0.005, 0.0, vacuum * a])
+
+    def area(x):
+        return nominal * (1.0 + slope * (x - curve.contracted_m) / curve.stroke_m)
+
+    start = np.array([-0.005, 0.0, vacuum * (area(-0.005) if force_kept else 1.0)])
 
     def rates(source):
         def right_hand_side(_, y):
             alpha = slow if y[0] > curve.unstable_m and source < 0.0 else fast
-            return [y[1], (-float(curve.force(y[0])) - b * y[1] + y[2]) / mass, alpha * (source * a - y[2])]
+            push, aim = (y[2], source * area(y[0])) if force_kept else (y[2] * area(y[0]), source)
+            return [y[1], (-float(curve.force(y[0])) - b * y[1] + push) / mass, alpha * (aim - y[2])]
 
         return right_hand_side
 
@@ -33,11 +39,13 @@ def _lsoda_step(model, name, curve, mass, time, on, off, pressure):
         rows.append(part[:, :-1])
         state = part[:, -1]
     y = np.concatenate(rows, axis=1)
-    return 1e3 * (y[0] - curve.contracted_m), (y[2] - b * y[1]) / a
+    inside = y[2] / (area(y[0]) if force_kept else 1.0)
+    return 1e3 * (y[0] - curve.contracted_m), inside - b * y[1] / area(y[0])
 
 
+@pytest.mark.parametrize(("slope", "force_kept"), [(0.0, True), (-0.2, True), (-0.2, False), (0.15, True)])
 @pytest.mark.parametrize("actuator", ["large", "small"])
-def test_step_response_agrees_with_lsoda(actuator):
+def test_step_response_agrees_with_lsoda(actuator, slope, force_kept):
     model = robot.nominal()
     time = np.arange(0.0, 8.0, 0.01)
     command = np.where((time >= 0.5) & (time < 4.0), 1.0, 0.0)
@@ -51,7 +59,11 @@ def test_step_response_agrees_with_lsoda(actuator):
         0.5,
         4.0,
         7.0,
+        slope,
+        force_kept,
     )
+    if slope:
+        model = model.with_effects({"area_variation": {"slope": slope, "force_kept": float(force_kept)}})
     record = simulate.step_response(model, actuator, time, command, 7.0, tolerance_m=1e-8)
     np.testing.assert_allclose(record["displacement_mm"], displacement, atol=2e-3)
     np.testing.assert_allclose(record["pressure_psi"], pressure, atol=2e-3)
