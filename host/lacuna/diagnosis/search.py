@@ -159,6 +159,7 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
         if before - best.excess < least or enough(best):
             break
         if own := free_form(best, split, policy=policy, crew=crew):
+            own = _finished(own, split, policy, crew)
             freed.append(own)
             if enough(own):
                 break
