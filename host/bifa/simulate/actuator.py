@@ -59,7 +59,7 @@ def pressure_after(plant, rig, block, actuator, z, z_new, x, pressure, source, h
     q, active = plant.q, plant.active
     inlet = chains.line(active, q, z, actuator, z_new, source, h)
     rate = chains.filling(active, q, convergence(q, block, x, inlet), pressure, inlet, rig.share[actuator])
-    total = rate + chains.loss(active, q)
+    total = rate + chains.loss(active, q, pressure)
     settled = inlet * rate / total
     after = settled + (pressure - settled) * math.exp(-total * h)
     if plant.learnt.shape[0]:

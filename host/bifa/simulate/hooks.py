@@ -11,7 +11,7 @@ the active effects in alphabetical order; an effect costs one test of a bit whil
 | `load` | supply pressure under load | `supply_psi`, `conductance_per_s`, `pull_psi_per_s`, `positive` |
 | `line` | chamber's inlet pressure after the step, kept as `state` | `source_psi`, `step_s` |
 | `filling` | convergence factor alpha of (2) | `rate_per_s`, `pressure_psi`, `inlet_psi`, `volume_share` |
-| `loss` | 1/s of pressure lost | |
+| `loss` | 1/s of pressure lost | `pressure_psi` |
 | `area` | factor of the area a | `stroke_share` |
 | `air` | factor of the pressure as the area changes over a step | `area_ratio` (before over after) |
 | `play` | position of the spring | `position_m` |
@@ -46,7 +46,7 @@ _HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "load": (("supply_psi", "conductance_per_s", "pull_psi_per_s", "positive"), "replace"),
     "line": ((*_STATEFUL, "z_new", "source_psi", "step_s"), "keep"),
     "filling": (("rate_per_s", "pressure_psi", "inlet_psi", "volume_share"), "replace"),
-    "loss": ((), "sum"),
+    "loss": (("pressure_psi",), "sum"),
     "area": (("stroke_share",), "product"),
     "air": (("area_ratio",), "product"),
     "play": ((*_STATEFUL, "position_m"), "replace"),
