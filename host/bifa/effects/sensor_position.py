@@ -5,16 +5,27 @@ from bifa.effects.effect import EffectParameter, PhysicalEffect
 EFFECT = PhysicalEffect(
     name="sensor_position",
     summary="while air flows, the sensor reads between the chamber's pressure and the valve's",
-    equation="reading = p + share (p_d - p)",
-    source="paper, section II.C: sensors near the valves and away from the robot",
+    equation="reading = p + share (p_d - p) (|p_d - p| / 12 psi)^(power - 1)",
+    source="paper, section II.C: sensors near the valves and away from the robot; the drop in a line grows with the flow:"
+    " laminar power 1, turbulent 1.75 in a smooth and 2 in a rough pipe (H. Blasius, 1913; L. F. Moody, Trans. ASME 66,"
+    " 1944)",
     enters="the pressure channels only",
     experiments=("step_response", "locomotion"),
     confusable_with=(),
-    parameters=(EffectParameter("share", "", 0.0, 1.0, 0.05, "share of the line's drop that is seen", size=True),),
+    parameters=(
+        EffectParameter(
+            "share", "", 0.0, 1.0, 0.05, "share of the line's drop that is seen, where it is 12 psi", size=True
+        ),
+        EffectParameter("power", "", 0.4, 2.6, 1.0, "of the drop: 1 laminar, 1.75 to 2 turbulent"),
+    ),
     freed_at=("pressure_sensor_inflow",),
 )
 
 
-def sensed(share, pressure_psi, source_psi):
+_USUAL_PSI, _LEAST_PSI = 12.0, 0.01
+
+
+def sensed(share, power, pressure_psi, source_psi):
     """Pressure where the sensor sits."""
-    return pressure_psi + share * (source_psi - pressure_psi)
+    drop_psi = source_psi - pressure_psi
+    return pressure_psi + share * drop_psi * (max(abs(drop_psi), _LEAST_PSI) / _USUAL_PSI) ** (power - 1.0)
