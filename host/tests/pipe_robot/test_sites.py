@@ -112,7 +112,11 @@ def with_effect(theta, name, **values):
 # A curve (a row each where they differ), the effect of the library that does the same, and where it shows.
 ALIKE = {
     "valves": ([lambda _: 0.03], with_effect({}, "valve_latency", delay_s=0.03), ("step_response", "locomotion")),
-    "area_stroke": ([lambda x: 0.1 * x], with_effect({}, "area_variation", slope=0.1), ("static_loading",)),
+    "area_stroke": (
+        [lambda x: 0.1 * x],
+        with_effect({}, "area_variation", slope=0.1, force_kept=0.0),
+        ("static_loading",),
+    ),
     "grip_speed": (
         [lambda _: 0.15, lambda _: -0.15],
         with_effect({}, "friction_direction", asymmetry=0.15),
