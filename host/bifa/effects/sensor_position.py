@@ -6,16 +6,14 @@ EFFECT = PhysicalEffect(
     name="sensor_position",
     summary="while air flows, the sensor reads between the chamber's pressure and the valve's",
     equation="reading = p + share (p_d - p) (|p_d - p| / 12 psi)^(power - 1)",
-    source="paper, section II.C: sensors near the valves and away from the robot; the drop in a line grows with the flow:"
-    " laminar power 1, turbulent 1.75 in a smooth and 2 in a rough pipe (H. Blasius, 1913; L. F. Moody, Trans. ASME 66,"
+    source="paper, section II.C: sensors near the valves and away from the robot; the drop in a line grows with a power"
+    " of the flow, 1 laminar, 1.75 in a smooth and 2 in a rough pipe (H. Blasius, 1913; L. F. Moody, Trans. ASME 66,"
     " 1944)",
     enters="the pressure channels only",
     experiments=("step_response", "locomotion"),
     confusable_with=(),
     parameters=(
-        EffectParameter(
-            "share", "", 0.0, 1.0, 0.05, "share of the line's drop that is seen, where it is 12 psi", size=True
-        ),
+        EffectParameter("share", "", 0.0, 1.0, 0.05, "share that is seen of a drop of 12 psi", size=True),
         EffectParameter("power", "", 0.4, 2.6, 1.0, "of the drop: 1 laminar, 1.75 to 2 turbulent"),
     ),
     freed_at=("pressure_sensor_inflow",),
