@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from lacuna.errors import LacunaError
+from lacuna.errors import LacunaError, MisuseError, TooLittleDataError
 from lacuna.system import Channels, Record, System, Theta
 
 _FEWEST_TRIALS, _FEWEST_SAMPLES = 3, 8
 _SAME = 1e-9  # of a channel's spread: what differs by less does not differ
 _NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent
 _OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
-
-
-class MisuseError(LacunaError):
-    """The system or its records are not what a diagnosis needs; the text says where and what to do."""
-
-
-class TooLittleDataError(MisuseError):
-    """There is nothing to fit, or nothing to judge a fit by."""
 
 
 def check(system: System) -> tuple[str, ...]:
@@ -120,8 +113,19 @@ def _check_repeats(trials: Sequence[Record]) -> None:
     spreads = {name: _input_spread(trials, name) for name in names}
     for first, *others in groups.values():
         for other in others:
+            _check_same_time(first, other)
             for name in sorted(first.inputs.keys() & other.inputs.keys()):
                 _check_same_input(first, other, name, spreads[name])
+
+
+def _check_same_time(first: Record, other: Record) -> None:
+    """Repeats are compared at equal times."""
+    (a, b), (c, d) = ((float(t.time_s[0]), float(t.time_s[-1])) for t in (first, other))
+    if min(b, d) - max(a, c) < 0.5 * min(b - a, d - c):
+        raise MisuseError(
+            f"trials {first.name} and {other.name} are declared as repeats (condition {first.condition}), but one is"
+            f" from {a:g} to {b:g} s and the other from {c:g} to {d:g} s: count the times of each from its own start."
+        )
 
 
 def _input_spread(trials: Sequence[Record], name: str) -> float:
@@ -143,6 +147,32 @@ def _check_same_input(first: Record, other: Record, name: str, spread: float) ->
         )
 
 
+def _check_same_values(system: System, start: Theta, trials: Sequence[Record], predictions) -> None:
+    """Repeats whose single inputs (a heater's power) change what is predicted are none."""
+    groups: dict[Hashable, list[Record]] = defaultdict(list)
+    for trial in trials:
+        groups[trial.experiment, trial.condition].append(trial)
+    for first, *others in groups.values():
+        for other in others:
+            for name, value in other.inputs.items():
+                if name not in first.inputs or not _number_changed(first.inputs[name], value):
+                    continue
+                there = replace(first, inputs={**first.inputs, name: value})
+                found = _predicted(system, start, (), there)
+                for channel, measured in first.channels.items():
+                    if _differ(found[channel], predictions[first.name][channel], _OTHER * _spread(measured)):
+                        raise MisuseError(
+                            f"trials {first.name} and {other.name} are declared as repeats (condition"
+                            f" {first.condition}), but their {name} is {first.inputs[name]:g} and {value:g}, with which"
+                            f" {channel} is predicted differently. Give them different conditions."
+                        )
+
+
+def _number_changed(one: object, other: object) -> bool:
+    numbers = [np.asarray(value) for value in (one, other)]
+    return all(n.ndim == 0 and n.dtype.kind in "fiu" for n in numbers) and bool(numbers[0] != numbers[1])
+
+
 # -- the model ------------------------------------------------------------------------------------------------
 
 
@@ -157,6 +187,8 @@ def _check_model(system: System, trials: Sequence[Record]) -> tuple[str, ...]:
         )
     good = [t for t in trials if t.name not in failed]
     _check_deterministic(system, start, good[0], predictions)
+    _check_same_values(system, start, good, predictions)
+    system.regressors(good[0], predictions[good[0].name])
     _check_effects(system, start, good, predictions)
     warnings = (
         [f"With its parameters at their initial values the model cannot predict {_listed(failed)}."] if failed else []

@@ -32,7 +32,7 @@ class Coordinate:
 
     def of(self, p: Parameter) -> Parameter:
         """`p` as it is fitted."""
-        lower, upper = sorted((self.fitted(p.lower), self.fitted(p.upper)))
+        lower, upper = sorted(self._end(bound, p.value) for bound in (p.lower, p.upper))
         slope = self.slope(p.value)
         return replace(
             p,
@@ -44,6 +44,10 @@ class Coordinate:
             prior_sd=None if p.prior_sd is None else p.prior_sd * slope,
             elsewhere=tuple(map(self.fitted, p.elsewhere)),
         )
+
+    def _end(self, bound: float, value: float) -> float:
+        """The inverse of 0 is infinite, on the value's side."""
+        return self.fitted(math.copysign(0.0, value) if self is INVERSE and bound == 0 else bound)
 
 
 def _same(value: float) -> float:

@@ -1,7 +1,15 @@
-"""The root of every error that the engine expects: its text says what is wrong and what to do."""
+"""Errors that the engine expects: their text says what is wrong and what to do."""
 
 
 class LacunaError(Exception):
     """An error meant for the user: one sentence, to be shown without a traceback."""
 
     for_the_user = True
+
+
+class MisuseError(LacunaError):
+    """The system or its records are not what a diagnosis needs; the text says where and what to do."""
+
+
+class TooLittleDataError(MisuseError):
+    """There is nothing to fit, or nothing to judge a fit by."""

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from copy import copy
 from typing import Any
 
 import numpy as np
 
 from lacuna.coordinates import PLAIN, Coordinate, of_effect, of_parameter
-from lacuna.errors import LacunaError
+from lacuna.errors import LacunaError, MisuseError
 from lacuna.records import Stretch
 from lacuna.system import (
+    LEARNT,
     CandidateExperiment,
     Channels,
     Correction,
@@ -91,8 +92,10 @@ class FunctionSystem(System):
         self.simulate, self.name = simulate, name or getattr(simulate, "__name__", "system")
         self.outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
         self.trials: tuple[Record, ...] = ()
-        given, library = tuple(parameters), _library(effects)
-        _all_different([p.name for p in given], "parameter")
+        given, library, sites = tuple(parameters), _library(effects), tuple(curves)
+        _check_names([p.name for p in given], "parameter")
+        _check_names([e.name for e in library], "effect")
+        _all_different([*(p.name for p in given), *(e.name for e in library), *(s.name for s in sites)], "name")
         ordered = {p.name for p in given if p.at_least} | {p.at_least for p in given}
         self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in given}
         self.parameters = tuple(self._coordinates[p.name].of(p) for p in given)
@@ -100,6 +103,11 @@ class FunctionSystem(System):
         self._off: dict[str, float] = {}  # every effect's parameters as they are when it is off, as told
         for effect in library:
             self.effects[effect.name], coordinates = of_effect(effect)
+            if not np.isfinite(self.effects[effect.name].absent):
+                raise DeclarationError(
+                    f"effect {effect.name} is absent at infinity: its size has to keep its sign, so let one of its"
+                    " bounds be 0, or both on the same side of it."
+                )
             self._coordinates |= coordinates
             typical = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
             self._off |= typical | dict.fromkeys(effect.size_names, effect.absent)
@@ -113,16 +121,26 @@ class FunctionSystem(System):
         self.estimates_noise_time = noise_time_s == ESTIMATED
         self._noise_time_s = 0.0 if self.estimates_noise_time else noise_time_s
         self._raised: dict[tuple[str, str], float] = {}
-        self._sites = {site.name: site for site in curves}
+        self._sites = {site.name: site for site in sites}
+        if isinstance(spare, str):
+            raise DeclarationError(f"spare is a collection of conditions: write [{spare!r}].")
         self._experiments, self._spare = tuple(experiments), frozenset(spare)
 
     def __repr__(self) -> str:
         return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"
 
     def with_trials(self, trials: Iterable[Record]) -> FunctionSystem:
-        """The same system with these measured records."""
+        """The same system with these measured records. Raises DeclarationError if what is declared of conditions and
+        outputs is of none of them."""
+        trials = tuple(trials)
+        conditions, outputs = {t.condition for t in trials}, {name for t in trials for name in t.channels}
+        _check_known("spare", self._spare, conditions)
+        for what, told in (("accuracy", self._accuracy), ("sensor_noise", self._sensor_noise)):
+            _check_known(what, told, outputs)
+        if isinstance(self._noise_time_s, Mapping):
+            _check_known("noise_time_s", self._noise_time_s, outputs)
         other = copy(self)
-        other.trials = tuple(trials)
+        other.trials = trials
         return other
 
     def with_floor(self, least: Mapping[tuple[str, str], float]) -> FunctionSystem:
@@ -146,6 +164,10 @@ class FunctionSystem(System):
     def told(self, parameter: str, value: float) -> float:
         return self.coordinate(parameter).told(value)
 
+    def times_slope(self, parameter: str, value: float) -> float:
+        coordinate = self.coordinate(parameter)
+        return coordinate.told(value) * coordinate.slope(coordinate.told(value))
+
     def values(self, theta: Theta, corrections: Sequence[Correction] = ()) -> Values:
         """The values passed to `simulate` for a fitted `theta`: the user's parameters, curves, absent effects off."""
         found = Values({p.name: 0.0 for p in self.parameters} | self._off)
@@ -156,10 +178,19 @@ class FunctionSystem(System):
             found |= {name: Curve(site, learnt.get(name)) for name, site in self._sites.items()}
         return found
 
+    def simulated(self, record: Record, values: Values) -> Any:
+        """What `simulate` returns, of a stretch of a longer run its own samples."""
+        if not isinstance(record.payload, Stretch):
+            return self.simulate(record, values)
+        whole = record.payload
+        found = self.simulate(whole.run, values)
+        if isinstance(found, Mapping):
+            return {name: whole.of(column) for name, column in found.items()}
+        return whole.of(found)
+
     def run(self, record: Record, values: Values) -> Channels:
         """The result of `simulate`, in whatever form, as channels by name."""
-        whole = record.payload if isinstance(record.payload, Stretch) else None
-        found = self.simulate(whole.run if whole else record, values)
+        found = self.simulated(record, values)
         if not isinstance(found, Mapping):
             if len(record.channels) != 1:
                 raise DeclarationError(
@@ -167,8 +198,7 @@ class FunctionSystem(System):
                     f" {', '.join(record.channels)}: return them by name, as a dict of arrays."
                 )
             found = {next(iter(record.channels)): found}
-        channels = {name: np.asarray(column) for name, column in found.items()}
-        return {n: c[whole.first :] if c.ndim else c for n, c in channels.items()} if whole else channels
+        return {name: np.asarray(column) for name, column in found.items()}
 
     # -- what the engine asks ----------------------------------------------------------------------------------
 
@@ -184,13 +214,57 @@ class FunctionSystem(System):
         try:
             return self.run(trial, self.values(theta, corrections))
         except (ArithmeticError, np.linalg.LinAlgError):  # there is no simulation so far out
-            return {name: np.full(column.shape, np.nan) for name, column in trial.channels.items()}
+            return _failed(trial)
+
+    def predict_trials(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trials: Sequence[Record],
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Sequence[Correction]] = (),
+        alike: bool = False,
+    ) -> list[Channels]:
+        """As `predict`, but that a search goes on where a model that can be simulated from its initial values cannot:
+        a ValueError, and an output of another shape than was measured, count as NaN. Raises MisuseError, with trial
+        and values, for any other error of the model."""
+        corrections = corrections or [()] * len(thetas)
+        return [self._sought(*one, effects) for one in zip(thetas, trials, corrections, strict=True)]
+
+    def _sought(
+        self, theta: Theta, trial: Record, corrections: Sequence[Correction], effects: tuple[str, ...]
+    ) -> Channels:
+        try:
+            found = self.predict(theta, effects, trial, corrections=corrections)
+        except ValueError:
+            return _failed(trial)
+        except LacunaError:
+            raise
+        except Exception as error:
+            at = ", ".join(f"{name} = {self.told(name, value):.6g}" for name, value in theta.items())
+            raise MisuseError(
+                f"trial {trial.name}: the model raises {type(error).__name__}: {error} at {at}. Return NaN where it"
+                " cannot be simulated."
+            ) from error
+        alike = all(
+            name in found and found[name].shape == column.shape and found[name].dtype.kind in "fiu"
+            for name, column in trial.channels.items()
+        )
+        return found if alike else _failed(trial)
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         return tuple(self._nuisances(trial)) if callable(self._nuisances) else self._nuisances
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
-        return dict(self._regressors(trial, prediction))
+        found = {name: np.asarray(column) for name, column in self._regressors(trial, prediction).items()}
+        for name, column in found.items():
+            if column.shape != trial.time_s.shape or column.dtype.kind not in "fiub":
+                raise DeclarationError(
+                    f"regressor {name} of trial {trial.name} is {column.dtype} of shape {column.shape}: give"
+                    f" {len(trial.time_s)} numbers, one for each sample."
+                )
+        return found
 
     def sensor_noise(self, experiment: str, channel: str) -> float:
         return max(self._sensor_noise.get(channel, 0.0), self._raised.get((experiment, channel), 0.0))
@@ -225,6 +299,25 @@ def _library(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     return found
 
 
+def _failed(trial: Record) -> Channels:
+    return {name: np.full(column.shape, np.nan) for name, column in trial.channels.items()}
+
+
+def _check_names(names: Sequence[str], what: str) -> None:
+    """`theta.NAME` has to lead to them, and nothing that is learnt may have them."""
+    for name in names:
+        if "." in name or name == LEARNT or hasattr(Values, name):
+            raise DeclarationError(f"{what} {name!r}: choose another name, without a dot; this one is not free.")
+    _all_different(names, what)
+
+
+def _check_known(what: str, given: Iterable[Hashable], known: Collection[Hashable]) -> None:
+    for one in given:
+        if one not in known:
+            there = ", ".join(sorted(map(str, known)))
+            raise DeclarationError(f"{what} names {one!r}, which none of the records has; there are {there}.")
+
+
 def _all_different(names: Sequence[str], what: str) -> None:
     for name in names:
         if names.count(name) > 1:
@@ -238,4 +331,5 @@ def _regressors(record: Record, prediction: Channels) -> dict[str, np.ndarray]:
         rate = np.gradient(column, record.time_s)
         found |= {name: column, f"rate of {name}": rate, f"direction of {name}": np.sign(rate)}
     inputs = {name: np.asarray(column) for name, column in record.inputs.items()}
-    return found | {n: c for n, c in inputs.items() if c.shape == record.time_s.shape} | {"time": record.time_s}
+    inputs = {n: c for n, c in inputs.items() if c.shape == record.time_s.shape and c.dtype.kind in "fiub"}
+    return found | inputs | {"time": record.time_s}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -55,7 +56,7 @@ def read(data: Any) -> list[Record | Table]:
       DataFrame, an xarray Dataset (one dimension), or a `Record`,
     - a DataFrame with a column `name`, or an xarray Dataset with a second dimension, for many in one,
     - a folder: one CSV file per record, column names in its first line. Files that differ only by a number at the end
-      (`step_1.csv`, `step_2.csv`) are repeats of one condition.
+      (`step_1.csv`, `step_2.csv`) are repeats of one condition, if no column `condition` says otherwise.
 
     A column `time_s` (or `time`, `t`; the index in pandas and xarray) holds seconds. Single values per record, and what
     is called `condition` (records with an equal one are repeats), `experiment`, `order` (its place in the day), may
@@ -63,7 +64,7 @@ def read(data: Any) -> list[Record | Table]:
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
-    if isinstance(data, Record):
+    if isinstance(data, Record | Table):
         return [data]
     if _is_table(data):
         return [_table(part, name) for name, part in _parts(data)]
@@ -172,6 +173,10 @@ def _whole(order: Any) -> int | None:
 
 
 def _folder(folder: Path) -> list[Record | Table]:
+    if folder.is_file():
+        return [_csv(folder)]
+    if not folder.exists():
+        raise RecordError(f"{folder}: no such folder.")
     files = sorted(folder.glob("*.csv"))
     if not files:
         raise RecordError(f"{folder} holds no CSV files.")
@@ -179,17 +184,40 @@ def _folder(folder: Path) -> list[Record | Table]:
 
 
 def _csv(file: Path) -> Table:
-    with file.open(encoding="utf-8") as lines:
-        names = [name.strip() for name in lines.readline().split(",")]
     try:
-        rows = np.genfromtxt(file, delimiter=",", skip_header=1, ndmin=2, encoding="utf-8")
-    except ValueError as error:
-        raise RecordError(f"{file.name}: {' '.join(str(error).split())}") from None
-    if rows.shape[1] != len(names):
-        raise RecordError(f"{file.name} names {len(names)} columns and has {rows.shape[1]}.")
+        with file.open(newline="", encoding="utf-8-sig") as lines:  # a spreadsheet begins its files with a mark
+            reader = csv.reader(lines, skipinitialspace=True)
+            names = [name.strip() for name in next(reader, [])]
+            rows = [(reader.line_num, row) for row in reader if "".join(row) and not row[0].startswith("#")]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordError(f"{file.name} is not a table of text in UTF-8: {error}") from None
+    if len(names) == 1 and ";" in names[0]:
+        raise RecordError(f"{file.name} separates its columns by semicolons: separate them by commas.")
+    for line, row in rows:
+        if len(row) != len(names):
+            raise RecordError(f"{file.name}, line {line}: {len(row)} values for {len(names)} columns.")
+    cells = zip(*(row for _, row in rows), strict=True)
+    columns = {n: _typed(column, file, [line for line, _ in rows], n) for n, column in zip(names, cells, strict=False)}
     condition = re.sub(r"[ _-]?\d+$", "", file.stem) or file.stem
-    table = _table({"condition": condition} | dict(zip(names, rows.T, strict=True)), file.stem)
-    return table
+    return _table({"condition": condition} | columns, file.stem)
+
+
+def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:
+    """Numbers, NaN where a cell is empty; or text, of labels and where there is no number."""
+    values = [_number(cell) for cell in cells]
+    if None not in values:
+        return np.array(values)
+    if name in _LABELS or not any(value is not None and np.isfinite(value) for value in values):
+        return np.array(cells)
+    at = values.index(None)
+    raise RecordError(f"{file.name}, line {lines[at]}, column {name}: {cells[at]!r} is not a number.")
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell) if cell.strip() else np.nan
+    except ValueError:
+        return None
 
 
 # -- one long record ------------------------------------------------------------------------------------------
@@ -201,6 +229,11 @@ class Stretch:
 
     run: Record
     first: int
+
+    def of(self, column: Any) -> np.ndarray:
+        """The stretch's own samples of a column of the run."""
+        column = np.asarray(column)
+        return column[self.first :] if column.ndim else column
 
 
 def windows(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -11,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from lacuna.check import MisuseError
+from lacuna.cores import usable_cores
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.errors import MisuseError
 from lacuna.estimation.problem import use_threads
 from lacuna.function_system import FunctionSystem
 from lacuna.misfit import compared_at_misfit
@@ -108,7 +108,7 @@ def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     """The names that `simulate` gives its outputs, tried on one record. Raises MisuseError."""
     record = stretched(table, table.record(()), ())
     run = record.payload.run if record.payload else record
-    theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(run))}
+    theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(record))}
     try:
         found = system.simulate(run, system.values(theta))
     except Exception as error:
@@ -132,6 +132,5 @@ def _workers(n_jobs: int | None, executor: Executor | None) -> Iterator[Executor
         return
     from loky import ProcessPoolExecutor
 
-    cores = max(1, len(os.sched_getaffinity(0)))
-    with ProcessPoolExecutor(n_jobs if n_jobs > 0 else cores, initializer=use_threads, initargs=(1,)) as pool:
+    with ProcessPoolExecutor(n_jobs if n_jobs > 0 else usable_cores(), initializer=use_threads, initargs=(1,)) as pool:
         yield pool

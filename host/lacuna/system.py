@@ -19,6 +19,8 @@ import numpy as np
 Theta = Mapping[str, float]
 Channels = dict[str, np.ndarray]
 
+LEARNT = "correction"  # what parameter names of learnt curves begin with, so that no effect may be called so
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -294,6 +296,11 @@ class System(Protocol):
 
     def told(self, parameter: str, value: float) -> float:
         """A parameter's fitted value in the user's terms, if the two differ (a logarithm)."""
+        return value
+
+    def times_slope(self, parameter: str, value: float) -> float:
+        """The derivative of a parameter's fitted value by the logarithm of what is told of it: the value itself, if the
+        two do not differ."""
         return value
 
     def noise_time_s(self, experiment: str, channel: str) -> float:

@@ -21,7 +21,7 @@ class Model:
     """The completed model, called like `simulate`: `model(record)` or `model(record, theta)`.
 
     `record` is anything that `diagnose` takes as one record, `theta` a mapping of values that differ from the fitted
-    ones, `model.theta`. Returns what `simulate` returns.
+    ones, `model.theta`. Returns what `simulate` returns, of a window or a segment its own samples.
     """
 
     def __init__(self, system: System, diagnosis: Diagnosis):
@@ -40,7 +40,7 @@ class Model:
         record = _one(record, self._system.outputs)
         own = {p.name: p.value for p in self._system.nuisances(record)}
         values = self._system.values(self._theta | own, self._corrections)
-        return self._system.simulate(record, Values(values | dict(theta or {})))
+        return self._system.simulated(record, Values(values | dict(theta or {})))
 
     def __repr__(self) -> str:
         return f"Model({', '.join(f'{name}={value:.4g}' for name, value in self.theta.items())})"

@@ -6,7 +6,7 @@ import time
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-from lacuna.check import TooLittleDataError, check
+from lacuna.check import check
 from lacuna.diagnosis.candidate import finished_afresh
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
@@ -25,6 +25,7 @@ from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Finished
 from lacuna.diagnosis.warn import warnings_of
+from lacuna.errors import TooLittleDataError
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
@@ -100,7 +101,9 @@ def diagnose(
     cautions = check(system)
     split = split_trials(system.trials, system.spare())
     if not split.fit or not split.judging:
-        raise TooLittleDataError("A diagnosis needs at least three trials: two to fit and one to choose by.")
+        raise TooLittleDataError(
+            "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."
+        )
     crew, case = Crew(progress, executor, forks=system.forks), Case(system, split, policy, seed)
     crew.say("fitting the base model")
     base = case.fit_base(starts)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from lacuna.cores import usable_cores
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.structure import Structure
 from lacuna.system import Channels, Parameter, Record
@@ -21,7 +22,7 @@ LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivati
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
 _OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
 _REMEMBERED = 4  # points whose residuals are kept
-_FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
+FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
 
 
 _threads: int | None = None
@@ -29,7 +30,7 @@ _threads: int | None = None
 
 def cores() -> int:
     """On how many this process simulates."""
-    return _threads or max(1, len(os.sched_getaffinity(0)))
+    return _threads or usable_cores()
 
 
 @cache
@@ -223,10 +224,13 @@ class Problem:
             structure, own = np.zeros((len(free), len(changes))), np.zeros((len(nuisances), len(changes)))
             structure[moving], own[stepping] = changes[:, : len(moving)].T, changes[:, len(moving) :].T
             for k, of in factors.items():
-                own[k] = sum(values[j] * structure[free.index(j)] for j in of) / nuisances[k]
+                own[k] = sum(self._by_factor(j, values[j]) * structure[free.index(j)] for j in of) / nuisances[k]
             return structure.T, own.T
 
         return in_parallel(blocks, range(len(self.trials)))
+
+    def _by_factor(self, index: int, value: float) -> float:
+        return self.structure.system.times_slope(self.structure.names[index], value)
 
     def _factors(self, index: int, moving: Sequence[int]) -> dict[int, list[int]]:
         """The nuisances of a trial that are factors of parameters all of which are in `moving`, and of which ones."""
@@ -243,7 +247,7 @@ class Problem:
         """By what the residuals of a trial change, shape (n, len(moved)), from `here` to each of `moved` nearby:
         values and the trial's nuisances."""
         found = self._deviations(self._simulate([here, *moved], index, coarse=coarse, alike=True), index)
-        failed = np.flatnonzero((found[1:] == _FAILED).any(axis=1))
+        failed = np.flatnonzero((found[1:] == FAILED).any(axis=1))
         seen = self._compressed(found[[0, *(failed + 1)]], index) if len(failed) else None
         first, changes = found[:1], np.subtract(found[1:], found[0], out=found[1:])
         first, weight = self._looked_at(first, index)
@@ -339,7 +343,7 @@ class Problem:
         predicted -= measured
         predicted *= weight
         z = predicted if keep.all() else predicted[:, keep]
-        z[~np.isfinite(z)] = _FAILED
+        z[~np.isfinite(z)] = FAILED
         return z
 
 

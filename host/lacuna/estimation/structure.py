@@ -9,9 +9,8 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from lacuna.system import Correction, CorrectionSite, Parameter, Record, System, Theta
+from lacuna.system import LEARNT, Correction, CorrectionSite, Parameter, Record, System, Theta
 
-_LEARNT = "correction"  # the owner that names of knots begin with
 _RELEASED = 20.0  # times its standard deviation: a prior that hardly counts, and yet holds what nothing else does
 _TABLE_INTERVALS = 64  # at least
 
@@ -135,7 +134,7 @@ class Structure:
         owner = self.names[index].split(".")
         experiments = (
             self.system.correction_sites[owner[1]].experiments
-            if owner[0] == _LEARNT
+            if owner[0] == LEARNT
             else self.system.effects[owner[0]].experiments
         )
         return not experiments or trial.experiment in experiments
@@ -143,11 +142,11 @@ class Structure:
 
 def is_learnt(name: str) -> bool:
     """Whether this parameter is a knot of a learnt curve."""
-    return name.startswith(f"{_LEARNT}.")
+    return name.startswith(f"{LEARNT}.")
 
 
 def _knot_name(site: CorrectionSite, row: int, knot: int) -> str:
-    return f"{_LEARNT}.{site.name}.{row}_{knot}"
+    return f"{LEARNT}.{site.name}.{row}_{knot}"
 
 
 def _knot_parameters(site: CorrectionSite) -> list[Parameter]:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import lacuna
-from lacuna.check import MisuseError, TooLittleDataError, check
+from lacuna.check import check
 from lacuna.diagnosis.diagnose import diagnose
+from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.function_system import DeclarationError
 from lacuna.records import RecordError
 from lacuna.run import with_records
@@ -181,11 +182,90 @@ def _bare(record, theta):
     return heater._lag(theta.gain_K_W * record["power_W"], theta.tau_s)
 
 
+# -- declarations of a plain function -------------------------------------------------------------------------
+
+
+def declared(effect="bend", parameter="slope", **told):
+    return lacuna.System(
+        lambda record, theta: record.time_s, [Parameter(parameter, "", 1.0, 0.0, 2.0)], [Effect(effect, BEND)], **told
+    )
+
+
+BEND = Parameter("by", "", 0.5, -5.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter"), [("correction", "slope"), ("a.b", "slope"), ("slope", "slope"), ("items", "slope")]
+)
+def test_refuses_names_that_theta_cannot_have(effect, parameter):
+    with pytest.raises(DeclarationError, match=effect):
+        declared(effect, parameter)
+    with pytest.raises(DeclarationError, match="copy"):
+        declared(parameter="copy")
+
+
+@pytest.mark.parametrize(
+    "told", [{"spare": ["10 V"]}, {"accuracy": {"temperature": 0.1}}, {"noise_time_s": {"temperature": 1.0}}]
+)
+def test_refuses_what_is_declared_of_nothing(told):
+    with pytest.raises(DeclarationError, match="none of the records has; there are"):
+        with_records(heater.system(**told), heater.records(1))
+
+
+def test_refuses_a_condition_where_conditions_belong():
+    with pytest.raises(DeclarationError, match=r"\['sweep 4 W'\]"):
+        heater.system(spare="sweep 4 W")
+
+
+def test_refuses_an_infinite_size_that_may_be_of_either_sign():
+    with pytest.raises(DeclarationError, match="absent at infinity"):
+        heater.system(Effect("saturation", Parameter("limit_W", "W", 8.0, -1.0, np.inf), absent=np.inf))
+    below = heater.system(Effect("saturation", Parameter("limit_W", "W", -8.0, -20.0, 0.0), absent=-np.inf))
+    size = below.effects["saturation"].parameters[0]
+    assert (size.lower, size.upper) == (-np.inf, -0.05)
+
+
+def test_refuses_repeats_on_a_clock_of_the_day():
+    given = heater.records(2)
+    for place, one in enumerate(given.values()):
+        one["time_s"] = one["time_s"] + 500.0 * place
+    with pytest.raises(MisuseError, match="from its own start"):
+        check(with_records(heater.system(), given))
+
+
+def test_refuses_repeats_of_which_a_single_input_differs_if_it_matters():
+    def simulate(record, theta):
+        return {"y": theta.gain * record["volt"] * record.time_s}
+
+    def one(volt, room_C):
+        return {"time_s": T, "y": volt * T, "volt": volt, "room_C": room_C, "condition": "all"}
+
+    system = lacuna.System(simulate, [Parameter("gain", "", 1.1, -5.0, 5.0)])
+    check(with_records(system, [one(2.0, 20.0), one(2.0, 25.0), one(2.0, 30.0)]))
+    with pytest.raises(MisuseError, match="their volt is 2 and 10"):
+        check(with_records(system, [one(2.0, 20.0), one(10.0, 20.0), one(2.0, 20.0)]))
+
+
+def test_refuses_regressors_that_are_no_samples():
+    lists = heater.system(regressors=lambda record, prediction: {"power": record["power_W"].tolist()})
+    check(with_records(lists, heater.records(2)))
+    single = heater.system(regressors=lambda record, prediction: {"power": 4.0})
+    with pytest.raises(DeclarationError, match="regressor power"):
+        check(with_records(single, heater.records(2)))
+
+
+def test_words_among_the_inputs_do_no_harm():
+    given = heater.records(2)
+    for one in given.values():
+        one["note"] = np.full(len(one["time_s"]), "windy")
+    check(with_records(heater.system(), given))
+
+
 def test_refuses_a_csv_that_is_no_table(tmp_path):
     (tmp_path / "a_1.csv").write_text("time_s,y\n0,1\n1\n")
     with pytest.raises(RecordError, match=r"a_1\.csv"):
         lacuna.diagnose(heater.system(), tmp_path, progress=pytest.fail)
-    with pytest.raises(RecordError, match="no CSV files"):
+    with pytest.raises(RecordError, match="no such folder"):
         lacuna.diagnose(heater.system(), tmp_path / "elsewhere")
 
 

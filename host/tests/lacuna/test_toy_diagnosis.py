@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from toy import ToySystem, draw_base, hide
 
-from lacuna.diagnosis.diagnose import TooLittleDataError, diagnose
+from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.record import as_record
+from lacuna.errors import TooLittleDataError
 from lacuna.report.text import screen_of
 
 SIZES = {

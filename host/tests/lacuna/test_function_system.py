@@ -1,0 +1,101 @@
+"""A plain function as a system: what it may do while a search tries it, and what its factors' derivatives are."""
+
+import math
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.errors import MisuseError
+from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.structure import Structure
+from lacuna.records import Table, segments, stretched
+from lacuna.run import with_records
+
+FAR = 1.3  # a gain from which the model fails
+
+
+def failing(how):
+    def simulate(record, theta):
+        found = theta.gain_K_W * record["power_W"] * (1.0 - np.exp(-record.time_s / theta.tau_s))
+        return how(found) if theta.gain_K_W > FAR else found
+
+    return lacuna.System(simulate, heater.PARAMETERS, outputs="temperature_K")
+
+
+def at_a_far_gain(system):
+    trial = system.trials[0]
+    theta = {"gain_K_W": system.coordinate("gain_K_W").fitted(2.0), "tau_s": math.log(12.0)}
+    return system.predict_many([theta], (), trial)[0]["temperature_K"]
+
+
+@pytest.mark.parametrize(
+    "how", [lambda y: math.sqrt(-1.0), lambda y: y[:-5], lambda y: y + 1j, lambda y: 1.0 / math.sin(0.0)]
+)
+def test_a_search_goes_on_where_the_model_fails(how):
+    found = at_a_far_gain(with_records(failing(how), heater.records(1)))
+    assert found.shape == heater.TIME_S.shape
+    assert np.isnan(found).all()
+
+
+def test_any_other_error_of_the_model_says_where():
+    def broken(y):
+        raise RuntimeError("solver gave up")
+
+    with pytest.raises(MisuseError, match=r"steps_4W_1.*RuntimeError: solver gave up at gain_K_W = 2, tau_s = 12"):
+        at_a_far_gain(with_records(failing(broken), heater.records(1)))
+
+
+def test_a_wrong_shape_from_the_start_is_refused():
+    short = lacuna.System(lambda record, theta: {"temperature_K": np.zeros(3)}, heater.PARAMETERS)
+    with pytest.raises(MisuseError, match=r"shape \(3,\)"):
+        lacuna.diagnose(short, heater.records(1), progress=False)
+
+
+@pytest.mark.parametrize("lower", [0.1, -1.0])
+def test_the_derivative_by_a_factor_is_that_of_its_parameter(lower):
+    """Whichever coordinate the parameter is fitted in: at a lower bound above 0 its logarithm."""
+
+    def simulate(record, theta):
+        return {"temperature_K": theta.gain_K_W * theta.wobble * np.cumsum(record["power_W"])}
+
+    def derivative(factor_of):
+        wobble = Parameter("wobble", "", 1.0, 0.5, 2.0, scale=0.02, factor_of=factor_of)
+        gain = Parameter("gain_K_W", "K/W", 2.0, lower, 10.0)
+        system = with_records(lacuna.System(simulate, [gain], nuisances=[wobble]), heater.records(2))
+        problem = Problem(Structure(system), system.trials, estimate_noise(system, system.trials))
+        _, own = problem.jacobians(problem.start(), (0,), problem.first_steps())[0]
+        return own
+
+    np.testing.assert_allclose(derivative(("gain_K_W",)), derivative(()), rtol=1e-3, atol=1e-6)
+
+
+def test_the_completed_model_of_a_segment_gives_its_own_samples():
+    def simulate(record, theta):
+        return {"y": theta.slope * record.time_s + theta.bend.by * record.time_s**2}
+
+    bend = Effect("bend", Parameter("by", "", 0.5, -5.0, 5.0))
+    system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -10.0, 10.0)], [bend])
+    time = np.linspace(0.0, 4.0, 400)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(400)
+    pieces = segments(Table("long", time, {"y": 2.0 * time + 0.3 * time**2 + noise}, {}), 10)
+    verdict = lacuna.diagnose(system, pieces, progress=False)
+    trial = stretched(pieces[5], pieces[5].record(["y"]), ["y"])
+    for asked in (pieces[5], trial):
+        np.testing.assert_allclose(verdict.model(asked)["y"], pieces[5].columns["y"], atol=0.05)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_records_that_the_model_cannot_predict_are_structure():
+    def simulate(record, theta):
+        found = heater.simulate(record, theta)["temperature_K"]
+        return np.full(found.shape, np.nan) if np.max(record["power_W"]) > 5.0 else found
+
+    effects = (heater.SENSOR, heater.OFFSET, heater.DEAD)
+    system = lacuna.System(simulate, heater.PARAMETERS, effects, outputs="temperature_K")
+    verdict = lacuna.diagnose(system, heater.records(), progress=False)
+    assert verdict.verdict == "unexplained"
+    assert "could not predict" in " ".join(verdict.warnings)

@@ -1,0 +1,65 @@
+"""Folders of CSV as people have them: labels in words, marks of spreadsheets, and cells that are no numbers."""
+
+import numpy as np
+import pytest
+
+from lacuna.records import RecordError, Table, read, segments
+
+ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
+
+
+def write(folder, name, text, **how):
+    (folder / name).write_text(text, **how)
+    return folder
+
+
+def test_conditions_in_words_make_repeats(tmp_path):
+    rows = "\n".join(f"{k},{k * k},heat 2 W" for k in range(10))
+    for name in ("monday.csv", "tuesday.csv"):
+        write(tmp_path, name, f"time_s,y,condition\n{rows}\n")
+    assert {table.record(["y"]).condition for table in read(tmp_path)} == {"heat 2 W"}
+
+
+def test_a_spreadsheets_mark_is_no_part_of_the_first_name(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", f"time_s,y\n{ROWS}\n", encoding="utf-8-sig"))
+    assert list(one.columns) == ["y"]
+    assert one.time_s[-1] == 9.0
+
+
+def test_quoted_cells_and_remarks_are_read(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", f'"time_s","y"\n# warm\n"0.5","7"\n\n{ROWS}\n'))
+    assert (one.time_s[0], one.columns["y"][0]) == (0.5, 7.0)
+
+
+def test_an_empty_cell_is_a_missing_sample_and_a_column_of_words_an_input(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", "time_s,y,who\n0,1,Ann\n1,,Bob\n"))
+    assert np.isnan(one.columns["y"]).tolist() == [False, True]
+    assert one.columns["who"].tolist() == ["Ann", "Bob"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time_s,y\n0,1\n1,2.5.1\n", r"a\.csv, line 3, column y: '2\.5\.1' is not a number"),
+        ("time_s,y\n0,1\n1\n", r"a\.csv, line 3: 1 values for 2 columns"),
+        ("time_s;y\n0;1\n", "semicolons"),
+        ("", "no times"),
+    ],
+)
+def test_refuses_with_file_line_and_column(tmp_path, text, said):
+    with pytest.raises(RecordError, match=said):
+        read(write(tmp_path, "a.csv", text))
+
+
+def test_refuses_what_is_no_text(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"time_s,y\n\xff\xfe\x00\n")
+    with pytest.raises(RecordError, match="UTF-8"):
+        read(tmp_path)
+
+
+def test_one_file_is_one_record_and_so_is_a_segment(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", f"time_s,y\n{ROWS}\n") / "a.csv")
+    assert one.name == "a"
+    long = Table("long", np.arange(100.0), {"y": np.arange(100.0)}, {})
+    piece = segments(long, 10)[5]
+    assert read(piece) == [piece]
