@@ -31,6 +31,7 @@ def compared_at_misfit(
     left = _left(found)
     for _ in range(_ROUNDS):
         level = {key: _FRACTION * rms for key, rms in left.items() if rms > SOFT_LIMIT * was[key]}
+        level = {key: sd for key, sd in level.items() if sd > was[key]}
         if not level or found.verdict == "none":
             break
         next_found = again(system.with_floor(level))
@@ -49,7 +50,8 @@ def _left(found: Diagnosis) -> dict[Key, float]:
     residuals = found.final.residuals()
     for trial in found.final.problem.trials:
         for channel, residual in residuals[trial.name].items():
-            squares.setdefault((trial.experiment, channel), []).append(float(np.nanmean(residual**2)))
+            if (known := residual[np.isfinite(residual)]).size:
+                squares.setdefault((trial.experiment, channel), []).append(float(np.mean(known**2)))
     return {key: float(np.sqrt(np.mean(values))) for key, values in squares.items()}
 
 

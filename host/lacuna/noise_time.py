@@ -22,8 +22,10 @@ def left_over_s(diagnosis: Diagnosis) -> dict[str, float]:
     periods: dict[tuple[str, str], list[float]] = defaultdict(list)
     for trial in trials:
         for channel, residual in residuals[trial.name].items():
-            key = trial.experiment, channel
-            traces[key].append(residual / max(float(np.nanstd(residual)), 1e-300))
+            key, known = (trial.experiment, channel), residual[np.isfinite(residual)]
+            if not known.size:
+                continue
+            traces[key].append(residual / max(float(np.std(known)), 1e-300))
             periods[key].append(float(np.median(np.diff(trial.time_s))))
     for (experiment, channel), members in traces.items():
         if diagnosis.search.floor.channels[experiment, channel].repeats:

@@ -275,7 +275,7 @@ def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) ->
     described = structure.system.effects[effect]
     parameters = described.parameters[: described.sizes]
     at, vectors = [structure.names.index(name) for name in described.size_names], []
-    for signs in _signs(parameters):
+    for signs in _signs(described):
         vector = base.copy()
         for index, parameter, sign in zip(at, parameters, signs, strict=True):
             size = described.absent + sign * factor * (parameter.value - described.absent)
@@ -297,7 +297,8 @@ def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndar
     return found
 
 
-def _signs(sizes: Sequence[Parameter]) -> list[tuple[float, ...]]:
-    both_ways = all(p.lower < 0 < p.upper for p in sizes)
-    positive = (1.0,) * len(sizes)
+def _signs(effect: Effect) -> list[tuple[float, ...]]:
+    """On which sides of their absent values the sizes may be."""
+    both_ways = all(p.lower < effect.absent < p.upper for p in effect.parameters[: effect.sizes])
+    positive = (1.0,) * effect.sizes
     return [positive, tuple(-s for s in positive)] if both_ways else [positive]

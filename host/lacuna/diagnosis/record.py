@@ -26,7 +26,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
                 "parameters": {name: _number(value) for name, value in e.parameters.items()},
                 "interval_90": {name: [_number(v) for v in ends] for name, ends in e.interval.items()},
                 "probability": _number(e.probability),
-                "share_of_gap": _number(e.share_of_gap),
+                "share_of_gap": _share(e.share_of_gap, d),
                 "confusable_with": list(e.confusable_with),
             }
             for e in d.effects
@@ -36,7 +36,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             for name, e in d.base_parameters.items()
         },
         "remainder": _left(d.left),
-        "nearest": [{"effects": list(r.effects), "share_of_gap": _number(r.share_of_gap)} for r in d.nearest],
+        "nearest": [{"effects": list(r.effects), "share_of_gap": _share(r.share_of_gap, d)} for r in d.nearest],
         "warnings": list(d.warnings),
         "held_out": {
             "repeats": [trial.name for trial in d.split.repeats],
@@ -101,6 +101,11 @@ def _error(error: Error) -> dict[str, Any]:
 
 def _sides(error: Error | Floor) -> dict[str, Any]:
     return {name: _number(getattr(error, name)) for name in ("fitted", "held_out", "held_out_conditions")}
+
+
+def _share(share: float, d: Diagnosis) -> float | None:
+    """None where the base model leaves no gap on the held-out trials: a share of it would say nothing."""
+    return _number(share) if d.before.held_out > d.floor.held_out else None
 
 
 def _number(value: float) -> float | None:

@@ -17,7 +17,7 @@ from scipy.stats import norm
 
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.noise import NoiseFloor
-from lacuna.estimation.problem import SOFT_LIMIT
+from lacuna.estimation.problem import FAILED, SOFT_LIMIT
 from lacuna.system import Channels, Record, System
 
 _DRAWS = 200
@@ -85,24 +85,42 @@ def find_remainder(
     draw = np.random.default_rng(seed)
     shared, z, alone = {}, {}, {}
     for key, conditions in _by_condition(trials, scaled).items():
-        repeated = [rows for rows in conditions if len(rows) > 1]
-        if repeated:
-            shared[key] = _shared(repeated)
-            by_chance = _by_chance(repeated, draw)
-            z[key] = (shared[key] - by_chance.mean()) / max(by_chance.std(), 1e-12)
-            alone[key] = _exceeded(by_chance, shared[key])
-        else:
-            samples = np.concatenate([rows.ravel() for rows in conditions])
-            shared[key] = float(np.mean(samples**2) - 1)
-            z[key] = shared[key] / np.sqrt(2 * floor.channels[key].samples_per_piece / len(samples))
-            alone[key] = float(norm.sf(z[key]))
+        repeated = [rows for rows in conditions if _in_common(rows) > 0]
+        single = [rows for rows in conditions if _in_common(rows) == 0]
+        tests = [_of_repeats(repeated, draw)] if repeated else []
+        if single:
+            tests.append(_of_singles(single, repeated, floor.channels[key].samples_per_piece))
+        sizes, zs, chances = zip(*tests, strict=True)
+        shared[key] = float(np.average(sizes, weights=[len(part) for part in (repeated, single) if part]))
+        z[key], alone[key] = max(zs), min(1.0, len(tests) * min(chances))
     chance = {key: float(-np.expm1(len(z) * np.log1p(-min(p, 0.999)))) for key, p in alone.items()}
     good_enough = {key: (system.accuracy(*key) / floor.channels[key].sd) ** 2 for key in shared}
     return Remainder(shared, z, chance, good_enough, policy)
 
 
+def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> tuple[float, float, float]:
+    """What repeats share, in standard deviations of what chance makes of it, and the probability of so much."""
+    shared, by_chance = _shared(conditions), _by_chance(conditions, draw)
+    z = (shared - by_chance.mean()) / max(by_chance.std(), 1e-12)
+    return shared, float(z), _exceeded(by_chance, shared)
+
+
+def _of_singles(
+    conditions: Sequence[np.ndarray], repeated: Sequence[np.ndarray], samples_per_piece: float
+) -> tuple[float, float, float]:
+    """The same for what was run once: its mean square above the floor, which itself is only as well known as the
+    repeats that it was taken from tell."""
+    samples = np.concatenate([rows[np.isfinite(rows)] for rows in conditions])
+    above = float(np.mean(samples**2) - 1)
+    of_floor = sum((len(rows) - 1) * _in_common(rows) for rows in repeated)
+    variance = 2 * samples_per_piece * (1 / len(samples) + (1 / of_floor if of_floor else 0.0))
+    z = above / np.sqrt(variance)
+    return above, float(z), float(norm.sf(z))
+
+
 def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
-    """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base."""
+    """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base; NaN where
+    nothing was measured."""
     groups: dict[object, list[tuple[Record, Channels]]] = defaultdict(list)
     for trial, channels in zip(trials, scaled, strict=True):
         groups[trial.experiment, trial.condition].append((trial, channels))
@@ -111,12 +129,25 @@ def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
         first, channels = members[0]
         for channel in channels:
             rows = [
-                _compressed(np.interp(first.time_s, t.time_s, np.nan_to_num(c[channel])))
+                _compressed(np.interp(first.time_s, t.time_s, _with_failures(c[channel], t.channels[channel])))
                 for t, c in members
                 if channel in c
             ]
             found[first.experiment, channel].append(np.array(rows))
     return found
+
+
+def _with_failures(z: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """`z`, where the model could not predict what was measured as bad as in a fit."""
+    return np.where(np.isfinite(measured) & ~np.isfinite(z), FAILED, z)
+
+
+def _in_common(rows: np.ndarray) -> float:
+    """Samples that two repeats have in common, on average."""
+    if len(rows) < 2:
+        return 0.0
+    known = np.isfinite(rows).sum(axis=0)
+    return float((known * (known - 1)).sum()) / (len(rows) * (len(rows) - 1))
 
 
 def _compressed(z: np.ndarray) -> np.ndarray:
@@ -127,23 +158,25 @@ def _shared(conditions: Sequence[np.ndarray]) -> float:
     """Mean product of different repeats at the same sample."""
     total, count = 0.0, 0
     for rows in conditions:
-        repeats, length = rows.shape
-        total += (float((rows.sum(axis=0) ** 2).sum()) - float((rows**2).sum())) / (2 * length)
+        repeats, known = len(rows), np.nan_to_num(rows)
+        squares = float((known.sum(axis=0) ** 2).sum()) - float((known**2).sum())
+        total += squares / (2 * _in_common(rows))
         count += repeats * (repeats - 1) // 2
     return total / count
 
 
 def _by_chance(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> np.ndarray:
     """`_shared` of noise alone, `_DRAWS` times: signs, order and places in time of pure noise turned at random."""
-    noise = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
+    differences = [(rows[a] - rows[b]) / np.sqrt(2) for rows in conditions for a in range(len(rows)) for b in range(a)]
+    noise = [known for known in (d[np.isfinite(d)] for d in differences) if known.size]
     total, count = np.zeros(_DRAWS), 0
     for rows in conditions:
         repeats, length = rows.shape
-        most = max(1, _AT_ONCE // rows.size)
+        most, in_common = max(1, _AT_ONCE // rows.size), _in_common(rows)
         for first in range(0, _DRAWS, most):
-            drawn = _stretches(noise, (min(most, _DRAWS - first), repeats, length), draw)
+            drawn = _stretches(noise, (min(most, _DRAWS - first), repeats, length), draw) * np.isfinite(rows)
             squares = (drawn.sum(axis=1) ** 2).sum(axis=1) - (drawn**2).sum(axis=(1, 2))
-            total[first : first + most] += squares / (2 * length)
+            total[first : first + most] += squares / (2 * in_common)
         count += repeats * (repeats - 1) // 2
     return total / count
 
@@ -155,7 +188,8 @@ def _exceeded(draws: np.ndarray, value: float) -> float:
     if value <= threshold:
         return float(np.mean(draws >= value))
     excess = draws[draws > threshold] - threshold
-    return _TAIL * float(np.exp(-(value - threshold) / max(float(excess.mean()), 1e-12)))
+    mean = float(excess.mean()) if excess.size else 0.0  # repeats without noise differ by nothing
+    return _TAIL * float(np.exp(-(value - threshold) / max(mean, 1e-12)))
 
 
 def _stretches(noise: Sequence[np.ndarray], shape: tuple[int, ...], draw: np.random.Generator) -> np.ndarray:

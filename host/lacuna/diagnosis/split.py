@@ -52,8 +52,8 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
 
     `spare`: (experiment, condition) of those that are never fitted. Of three or more repeats of any other condition
     one goes to `final` and one to `select`, which one rotates from condition to condition, so that no part has all the
-    early or all the late runs of a session; of two, every other condition gives one away; where there are no repeats,
-    every fifth trial is held out and every fourth selects.
+    early or all the late runs of a session; of two, one goes to either in turn; of trials without repeats every fifth
+    is `final` and another fifth selects. None is `final` if nothing else could judge, or if it alone has a channel.
     """
     groups: dict[tuple[str, Hashable], list[Record]] = defaultdict(list)
     for trial in trials:
@@ -61,12 +61,12 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
     left_out = set(spare)
     parts: dict[str, list[Record]] = {"fit": [], "select": [], "unseen": [], "final": []}
     pairs = 0
-    singles = [members[0] for members in groups.values() if len(members) == 1]
+    singles = [members[0] for key, members in groups.items() if len(members) == 1 and key not in left_out]
     for turn, (key, members) in enumerate(groups.items()):
-        if len(members) == 1:
-            continue
         if key in left_out:
             parts["unseen"] += members
+            continue
+        if len(members) == 1:
             continue
         if len(members) == 2:
             parts["fit"].append(members[pairs % 2])
@@ -79,5 +79,16 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
     for place, trial in enumerate(singles):
         role = "final" if place % 5 == 4 else "select" if place % 5 == 2 else "fit"
         parts[role].append(trial)
+    known = {key for role in ("fit", "select", "unseen") for trial in parts[role] for key in _channels(trial)}
+    alone = [trial for trial in parts["final"] if not _channels(trial) <= known]
+    if not (parts["select"] or parts["unseen"] or alone):
+        parts["select"], parts["final"] = parts["final"][:1], parts["final"][1:]
+    for trial in alone:
+        parts["final"].remove(trial)
+        parts["fit"].append(trial)
     order = {trial.name: k for k, trial in enumerate(trials)}
     return Split(**{role: tuple(sorted(ts, key=lambda t: order[t.name])) for role, ts in parts.items()})
+
+
+def _channels(trial: Record) -> set[tuple[str, str]]:
+    return {(trial.experiment, channel) for channel in trial.channels}

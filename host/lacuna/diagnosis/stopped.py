@@ -15,7 +15,7 @@ class Finished:
     """Keeps each set of effects that the search has fitted to the end, whenever it asks whether that is enough."""
 
     def __init__(self, enough: Callable[[Candidate], bool]):
-        self._enough, self.candidates, self.stopped = enough, [], False
+        self._enough, self.candidates = enough, []
 
     def __call__(self, candidate: Candidate) -> bool:
         if not candidate.fitted.structure.sites:
@@ -24,7 +24,6 @@ class Finished:
 
     def search(self, base: Candidate, split: Split) -> Search:
         """What the search would have returned: the best candidate for each set, all against the latest floor."""
-        self.stopped = True
         floor = (self.candidates[-1] if self.candidates else base).fitted.problem.floor
         found: dict[frozenset[str], Candidate] = {}
         for one in (base, *self.candidates):

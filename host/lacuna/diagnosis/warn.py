@@ -40,7 +40,8 @@ def _parameters(fitted: Fit) -> list[str]:
     ]
     # between its data a learnt curve is what its prior makes of it, in any number of directions
     own = [[name for name in direction if not is_learnt(name)] for direction in known.undetermined]
-    return [*found, *(f"The data do not determine a combination of {_listed(names)}." for names in own if names)]
+    found += [f"The data do not determine a combination of {_listed(names)}." for names in own if names]
+    return list(dict.fromkeys(found))
 
 
 def _strayed(fits: list[Fit]) -> list[str]:

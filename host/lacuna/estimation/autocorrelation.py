@@ -12,13 +12,15 @@ def correlation_samples(traces: Sequence[np.ndarray]) -> float:
     """How many neighbouring samples count as one: 1 + 2 sum of the autocorrelations, pooled over `traces`, which are
     in units of their noise.
 
-    The mean is not taken out: a trace that is offset as a whole counts as one piece, as it should.
+    The mean is not taken out: a trace that is offset as a whole counts as two or three pieces, as it should. Missing
+    samples (NaN) are no neighbours.
     """
-    length = min(len(t) for t in traces)
+    traces = [known for known in (t[np.isfinite(t)] for t in traces) if known.size]
+    length = min((len(t) for t in traces), default=0)
     longest = max(1, length // 4)
     total = np.zeros(longest + 1)
     for trace in traces:
-        clean = np.nan_to_num(np.clip(trace, -_OUTLIER, _OUTLIER))
+        clean = np.clip(trace, -_OUTLIER, _OUTLIER)
         size = 1 << (2 * len(clean) - 1).bit_length()
         spectrum = np.abs(np.fft.rfft(clean, size)) ** 2
         total += np.fft.irfft(spectrum, size)[: longest + 1] / len(clean)

@@ -243,7 +243,7 @@ def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) 
     for effect in (structure.system.effects[name] for name in structure.effects):
         for name, parameter in zip(effect.size_names, effect.parameters, strict=False):
             factor = draw.uniform(min(effect.start_factors), max(effect.start_factors))
-            sign = draw.choice((-1.0, 1.0)) if parameter.lower < 0.0 < parameter.upper else 1.0
+            sign = draw.choice((-1.0, 1.0)) if parameter.lower < effect.absent < parameter.upper else 1.0
             size = effect.absent + sign * factor * (parameter.value - effect.absent)
             values[structure.names.index(name)] = size
     lower, upper = structure.bounds(values)

@@ -94,7 +94,8 @@ def estimate_noise(
             solo[trial.experiment, channel].append(trial)
     for first, second in repeat_pairs(trials):
         for channel in first.channels.keys() & second.channels.keys():
-            by_key[first.experiment, channel].append((first, second))
+            if np.isfinite(_difference(first, second, channel, None)).any():
+                by_key[first.experiment, channel].append((first, second))
     channels = {}
     for key, members in solo.items():
         sensor = system.sensor_noise(*key)
@@ -129,10 +130,11 @@ def _from_pairs(
         also = np.interp(first.time_s, second.time_s, _moves(second, channel).astype(float)) > 0
         moving.append(_moves(first, channel) | also)
     everything = np.concatenate(differences)
-    still = ~np.concatenate(moving)
+    known = np.isfinite(everything)
+    still = known & ~np.concatenate(moving)
     if still.sum() < 20:
-        still = np.ones_like(still)
-    sd = np.sqrt(np.nanmean(everything[still] ** 2))
+        still = known
+    sd = np.sqrt(np.mean(everything[still] ** 2))
     sd = max(sd, sensor, _smallest([trial for pair in pairs for trial in pair], channel))
     records = [(first.time_s, _smooth(first.channels[channel])) for first, _ in pairs]
     jitter_s = _jitter(records, differences, moving, sd)

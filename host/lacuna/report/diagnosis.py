@@ -10,16 +10,19 @@ from lacuna.report.evidence import draw_errors, draw_learnt, draw_probabilities
 from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.overview import draw_held_out, draw_tried
 from lacuna.report.page import Page, Section, Table, both_palettes
-from lacuna.report.sentence import own_form, verdict_sentence
+from lacuna.report.sentence import number_in_words, own_form, share_in_words, verdict_sentence
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
     """The page for a `record` (of `as_record`); with the diagnosis itself also what was measured, and traces."""
     error, effects = record["error"], record["effects"]
     facts = [
-        (f"{error['before']['held_out']:.2f}", "error of the base model on trials not fitted, in units of the noise"),
-        (f"{error['after']['held_out']:.2f}", "after"),
-        (f"{error['noise_floor']['held_out']:.2f}", "noise floor"),
+        (
+            number_in_words(error["before"]["held_out"], ".2f"),
+            "error of the base model on trials not fitted, in units of the noise",
+        ),
+        (number_in_words(error["after"]["held_out"], ".2f"), "after"),
+        (number_in_words(error["noise_floor"]["held_out"], ".2f"), "noise floor"),
     ]
     sections = [
         *_evidence(effects),
@@ -45,10 +48,10 @@ def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
         lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
     )
     rows = [
-        (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), f"{100 * e['share_of_gap']:.0f} %")
+        (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), share_in_words(e["share_of_gap"]))
         for e in effects
     ]
-    table = Table(("effect", "parameters, with 90 % intervals", "of the gap"), rows)
+    table = Table(("effect", "parameters, with 90 % intervals", "closes"), rows)
     return [Section("Evidence", tables=(table,), figures=(figure,))]
 
 
@@ -71,8 +74,8 @@ def _held_out(found: Diagnosis) -> Section:
 def _rejected(record: Mapping[str, Any]) -> list[Section]:
     if not record["nearest"]:
         return []
-    rows = [(_words(" + ".join(r["effects"])), f"{100 * r['share_of_gap']:.0f} %") for r in record["nearest"]]
-    table = Table(("explanation", "of the gap that it would close"), rows)
+    rows = [(_words(" + ".join(r["effects"])), share_in_words(r["share_of_gap"])) for r in record["nearest"]]
+    table = Table(("explanation", "would close"), rows)
     tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
     why = (
         "An explanation is rejected if it predicts conditions that were never fitted no better than a smaller one,"

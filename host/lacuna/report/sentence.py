@@ -17,6 +17,15 @@ def own_form(effect: Mapping[str, Any]) -> str:
     return f"in a form of its own: {where}" if freed else ""
 
 
+def share_in_words(share: float | None) -> str:
+    """A share of the gap; None where no trial was left to measure it on."""
+    return "an unknown share of the gap" if share is None else f"{100 * share:.0f} % of the gap"
+
+
+def number_in_words(value: float | None, digits: str = ".4g") -> str:
+    return "-" if value is None else format(value, digits)
+
+
 def verdict_sentence(
     verdict: str,
     effects: Sequence[Mapping[str, Any]],
@@ -25,10 +34,12 @@ def verdict_sentence(
 ) -> str:
     """A verdict (of `as_record`) in one sentence; `words`: what an effect is called."""
     if verdict == "none":
-        return "Nothing that matters is missing from the base model: it predicts these data to within the noise."
+        near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "as well as was asked for"
+        return f"Nothing that matters is missing from the base model: it predicts these data {near}."
     if verdict == "unexplained":
         return "The base model lacks something that no effect of the library explains."
     names = " and ".join(words(effect) for effect in effects)
-    closed = f"{100 * (1 - remainder['share_of_gap']):.0f} % of the gap"
+    left = remainder["share_of_gap"]
+    closed = share_in_words(None if left is None else 1 - left)
     rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
     return f"What the base model lacks is {names}, which closes {closed}{rest}."

@@ -8,7 +8,7 @@ from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.report.measured import floor_sentence
-from lacuna.report.sentence import own_form, verdict_sentence
+from lacuna.report.sentence import number_in_words, own_form, share_in_words, verdict_sentence
 
 _WIDTH, _LINES = 100, 40
 _WARNINGS, _TRIED = 6, 4
@@ -41,12 +41,13 @@ def _wrapped(text: str, mark: str = "") -> list[str]:
 
 def _effects(record: Mapping[str, Any]) -> Iterator[str]:
     for effect in record["effects"]:
-        yield f"{effect['name']}: closes {_percent(effect['share_of_gap'])}, probability {effect['probability']:.2f}"
+        closed = share_in_words(effect["share_of_gap"])
+        yield f"{effect['name']}: closes {closed}, probability {effect['probability']:.2f}"
         if form := own_form(effect):
             yield from _wrapped(form, "    ")
         for name, value in effect["parameters"].items():
-            lower, upper = (_number(end) for end in effect["interval_90"][name])
-            yield f"    {name} = {_number(value)}   ({lower} to {upper})"
+            lower, upper = (number_in_words(end) for end in effect["interval_90"][name])
+            yield f"    {name} = {number_in_words(value)}   ({lower} to {upper})"
         if effect["confusable_with"]:
             yield f"    this data cannot tell it from {', '.join(effect['confusable_with'])}"
     if record["effects"]:
@@ -62,13 +63,13 @@ def _errors(error: Mapping[str, Any]) -> Iterator[str]:
     ):
         if error["before"][side] is not None:
             values = (error[column][side] for column in ("before", "after", "noise_floor"))
-            yield f"  {label:40}" + "".join(f"{_number(v):>10}" for v in values)
+            yield f"  {label:40}" + "".join(f"{number_in_words(v):>10}" for v in values)
 
 
 def _nearest(record: Mapping[str, Any]) -> list[str]:
     if record["verdict"] == "none" or not record["nearest"]:
         return []
-    near = [f"{' + '.join(r['effects'])} ({_percent(r['share_of_gap'])})" for r in record["nearest"][:_TRIED]]
+    near = [f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in record["nearest"][:_TRIED]]
     return _wrapped(f"Also tried, with what each would close: {', '.join(near)}.")
 
 
@@ -77,11 +78,3 @@ def _next(coming: Mapping[str, Any]) -> list[str]:
         return []
     settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
     return _wrapped(f"Next: {coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}.")
-
-
-def _percent(share: float | None) -> str:
-    return "an unknown share of the gap" if share is None else f"{100 * share:.0f} % of the gap"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"

@@ -1,0 +1,49 @@
+"""Every part of a split has what it is for, however few the trials are."""
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna.diagnosis.split import split_trials
+from lacuna.system import Record
+
+T = np.linspace(0.0, 1.0, 50)
+
+
+def trials(*conditions, experiment="steps"):
+    return tuple(Record(f"{k}", experiment, c, T, {"y": T}) for k, c in enumerate(conditions))
+
+
+def names(part):
+    return [t.name for t in part]
+
+
+def test_a_spare_condition_is_never_fitted_though_it_was_run_once():
+    split = split_trials(trials(*"abcdefghij"), spare=[("steps", "a"), ("steps", "c")])
+    assert names(split.unseen) == ["0", "2"]
+    assert not {"0", "2"} & set(names(split.known))
+
+
+def test_the_only_trial_of_an_experiment_is_not_held_out_since_its_floor_would_be_unknown():
+    given = list(trials(*"abcdefghij"))
+    given[4] = Record("4", "cooling", "e", T, {"y": T})
+    assert "4" in names(split_trials(given).fit)
+    assert names(split_trials(trials(*"abcdefghij")).final) == ["4", "9"], "others are"
+
+
+@pytest.mark.parametrize("conditions", ["aab", "aabc", "abc"])
+def test_something_is_left_to_judge_by(conditions):
+    split = split_trials(trials(*conditions))
+    assert split.fit
+    assert split.judging
+    assert len(split.fit + split.judging + split.final) == len(conditions)
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
+    given = dict(list(heater.records(repeats=1, sensor_lag__lag_s=3.0).items())[:count])
+    verdict = lacuna.diagnose(heater.system(), given, progress=False)
+    assert verdict.verdict in str(verdict)
+    assert "<html" in verdict.report(tmp_path / "page.html").read_text()
+    assert verdict.plot()
