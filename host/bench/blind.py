@@ -1,7 +1,7 @@
 """Blind trial of the diagnosis: sealed data sets, verdicts first, labels opened afterwards.
 
     python -m bench.blind --truth own|realistic|foreign --singles 60 --none 20 [--jobs 2] [--out FOLDER]
-                          [--records FILE [--print]]
+                          [--records FILE [--print]] [--table FOLDER]
 
 Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or measured through the real firmware by
 `python -m bench.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the library
@@ -23,23 +23,21 @@ import sys
 import tempfile
 import time
 import tomllib
-from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench import blind_records
+from bench.blind_figures import BASELINES, CLOSE, name_of, report, said_of, table
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
 _STRIDE = 7  # through the effects: coprime to their numbers, so that relatives in the list are far apart
-_CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # floors that the error after may be
 _DRAWN_BY = {
     "own": ["-m", "virtual_robot.sealed"],
     "realistic": ["-m", "bench.sealed_campaign"],
     "foreign": ["-m", "virtual_robot.sealed", "--truth", "foreign"],
 }
-BASELINES = ("best single", "BIC", "greedy", "sparse regression")
 
 
 @dataclass(frozen=True)
@@ -142,115 +140,12 @@ def _bic(candidate) -> float:
     return 2 * (candidate.fitted.cost + candidate.checked.cost) + extra * math.log(candidate.pieces)
 
 
-def wilson(hits: int, of: int) -> tuple[float, float]:
-    """95 % interval of a share."""
-    if of == 0:
-        return 0.0, 1.0
-    z, share = 1.96, hits / of
-    centre = (share + z * z / (2 * of)) / (1 + z * z / of)
-    half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
-    return max(centre - half, 0.0), min(centre + half, 1.0)
-
-
-def report(records: list[dict], truth: str) -> None:
-    """Print the figures of all data sets diagnosed."""
-    close = _CLOSE[truth]
-    by_kind = {kind: [r for r in records if r["kind"] == kind] for kind in ("single", "none", "outside", "pair")}
-    single, none, outside, pair = by_kind.values()
-    _share("one effect: named first", [_first(r) in r["truth"] for r in single])
-    _share("one effect: in the reported set", [bool(set(r["truth"]) & _reported(r)) for r in single])
-    sizes = [len(_reported(r)) for r in single if r["effects"]]
-    print(f"  mean size of the reported set {sum(sizes) / max(len(sizes), 1):.2f}")
-    _share("no effect: verdict none", [r["verdict"] == "none" for r in none])
-    _share("outside the library: never plainly explained", [not _plain(r) for r in outside])
-    _share("outside the library: unexplained", [r["verdict"] == "unexplained" for r in outside])
-    _share("outside: at least half the gap closed", [_closed(r) >= 0.5 for r in outside])
-    _share("two effects: both named", [set(r["truth"]) <= {e["name"] for e in r["effects"]} for r in pair])
-    named = [r for r in single + pair if r["verdict"] == "identified"]
-    _share(f"identified: error not fitted within {close} floors", [_ratio(r) <= close for r in named])
-    of_conditions = [r for r in named if r["error"]["noise_floor"]["held_out_conditions"]]
-    _share(
-        f"identified: conditions not fitted within {close} floors",
-        [_ratio(r, "held_out_conditions") <= close for r in of_conditions],
-    )
-    if truth != "foreign":
-        _share("90 % intervals of sizes hold the truth", [hit for r in named for hit in _covered(r)])
-        right = [r for r in single + none + pair if {e["name"] for e in r["effects"]} == set(r["truth"])]
-        _share("90 % intervals of base parameters hold the truth", [hit for r in right for hit in _base_covered(r)])
-    closed = sorted(_closed(r) for r in named)
-    if closed:
-        print(f"  median share of the gap closed {closed[len(closed) // 2]:.2f}")
-    for name in BASELINES:
-        _share(f"baseline {name}: one effect, named alone", [r["baselines"][name] == r["truth"] for r in single])
-        _share(f"baseline {name}: no effect, says none", [not r["baselines"][name] for r in none])
-    for kind, members in by_kind.items():
-        if spent := sorted(r["processor_seconds"] for r in members):
-            print(f"processor seconds, {kind:8} median {spent[len(spent) // 2]:.0f}, longest {spent[-1]:.0f}")
-    print("\ntruth -> named")
-    for (truth, said), count in sorted(Counter((_name(r["truth"]), _said(r)) for r in records).items()):
-        print(f"  {count:3d}  {truth:40} {said}")
-
-
-def _share(what: str, hits: list[bool]) -> None:
-    if hits:
-        low, high = wilson(sum(hits), len(hits))
-        print(f"{what:55} {sum(hits):3d}/{len(hits):<3d} = {sum(hits) / len(hits):.2f}  [{low:.2f}, {high:.2f}]")
-
-
-def _first(record: dict) -> str | None:
-    return record["effects"][0]["name"] if record["effects"] else None
-
-
-def _reported(record: dict) -> set[str]:
-    return {name for e in record["effects"] for name in (e["name"], *e["confusable_with"])}
-
-
-def _name(effects: list[str]) -> str:
-    return " + ".join(sorted(effects)) or "nothing"
-
-
-def _said(record: dict) -> str:
-    return _name([e["name"] for e in record["effects"]]) if record["effects"] else record["verdict"]
-
-
-def _plain(record: dict) -> bool:
-    """Whether a verdict says that the library explains all that matters."""
-    return record["verdict"] == "none" or (record["verdict"] == "identified" and not record["remainder"]["matters"])
-
-
-def _ratio(record: dict, which: str = "held_out") -> float:
-    return record["error"]["after"][which] / record["error"]["noise_floor"][which]
-
-
-def _covered(record: dict) -> list[bool]:
-    """Of each parameter of each effect that was named and is there, whether its interval holds the truth."""
-    hits = []
-    for effect in record["effects"]:
-        for name, true in record["values"].get(effect["name"], {}).items():
-            if (ends := effect["interval_90"].get(name)) is not None:
-                hits.append(ends[0] <= true <= ends[1])
-    return hits
-
-
-def _base_covered(record: dict) -> list[bool]:
-    """Of each parameter of the base model, whether its interval holds the truth."""
-    estimated, values = record["base_parameters"], record["base_values"]
-    ends = {name: estimated[name]["interval_90"] for name in estimated if name in values}
-    return [low <= values[name] <= high for name, (low, high) in ends.items()]
-
-
-def _closed(record: dict) -> float:
-    error = record["error"]
-    floor, before = error["noise_floor"]["held_out"], error["before"]["held_out"]
-    return (before - error["after"]["held_out"]) / max(before - floor, 1e-9)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     counts = {"singles": ("single", 60), "none": ("none", 20), "outside": ("outside", 22), "pairs": ("pair", 20)}
     for name, (_, count) in counts.items():
         parser.add_argument(f"--{name}", type=int, default=count)
-    parser.add_argument("--truth", choices=tuple(_CLOSE), default="own", help="whose equations the robots follow")
+    parser.add_argument("--truth", choices=tuple(CLOSE), default="own", help="whose equations the robots follow")
     parser.add_argument("--first-seed", type=int, default=1000)
     cores = len(os.sched_getaffinity(0))
     parser.add_argument("--jobs", type=int, default=cores, help="at once, which share the cores")
@@ -261,7 +156,11 @@ def main() -> None:
     parser.add_argument("--threads", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--records", type=Path, help="a line of JSON a data set; read first, and kept up to date")
     parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    parser.add_argument("--table", type=Path, metavar="FOLDER", help="the rates of all truths with records there")
     options = parser.parse_args()
+    if options.table:
+        print(table({truth: list(blind_records.read(options.table / f"{truth}.jsonl").values()) for truth in CLOSE}))
+        return
     if options.one:
         diagnose_one(options.one, options.json, options.without, options.threads)
         return
@@ -283,7 +182,7 @@ def main() -> None:
                     blind_records.write(options.records, known.values())
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(
-                    f"{record['kind']:8}{record['seed']}  {_name(record['truth'])} ({sizes}) -> {_said(record)}"
+                    f"{record['kind']:8}{record['seed']}  {name_of(record['truth'])} ({sizes}) -> {said_of(record)}"
                     f"  {record['processor_seconds']:.0f} s of processor",
                     flush=True,
                 )

@@ -1,10 +1,11 @@
 """What a completed model buys: the gait found with it beside the gait found with the base model, both walked.
 
-    python -m bench.loop [--effects hysteresis,leak] [--seeds 3] [--first-seed 200] [--out ../out/loop]
+    python -m bench.loop [--effects hysteresis,leak] [--seeds 3] [--first-seed 200] [--out ../out/loop] [--records FILE]
 
 For each effect of the library at its full size and each seed, a whole campaign through the real firmware, profile
 `realistic`, as `bifa campaign` runs it: another specimen of the robot, other noise. Campaigns stay in OUT, so that an
-interrupted run goes on where it was. A gait "walks" on a robot if it advances by more than 1 mm/s.
+interrupted run goes on where it was; FILE has a line for each, with which it goes on on another machine. A gait "walks"
+on a robot if it advances by more than 1 mm/s.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bench import records as lines
 from bifa.campaign.bench import Bench
 from bifa.campaign.loop import Effort, campaign
 from bifa.campaign.stages import Stage, run_stages
@@ -104,18 +106,32 @@ def summed_up(gains: Sequence[Gain]) -> dict[str, float]:
     return figures
 
 
-def run(effects: Sequence[str], seeds: Sequence[int], out: Path) -> dict[str, float]:
-    """Print the table, a line as each campaign ends; returns the figures flat. Ctrl-C sums up what there is."""
+def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | None = None) -> dict[str, float]:
+    """Print the table, a line as each campaign ends; returns the figures flat. Ctrl-C sums up what there is. `kept`:
+    the file of records."""
+    known = lines.read(kept, _place) if kept else {}
     print(HEADING)
     gains = []
     try:
         for seed in seeds:
             for effect in effects:
-                gains.append(measured(effect, seed, out))
+                record = known.get((effect, seed))
+                gains.append(_gain_of(record) if record else measured(effect, seed, out))
                 print(row(gains[-1]), flush=True)
+                if kept and not record:
+                    known[effect, seed] = gains[-1]._asdict()
+                    lines.write(kept, known.values())
     except KeyboardInterrupt:
         print(f"\ninterrupted after {len(gains)} of {len(effects) * len(seeds)} robots; the same command goes on")
     return summed_up(gains) if gains else {}
+
+
+def _place(record: dict) -> tuple[str, int]:
+    return record["effect"], record["seed"]
+
+
+def _gain_of(record: dict) -> Gain:
+    return Gain(**{name: tuple(value) if isinstance(value, list) else value for name, value in record.items()})
 
 
 def main() -> None:
@@ -126,11 +142,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--records", type=Path, help="a line of JSON a campaign; read first, and kept up to date")
     options = parser.parse_args()
     effects = options.effects.split(",")
     if unknown := set(effects) - set(LIBRARY):
         parser.error(f"no effect {', '.join(sorted(unknown))}; there are {', '.join(LIBRARY)}")
-    run(effects, range(options.first_seed, options.first_seed + options.seeds), options.out)
+    run(effects, range(options.first_seed, options.first_seed + options.seeds), options.out, options.records)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from bench import blind, blind_records
+from bench import blind, blind_figures, blind_records
 
 
 def record(seed: int, *named: str, kind: str = "single", truth: str = "leak", matters: bool = False) -> dict:
@@ -28,7 +28,7 @@ def record(seed: int, *named: str, kind: str = "single", truth: str = "leak", ma
         "error": {"before": error | {"held_out": 3.0}, "after": error | {"held_out": 1.1}, "noise_floor": error},
         "remainder": {"matters": matters, "text": "a sentence"},
         "processor_seconds": 50.123456,
-        "baselines": {name: list(named) for name in blind.BASELINES},
+        "baselines": {name: list(named) for name in blind_figures.BASELINES},
     }
 
 
@@ -36,7 +36,7 @@ RECORDS = [record(1, "leak"), record(2, "backlash", "leak"), record(3), record(4
 
 
 def test_rates_count_what_was_named_and_what_was_not(capsys):
-    blind.report(RECORDS, "own")
+    blind_figures.report(RECORDS, "own")
     said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     assert said[:4] == [
         "one effect: named first 1/3 = 0.33 [0.06, 0.79]",
@@ -49,13 +49,27 @@ def test_rates_count_what_was_named_and_what_was_not(capsys):
     assert "1 leak backlash + leak" in said
 
 
+def test_a_table_has_the_rates_of_all_truths_beside_what_is_required():
+    found = blind_figures.table({"own": RECORDS, "realistic": RECORDS[:1], "foreign": []})
+    rows = {cells[1]: cells[2:-1] for cells in ([c.strip() for c in row.split("|")] for row in found.splitlines())}
+    assert rows[""][:2] == ["own, 5 data sets", "required"]
+    assert rows["one effect: named first"] == [
+        *("1/3 = 0.33 [0.06, 0.79]", "0.97"),
+        *("1/1 = 1.00 [0.21, 1.00]", "0.95"),
+        *("", "0.90"),
+    ]
+    assert rows["mean size of the reported set"] == ["1.50", "1.1", "1.00", "1.2", "0.00", "1.4"]
+    assert rows["90 % intervals of sizes hold the truth"][4:] == ["", "-"]
+    assert len({len(cells) for cells in rows.values()}) == 1
+
+
 def test_records_print_the_report_that_they_were_kept_from(tmp_path, capsys):
-    blind.report(RECORDS, "own")
+    blind_figures.report(RECORDS, "own")
     whole = capsys.readouterr().out
     kept = tmp_path / "own.jsonl"
     blind_records.write(kept, RECORDS)
     assert len(kept.read_text().splitlines()) == len(RECORDS)
-    blind.report(list(blind_records.read(kept).values()), "own")
+    blind_figures.report(list(blind_records.read(kept).values()), "own")
     assert capsys.readouterr().out == whole
 
 

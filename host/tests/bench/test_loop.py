@@ -63,3 +63,18 @@ def test_an_interrupted_run_sums_up_what_there_is(monkeypatch, capsys, tmp_path)
     figures = loop.run(("leak", "stribeck"), range(2), tmp_path)
     assert figures["loop_completed_mm_s"] == 20.0
     assert "interrupted after 1 of 4 robots" in capsys.readouterr().out
+
+
+def test_a_run_goes_on_from_its_records(monkeypatch, tmp_path):
+    asked, kept = [], tmp_path / "loop.jsonl"
+
+    def measured(effect, seed, out):
+        asked.append((effect, seed))
+        return loop.gain(effect, seed, summary((10.0, 15.0, 20.0)))
+
+    monkeypatch.setattr(loop, "measured", measured)
+    first = loop.run(("leak",), range(2), tmp_path, kept)
+    assert loop.run(("leak",), range(2), tmp_path, kept) == first
+    loop.run(("leak", "stribeck"), range(1), tmp_path, kept)
+    assert asked == [("leak", 0), ("leak", 1), ("stribeck", 0)]
+    assert len(kept.read_text().splitlines()) == 3

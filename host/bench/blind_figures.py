@@ -1,0 +1,178 @@
+"""What a blind trial's records come to: rates with 95 % Wilson intervals, beside what is required and baselines."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # floors that the error after may be, by truth
+BASELINES = ("best single", "BIC", "greedy", "sparse regression")
+KINDS = ("single", "none", "outside", "pair")
+
+_FIRST, _IN_SET, _SIZE = "one effect: named first", "one effect: in the reported set", "mean size of the reported set"
+_NONE = "no effect: verdict `none`"
+_NOT_PLAIN, _CLOSED = "outside the library: never plainly explained", "outside: half the gap closed by what is learnt"
+_BOTH = "two effects: both named"
+_HELD_OUT, _CONDITIONS = "identified: error not fitted within {} floors", "the same on conditions not fitted"
+_SIZES, _BASE = "90 % intervals of sizes hold the truth", "90 % intervals of base parameters hold the truth"
+_REQUIRED: dict[str, dict[str, str]] = {
+    title: dict(zip(CLOSE, values, strict=True))
+    for title, values in {
+        _FIRST: ("0.97", "0.95", "0.90"),
+        _IN_SET: ("0.99", "0.98", "0.95"),
+        _SIZE: ("1.1", "1.2", "1.4"),
+        _NONE: ("0.98", "0.95", "0.95"),
+        _NOT_PLAIN: ("0.95", "0.90", "0.85"),
+        _CLOSED: ("0.75", "0.70", "0.60"),
+        _BOTH: ("0.85", "0.75", "0.60"),
+        _HELD_OUT: ("0.95", "0.90", "0.80"),
+        _CONDITIONS: ("0.95", "0.90", "0.80"),
+        _SIZES: ("0.85-0.95", "0.85-0.95", "-"),
+        _BASE: ("0.85-0.95", "0.85-0.95", "-"),
+    }.items()
+}
+
+
+def wilson(hits: int, of: int) -> tuple[float, float]:
+    """95 % interval of a share."""
+    if of == 0:
+        return 0.0, 1.0
+    z, share = 1.96, hits / of
+    centre = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return max(centre - half, 0.0), min(centre + half, 1.0)
+
+
+def rates(records: Sequence[dict], truth: str) -> dict[str, list[bool]]:
+    """Hits and misses by what they are of."""
+    single, none, outside, pair = ([r for r in records if r["kind"] == kind] for kind in KINDS)
+    named = [r for r in single + pair if r["verdict"] == "identified"]
+    of_conditions = [r for r in named if r["error"]["noise_floor"]["held_out_conditions"]]
+    found = {
+        _FIRST: [_first(r) in r["truth"] for r in single],
+        _IN_SET: [bool(set(r["truth"]) & _reported(r)) for r in single],
+        _NONE: [r["verdict"] == "none" for r in none],
+        _NOT_PLAIN: [not _plain(r) for r in outside],
+        _CLOSED: [_closed(r) >= 0.5 for r in outside],
+        _BOTH: [set(r["truth"]) <= {e["name"] for e in r["effects"]} for r in pair],
+        _HELD_OUT: [_ratio(r) <= CLOSE[truth] for r in named],
+        _CONDITIONS: [_ratio(r, "held_out_conditions") <= CLOSE[truth] for r in of_conditions],
+    }
+    if truth != "foreign":
+        right = [r for r in single + none + pair if {e["name"] for e in r["effects"]} == set(r["truth"])]
+        found[_SIZES] = [hit for r in named for hit in _covered(r)]
+        found[_BASE] = [hit for r in right for hit in _base_covered(r)]
+    return found
+
+
+def report(records: Sequence[dict], truth: str) -> None:
+    """Print the figures of all data sets diagnosed."""
+    for what, hits in rates(records, truth).items():
+        _print_share(what.format(CLOSE[truth]).replace("`", ""), hits)
+        if what == _IN_SET:
+            print(f"  {_SIZE} {_mean_size(records):.2f}")
+    single, none, outside, _ = ([r for r in records if r["kind"] == kind] for kind in KINDS)
+    _print_share("outside the library: unexplained", [r["verdict"] == "unexplained" for r in outside])
+    closed = sorted(_closed(r) for r in records if r["kind"] in ("single", "pair") and r["verdict"] == "identified")
+    if closed:
+        print(f"  median share of the gap closed {closed[len(closed) // 2]:.2f}")
+    for name in BASELINES:
+        _print_share(f"baseline {name}: one effect, named alone", [r["baselines"][name] == r["truth"] for r in single])
+        _print_share(f"baseline {name}: no effect, says none", [not r["baselines"][name] for r in none])
+    for kind, spent in _spent(records).items():
+        print(f"processor seconds, {kind:8} median {spent[len(spent) // 2]:.0f}, longest {spent[-1]:.0f}")
+    print("\ntruth -> named")
+    for (truth, said), count in sorted(Counter((name_of(r["truth"]), said_of(r)) for r in records).items()):
+        print(f"  {count:3d}  {truth:40} {said}")
+
+
+def table(records: Mapping[str, Sequence[dict]]) -> str:
+    """The rates of all truths in Markdown, each beside what is required of it."""
+    found = {truth: rates(of, truth) for truth, of in records.items()}
+    titles = [*found["own"]]
+    titles.insert(titles.index(_IN_SET) + 1, _SIZE)
+    heads = [f"{truth}, {len(of)} data sets | required" for truth, of in records.items()]
+    lines = [f"| | {' | '.join(heads)} |", "|---|" + "---|" * 2 * len(records)]
+    for title in titles:
+        cells = []
+        for truth, of in records.items():
+            value = f"{_mean_size(of):.2f}" if title == _SIZE else _share(found[truth].get(title, []))
+            cells.append(f"{value} | {_REQUIRED[title][truth]}")
+        lines.append(f"| {title.format('1.2 (foreign: 1.3)')} | {' | '.join(cells)} |")
+    spent = [", ".join(f"{s[len(s) // 2]:.0f}" for s in _spent(of).values()) for of in records.values()]
+    lines.append(f"| processor time, median, s: {', '.join(KINDS)} | {' | '.join(f'{s} | -' for s in spent)} |")
+    return "\n".join(lines)
+
+
+def _spent(records: Sequence[dict]) -> dict[str, list[float]]:
+    """Processor seconds by kind, rising."""
+    by_kind = {kind: sorted(r["processor_seconds"] for r in records if r["kind"] == kind) for kind in KINDS}
+    return {kind: spent for kind, spent in by_kind.items() if spent}
+
+
+def _mean_size(records: Sequence[dict]) -> float:
+    """Effects reported, of robots with one effect of which something is named."""
+    sizes = [len(_reported(r)) for r in records if r["kind"] == "single" and r["effects"]]
+    return sum(sizes) / max(len(sizes), 1)
+
+
+def _share(hits: Sequence[bool]) -> str:
+    if not hits:
+        return ""
+    low, high = wilson(sum(hits), len(hits))
+    return f"{sum(hits)}/{len(hits)} = {sum(hits) / len(hits):.2f} [{low:.2f}, {high:.2f}]"
+
+
+def _print_share(what: str, hits: Sequence[bool]) -> None:
+    if hits:
+        low, high = wilson(sum(hits), len(hits))
+        print(f"{what:55} {sum(hits):3d}/{len(hits):<3d} = {sum(hits) / len(hits):.2f}  [{low:.2f}, {high:.2f}]")
+
+
+def _first(record: dict) -> str | None:
+    return record["effects"][0]["name"] if record["effects"] else None
+
+
+def _reported(record: dict) -> set[str]:
+    return {name for e in record["effects"] for name in (e["name"], *e["confusable_with"])}
+
+
+def name_of(effects: Sequence[str]) -> str:
+    return " + ".join(sorted(effects)) or "nothing"
+
+
+def said_of(record: dict) -> str:
+    return name_of([e["name"] for e in record["effects"]]) if record["effects"] else record["verdict"]
+
+
+def _plain(record: dict) -> bool:
+    """Whether a verdict says that the library explains all that matters."""
+    return record["verdict"] == "none" or (record["verdict"] == "identified" and not record["remainder"]["matters"])
+
+
+def _ratio(record: dict, which: str = "held_out") -> float:
+    return record["error"]["after"][which] / record["error"]["noise_floor"][which]
+
+
+def _covered(record: dict) -> list[bool]:
+    """Of each parameter of each effect that was named and is there, whether its interval holds the truth."""
+    hits = []
+    for effect in record["effects"]:
+        for name, true in record["values"].get(effect["name"], {}).items():
+            if (ends := effect["interval_90"].get(name)) is not None:
+                hits.append(ends[0] <= true <= ends[1])
+    return hits
+
+
+def _base_covered(record: dict) -> list[bool]:
+    """Of each parameter of the base model, whether its interval holds the truth."""
+    estimated, values = record["base_parameters"], record["base_values"]
+    ends = {name: estimated[name]["interval_90"] for name in estimated if name in values}
+    return [low <= values[name] <= high for name, (low, high) in ends.items()]
+
+
+def _closed(record: dict) -> float:
+    error = record["error"]
+    floor, before = error["noise_floor"]["held_out"], error["before"]["held_out"]
+    return (before - error["after"]["held_out"]) / max(before - floor, 1e-9)
