@@ -162,7 +162,7 @@ class PullInputs:
     grip: np.ndarray | float = 1.0
     extended_psi: float = 0.0
 
-    @property
+    @cached_property
     def sample_s(self) -> float:
         return float(np.median(np.diff(self.pulled_s)))
 

@@ -151,9 +151,10 @@ def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
     """Where each job's results go, (columns, samples)."""
     sizes = columns * jobs["samples"]
     ends = np.cumsum(sizes)
-    whole = np.empty(ends[-1])
-    jobs["rows"] = _address(whole) + whole.itemsize * (ends - sizes)
-    return [part.reshape(columns, -1) for part in np.split(whole, ends[:-1])]
+    starts, whole = ends - sizes, np.empty(ends[-1])
+    jobs["rows"] = _address(whole) + whole.itemsize * starts
+    places = zip(starts.tolist(), ends.tolist(), strict=True)
+    return [whole[start:end].reshape(columns, -1) for start, end in places]
 
 
 @cache
