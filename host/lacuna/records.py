@@ -44,7 +44,7 @@ class Table:
             condition=_plain(self.labels.get("condition", self.name)),
             time_s=self.time_s,
             channels={name: _numbers(self.columns[name], self.name, name) for name in outputs},
-            session_order=_whole(self.labels.get("order")),
+            session_order=_whole(self.labels.get("order"), self.name),
             inputs={name: column for name, column in self.columns.items() if name not in outputs},
         )
 
@@ -168,8 +168,13 @@ def _plain(label: Any) -> Hashable:
     return label.item() if isinstance(label, np.generic) else label
 
 
-def _whole(order: Any) -> int | None:
-    return None if order is None else int(order)
+def _whole(order: Any, record: str) -> int | None:
+    try:
+        return None if order is None else int(order)
+    except (TypeError, ValueError):
+        raise RecordError(
+            f"record {record}: its order is {order!r}: give its place in the day, a whole number."
+        ) from None
 
 
 def _folder(folder: Path) -> list[Record | Table]:
@@ -184,22 +189,34 @@ def _folder(folder: Path) -> list[Record | Table]:
 
 
 def _csv(file: Path) -> Table:
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as lines:  # a spreadsheet begins its files with a mark
-            reader = csv.reader(lines, skipinitialspace=True)
-            names = [name.strip() for name in next(reader, [])]
-            rows = [(reader.line_num, row) for row in reader if "".join(row) and not row[0].startswith("#")]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordError(f"{file.name} is not a table of text in UTF-8: {error}") from None
+    (_, names), *rows = _lines(file)
+    names = [name.strip() for name in names]
     if len(names) == 1 and ";" in names[0]:
         raise RecordError(f"{file.name} separates its columns by semicolons: separate them by commas.")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
+    if not rows:
+        raise RecordError(f"{file.name} has no rows below the names of its columns.")
     for line, row in rows:
         if len(row) != len(names):
             raise RecordError(f"{file.name}, line {line}: {len(row)} values for {len(names)} columns.")
-    cells = zip(*(row for _, row in rows), strict=True)
-    columns = {n: _typed(column, file, [line for line, _ in rows], n) for n, column in zip(names, cells, strict=False)}
+    lines, cells = [line for line, _ in rows], zip(*(row for _, row in rows), strict=True)
+    columns = {name: _typed(column, file, lines, name) for name, column in zip(names, cells, strict=True)}
     condition = re.sub(r"[ _-]?\d+$", "", file.stem) or file.stem
     return _table({"condition": condition} | columns, file.stem)
+
+
+def _lines(file: Path) -> list[tuple[int, list[str]]]:
+    """The cells of each line that holds any, with its number; remarks (#) are left out."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as lines:  # a spreadsheet begins its files with a mark
+            reader = csv.reader(lines, skipinitialspace=True)
+            found = [(reader.line_num, row) for row in reader if "".join(row) and not row[0].startswith("#")]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordError(f"{file.name} is not a table of text in UTF-8: {error}") from None
+    if not found:
+        raise RecordError(f"{file.name} is empty.")
+    return found
 
 
 def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:
@@ -207,10 +224,15 @@ def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) ->
     values = [_number(cell) for cell in cells]
     if None not in values:
         return np.array(values)
-    if name in _LABELS or not any(value is not None and np.isfinite(value) for value in values):
-        return np.array(cells)
     at = values.index(None)
-    raise RecordError(f"{file.name}, line {lines[at]}, column {name}: {cells[at]!r} is not a number.")
+    where = f"{file.name}, line {lines[at]}, column {name}: {cells[at]!r}"
+    if name in _LABELS:
+        return np.array(cells)
+    if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cells[at]):
+        raise RecordError(f"{where} has a decimal comma: write numbers with a point.")
+    if not any(value is not None and np.isfinite(value) for value in values):
+        return np.array(cells)
+    raise RecordError(f"{where} is not a number.")
 
 
 def _number(cell: str) -> float | None:

@@ -27,7 +27,7 @@ def test_a_spreadsheets_mark_is_no_part_of_the_first_name(tmp_path):
 
 
 def test_quoted_cells_and_remarks_are_read(tmp_path):
-    (one,) = read(write(tmp_path, "a.csv", f'"time_s","y"\n# warm\n"0.5","7"\n\n{ROWS}\n'))
+    (one,) = read(write(tmp_path, "a.csv", f'# run 1\n"time_s","y"\n# warm\n"0.5","7"\n\n{ROWS}\n'))
     assert (one.time_s[0], one.columns["y"][0]) == (0.5, 7.0)
 
 
@@ -43,7 +43,11 @@ def test_an_empty_cell_is_a_missing_sample_and_a_column_of_words_an_input(tmp_pa
         ("time_s,y\n0,1\n1,2.5.1\n", r"a\.csv, line 3, column y: '2\.5\.1' is not a number"),
         ("time_s,y\n0,1\n1\n", r"a\.csv, line 3: 1 values for 2 columns"),
         ("time_s;y\n0;1\n", "semicolons"),
-        ("", "no times"),
+        ('time_s,y\n0,"1,5"\n', r"a\.csv, line 2, column y: '1,5' has a decimal comma"),
+        ("time_s,y,y\n0,1,2\n", "more than one column 'y'"),
+        ("time_s,y\n", "no rows"),
+        ("# nothing\n\n", "is empty"),
+        ("", "is empty"),
     ],
 )
 def test_refuses_with_file_line_and_column(tmp_path, text, said):
@@ -63,3 +67,9 @@ def test_one_file_is_one_record_and_so_is_a_segment(tmp_path):
     long = Table("long", np.arange(100.0), {"y": np.arange(100.0)}, {})
     piece = segments(long, 10)[5]
     assert read(piece) == [piece]
+
+
+def test_a_place_in_the_day_is_a_whole_number(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", "time_s,y,order\n0,1,first\n1,2,first\n"))
+    with pytest.raises(RecordError, match=r"record a: its order is .*first"):
+        one.record(["y"])
