@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from independent_lab import BASELINE, Lab
+from scipy.signal import lsim
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
@@ -103,6 +104,30 @@ def test_the_camera_reads_with_what_was_learnt(system, theta):
     assert scaled["displacement_tail_mm"][inside] == pytest.approx(
         1.03 * plain["displacement_tail_mm"][inside], abs=1e-6
     )
+
+
+@pytest.mark.parametrize(("experiment", "channel"), [("locomotion", "head"), ("step_response", "")])
+def test_a_camera_that_remembers_is_one_on_a_mount_that_rings(system, theta, experiment, channel):
+    omega, damping = 2.0 * np.pi * 6.0, 0.1  # dies away within what is remembered
+    swing, decay = omega * np.sqrt(1.0 - damping**2), damping * omega
+
+    def after_a_step(ago_s):
+        return -np.exp(-decay * ago_s) * (np.cos(swing * ago_s) - decay / swing * np.sin(swing * ago_s))
+
+    site = system.correction_sites["camera_memory"]
+    at = np.linspace(site.lower, site.upper, 481)
+    learnt = Correction(site.name, np.array([after_a_step(at), 0.0 * at, 0.0 * at]))
+    trial = next(t for t in system.trials if t.experiment == experiment and t.payload.actuator in (None, "large"))
+    plain, got = (system.predict(theta, (), trial, corrections=one) for one in ((), (learnt,)))
+    name = f"displacement_{channel}_mm" if channel else "displacement_mm"
+    mount = ([-1.0, 0.0, 0.0], [1.0, 2.0 * decay, omega**2])  # r'' + 2 zeta omega r' + omega^2 r = -x''
+    moved_mm = plain[name] - plain[name][0]
+    rings_mm = lsim(mount, moved_mm, np.arange(len(moved_mm)) * 0.01)[1]
+    seen_mm = got[name] - plain[name]
+    assert np.abs(rings_mm).max() > 1.0
+    assert np.sqrt(np.mean((seen_mm - rings_mm) ** 2)) < 0.1 * np.sqrt(np.mean(rings_mm**2))
+    for other in plain.keys() - {name}:
+        np.testing.assert_array_equal(got[other], plain[other])
 
 
 def with_effect(theta, name, **values):

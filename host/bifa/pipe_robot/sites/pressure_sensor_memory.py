@@ -1,9 +1,7 @@
 """What the pressure sensors say by how the pressure has changed, by how long ago."""
 
-import numpy as np
-
 from bifa.pipe_robot.inputs import STEP, WALK, Inputs, StepInputs, WalkInputs
-from bifa.pipe_robot.sites.site import Range, Site, pressures, row_of
+from bifa.pipe_robot.sites.site import Range, Site, pressures, remembered, row_of
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant
 from lacuna.system import Channels
@@ -23,10 +21,4 @@ SITE = Site(
 def readings(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
     if not isinstance(inputs, (StepInputs, WalkInputs)):
         return {}
-    sample_s = float(np.median(np.diff(inputs.time_s)))
-    ago_s = np.arange(0.5 * sample_s, curve.upper, sample_s)
-    found = {}
-    for name, psi in pressures(channels):
-        changes = np.diff(psi, prepend=psi[0])
-        found[name] = psi + np.convolve(changes, curve.at(ago_s, row_of(name, inputs)))[: len(psi)]
-    return found
+    return {name: remembered(psi, inputs.time_s, curve, row_of(name, inputs)) for name, psi in pressures(channels)}

@@ -73,6 +73,14 @@ def pressures(channels: Channels) -> list[tuple[str, np.ndarray]]:
     return [(name, values) for name, values in channels.items() if name.startswith("pressure")]
 
 
+def remembered(values: np.ndarray, time_s: np.ndarray, curve: LearntCurve, row: int) -> np.ndarray:
+    """`values` (n,) with what a curve over the time ago makes of their changes."""
+    sample_s = float(np.median(np.diff(time_s)))
+    ago_s = np.arange(0.5 * sample_s, curve.upper, sample_s)
+    changes = np.diff(values, prepend=values[0])
+    return values + np.convolve(changes, curve.at(ago_s, row))[: len(values)]
+
+
 def row_of(channel: str, inputs: Inputs) -> int:
     """Of curves by actuator, the large one's first, that of a pressure channel."""
     return 0 if inputs.actuator == "large" or channel == "pressure_body_psi" else 1
