@@ -13,6 +13,7 @@ KINDS = ("single", "none", "outside", "pair")
 _FIRST, _IN_SET, _SIZE = "one effect: named first", "one effect: in the reported set", "mean size of the reported set"
 _NONE = "no effect: verdict `none`"
 _NOT_PLAIN, _CLOSED = "outside the library: never plainly explained", "outside: half the gap closed by what is learnt"
+_NOT_PLAIN_GAP, _CLOSED_GAP = (f"{title}, where there is a gap" for title in (_NOT_PLAIN, _CLOSED))
 _BOTH = "two effects: both named"
 _HELD_OUT, _CONDITIONS = "identified: error not fitted within {} floors", "the same on conditions not fitted"
 _SIZES, _BASE = "90 % intervals of sizes hold the truth", "90 % intervals of base parameters hold the truth"
@@ -25,6 +26,8 @@ _REQUIRED: dict[str, dict[str, str]] = {
         _NONE: ("0.98", "0.95", "0.95"),
         _NOT_PLAIN: ("0.95", "0.90", "0.85"),
         _CLOSED: ("0.75", "0.70", "0.60"),
+        _NOT_PLAIN_GAP: ("-", "-", "-"),
+        _CLOSED_GAP: ("-", "-", "-"),
         _BOTH: ("0.85", "0.75", "0.60"),
         _HELD_OUT: ("0.95", "0.90", "0.80"),
         _CONDITIONS: ("0.95", "0.90", "0.80"),
@@ -47,7 +50,7 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
 def rates(records: Sequence[dict], truth: str) -> dict[str, list[bool]]:
     """Hits and misses by what they are of."""
     single, none, outside, pair = ([r for r in records if r["kind"] == kind] for kind in KINDS)
-    named = [r for r in single + pair if r["verdict"] == "identified"]
+    named, gaps = [r for r in single + pair if r["verdict"] == "identified"], [r for r in outside if _gap(r)]
     of_conditions = [r for r in named if r["error"]["noise_floor"]["held_out_conditions"]]
     found = {
         _FIRST: [_first(r) in r["truth"] for r in single],
@@ -55,6 +58,8 @@ def rates(records: Sequence[dict], truth: str) -> dict[str, list[bool]]:
         _NONE: [r["verdict"] == "none" for r in none],
         _NOT_PLAIN: [not _plain(r) for r in outside],
         _CLOSED: [_closed(r) >= 0.5 for r in outside],
+        _NOT_PLAIN_GAP: [not _plain(r) for r in gaps],
+        _CLOSED_GAP: [_closed(r) >= 0.5 for r in gaps],
         _BOTH: [set(r["truth"]) <= {e["name"] for e in r["effects"]} for r in pair],
         _HELD_OUT: [_ratio(r) <= CLOSE[truth] for r in named],
         _CONDITIONS: [_ratio(r, "held_out_conditions") <= CLOSE[truth] for r in of_conditions],
@@ -76,12 +81,12 @@ def report(records: Sequence[dict], truth: str) -> None:
     _print_share("outside the library: unexplained", [r["verdict"] == "unexplained" for r in outside])
     closed = sorted(_closed(r) for r in records if r["kind"] in ("single", "pair") and r["verdict"] == "identified")
     if closed:
-        print(f"  median share of the gap closed {closed[len(closed) // 2]:.2f}")
+        print(f"  median share of the gap closed {_median(closed):.2f}")
     for name in BASELINES:
         _print_share(f"baseline {name}: one effect, named alone", [r["baselines"][name] == r["truth"] for r in single])
         _print_share(f"baseline {name}: no effect, says none", [not r["baselines"][name] for r in none])
     for kind, spent in _spent(records).items():
-        print(f"processor seconds, {kind:8} median {spent[len(spent) // 2]:.0f}, longest {spent[-1]:.0f}")
+        print(f"processor seconds, {kind:8} median {_median(spent):.0f}, longest {spent[-1]:.0f}")
     print("\ntruth -> named")
     for (truth, said), count in sorted(Counter((name_of(r["truth"]), said_of(r)) for r in records).items()):
         print(f"  {count:3d}  {truth:40} {said}")
@@ -100,7 +105,8 @@ def table(records: Mapping[str, Sequence[dict]]) -> str:
             value = f"{_mean_size(of):.2f}" if title == _SIZE else _share(found[truth].get(title, []))
             cells.append(f"{value} | {_REQUIRED[title][truth]}")
         lines.append(f"| {title.format('1.2 (foreign: 1.3)')} | {' | '.join(cells)} |")
-    spent = [", ".join(f"{s[len(s) // 2]:.0f}" for s in _spent(of).values()) for of in records.values()]
+    each = [_spent(of) for of in records.values()]
+    spent = [", ".join(f"{_median(s[kind]):.0f}" if kind in s else "-" for kind in KINDS) for s in each]
     lines.append(f"| processor time, median, s: {', '.join(KINDS)} | {' | '.join(f'{s} | -' for s in spent)} |")
     return "\n".join(lines)
 
@@ -109,6 +115,10 @@ def _spent(records: Sequence[dict]) -> dict[str, list[float]]:
     """Processor seconds by kind, rising."""
     by_kind = {kind: sorted(r["processor_seconds"] for r in records if r["kind"] == kind) for kind in KINDS}
     return {kind: spent for kind, spent in by_kind.items() if spent}
+
+
+def _median(rising: Sequence[float]) -> float:
+    return rising[len(rising) // 2]
 
 
 def _mean_size(records: Sequence[dict]) -> float:
@@ -149,6 +159,14 @@ def said_of(record: dict) -> str:
 def _plain(record: dict) -> bool:
     """Whether a verdict says that the library explains all that matters."""
     return record["verdict"] == "none" or (record["verdict"] == "identified" and not record["remainder"]["matters"])
+
+
+def _gap(record: dict) -> bool:
+    """Whether the base model misses the trials that informed nothing, or conditions that were never fitted, by more
+    than a tenth of the floor's variance: what it misses by less is `none` by contract."""
+    error = record["error"]
+    sides = [(error["before"][side], error["noise_floor"][side]) for side in ("held_out", "held_out_conditions")]
+    return any(before**2 - floor**2 > 0.1 * floor**2 for before, floor in sides if before and floor)
 
 
 def _ratio(record: dict, which: str = "held_out") -> float:

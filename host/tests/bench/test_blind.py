@@ -49,6 +49,16 @@ def test_rates_count_what_was_named_and_what_was_not(capsys):
     assert "1 leak backlash + leak" in said
 
 
+def test_what_the_base_model_hardly_misses_is_told_apart():
+    small = {"held_out": 1.04, "held_out_conditions": 0.99}
+    outside = [record(k, kind="outside", truth="pipe_joint") for k in range(3)]
+    outside[1]["error"]["before"] |= small
+    outside[2]["error"]["before"] |= small | {"held_out_conditions": 1.06}
+    rates = {name.split(":")[1].strip(): hits for name, hits in blind_figures.rates(outside, "foreign").items() if hits}
+    assert rates["never plainly explained"] == [False] * 3
+    assert rates["never plainly explained, where there is a gap"] == [False] * 2
+
+
 def test_a_table_has_the_rates_of_all_truths_beside_what_is_required():
     found = blind_figures.table({"own": RECORDS, "realistic": RECORDS[:1], "foreign": []})
     rows = {cells[1]: cells[2:-1] for cells in ([c.strip() for c in row.split("|")] for row in found.splitlines())}
