@@ -58,7 +58,8 @@ def isolating(problem: Problem) -> list[bool]:
 
 
 def _names(problems: Sequence[Problem]) -> list[tuple[str, ...]]:
-    return [problem.structure.effects or ("nothing",) for problem in problems]
+    each = ((*problem.structure.effects, *problem.structure.sites) for problem in problems)
+    return [names or ("nothing",) for names in each]
 
 
 def _begun(problem: Problem, starts: Sequence[np.ndarray]) -> tuple[Isolated, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.from_afar import begin, follow, isolating, promising
 from lacuna.diagnosis.linear import remaining_after, stacked
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import rms
@@ -20,6 +21,7 @@ from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 
 _MOST = 4  # curves in one correction
+_FOLLOWED = 2  # of those begun anew, to the end
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
 _SOUGHT = 8  # sites where further curves are sought
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
@@ -53,34 +55,74 @@ def learn_correction(
 ) -> Candidate | None:
     """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
     `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
-    None if none helps. Further ones are sought where the first regression promised most."""
+    None if none helps. Further ones are sought where the first regression promised most. Where the fits of `candidates`
+    leave so much that they may be lost, the first curve is begun anew as well."""
     best: Candidate | None = None
     sites = list(candidates[0].fitted.structure.system.correction_sites)
+    anew = [found for one in candidates for found in _begun_anew(one, sites, split, policy, crew)]
+    if anew and (begun := _best_of(anew, candidates, split, policy)):
+        if enough(begun):
+            return begun
+        anew = [begun]
     while best is None or len(best.fitted.structure.sites) < _MOST:
         parents, promises = [best] if best else candidates, []
         for parent in parents:
             promises = sorted([*promises, *_promises(parent, sites, split, crew)], key=lambda p: p.cost)
             sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
-        grown = _best_grown(parents, promises[:_FITTED], split, policy, crew)
+        grown = _best_grown(parents, promises[:_FITTED], split, policy, crew, anew)
         if grown is None:
             break
+        anew = []
         best = grown
         if enough(best):
             break
     return best
 
 
+def _begun_anew(parent: Candidate, sites: Sequence[str], split: Split, policy: Policy, crew: Crew) -> list[Candidate]:
+    """`parent` with one curve more, begun at the initial guess with the parent's effects and curves as they are: a fit
+    that lacks much may be so far off that no curve on top of it helps. The few that promise most from afar, if they
+    promise to take their share away (`lacuna.diagnosis.from_afar`)."""
+    fitted, structure = parent.fitted, parent.fitted.structure
+    isolates = isolating(fitted.problem)
+    if parent.checked_error <= (0, policy.lost) or not any(isolates) or all(isolates):
+        return []
+    known = {name: value for name, value in fitted.theta.items() if name not in Structure(structure.system).names}
+    problems, starts = [], []
+    for more in ((), *((site,) for site in sites if site not in structure.sites)):
+        grown = Structure(structure.system, structure.effects, (*structure.sites, *more))
+        problems.append(Problem(grown, split.fit, fitted.problem.floor))
+        starts.append([grown.values(grown.theta(grown.start()) | known)])
+    alone, *begun = begin(crew, "restarting with", problems, starts)
+    most = (1.0 - policy.promising) * alone.glanced
+    chosen = [one for one in promising(begun, _FOLLOWED) if one.glanced < most]
+    solutions = follow(crew, "following up", chosen)
+    return [judge(Fit(one.problem, solution, 1, 1), split) for one, solution in zip(chosen, solutions, strict=True)]
+
+
 def _best_grown(
-    parents: Sequence[Candidate], promises: Sequence[_Promise], split: Split, policy: Policy, crew: Crew
+    parents: Sequence[Candidate],
+    promises: Sequence[_Promise],
+    split: Split,
+    policy: Policy,
+    crew: Crew,
+    anew: Sequence[Candidate] = (),
 ) -> Candidate | None:
     before = min(parents, key=lambda c: c.checked.cost)
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
     solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
     grown = [judge(Fit(p.problem, solution, 1, 1), split) for p, solution in zip(promises, solutions, strict=True)]
+    return _best_of([*grown, *anew], parents, split, policy)
+
+
+def _best_of(
+    grown: Sequence[Candidate], parents: Sequence[Candidate], split: Split, policy: Policy
+) -> Candidate | None:
+    """The best of `grown`, fitted to the end, if it takes away its share of what the best of its parents leaves."""
     if not grown:
         return None
-    best = min(grown, key=lambda c: c.checked.cost)
+    before, best = (min(some, key=lambda c: c.checked.cost) for some in (parents, grown))
     if before.checked.cost - best.checked.cost < policy.curve * _excess(before.checked):
         return None
     best = min(best, judge(_refined(best.fitted), split), key=lambda c: c.checked.cost)

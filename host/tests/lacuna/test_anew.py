@@ -13,6 +13,7 @@ from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.from_afar import begin as begin_from_afar
 from lacuna.diagnosis.from_afar import follow as follow_from_afar
 from lacuna.diagnosis.from_afar import promising
+from lacuna.diagnosis.learn import learn_correction
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, evaluate_on
@@ -151,3 +152,30 @@ def test_rough_fits_that_do_not_look_promising_stay_as_they_are():
     near, far = again["coulomb"]
     assert far.solution is near.solution
     assert again["delay"][1].theta["delay.delay_s"] == pytest.approx(0.05, rel=0.1)
+
+
+def without(case: Case, effect: str) -> Case:
+    """The same data, of an effect that the library lacks."""
+    library = {name: known for name, known in case.system.effects.items() if name != effect}
+    return Case(Bench(case.system.trials, library), case.split, POLICY, 0)
+
+
+def learnt(case: Case, parent: Candidate) -> Candidate | None:
+    return learn_correction([parent], case.split, enough=case.suffices, policy=POLICY, crew=NOBODY)
+
+
+def test_a_curve_is_begun_anew_where_the_fit_below_it_is_lost(monkeypatch):
+    case = without(bench({"cubic_spring.stiffness_N_m3": 8000.0}, 66), "cubic_spring")
+    parent = lost(case)
+    found = learnt(case, parent)
+    assert found.fitted.structure.sites == ("spring",)
+    assert found.checked_error < (0, 1.2)
+    monkeypatch.setattr("lacuna.diagnosis.learn._begun_anew", lambda *_: [])
+    from_there = learnt(case, parent)
+    assert from_there is None or from_there.checked.cost > found.checked.cost
+
+
+def test_a_curve_is_not_begun_anew_on_a_fit_that_leaves_little(monkeypatch):
+    case = bench({}, 67)
+    monkeypatch.setattr("lacuna.diagnosis.learn.begin", pytest.fail)
+    assert learnt(case, case.judge(case.fit_base(1))) is None
