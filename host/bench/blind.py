@@ -164,6 +164,8 @@ def main() -> None:
     if options.one:
         diagnose_one(options.one, options.json, options.without, options.threads)
         return
+    if options.print and not options.records:
+        parser.error("--print says what is in a file of records: add --records FILE")
     known = blind_records.read(options.records) if options.records else {}
     if options.print:
         report(list(known.values()), options.truth)

@@ -128,6 +128,7 @@ def _mean_size(records: Sequence[dict]) -> float:
 
 
 def _share(hits: Sequence[bool]) -> str:
+    """How many of how many, with the interval; empty where there is none to count."""
     if not hits:
         return ""
     low, high = wilson(sum(hits), len(hits))
@@ -136,8 +137,7 @@ def _share(hits: Sequence[bool]) -> str:
 
 def _print_share(what: str, hits: Sequence[bool]) -> None:
     if hits:
-        low, high = wilson(sum(hits), len(hits))
-        print(f"{what:55} {sum(hits):3d}/{len(hits):<3d} = {sum(hits) / len(hits):.2f}  [{low:.2f}, {high:.2f}]")
+        print(f"{what:78} {_share(hits)}")
 
 
 def _first(record: dict) -> str | None:

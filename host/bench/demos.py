@@ -89,7 +89,7 @@ def summed_up(stories: Sequence[Story]) -> dict[str, float]:
 
 def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:
     """Print the table, a line as each demo ends; returns the figures flat."""
-    known = lines.read(kept, lambda record: record["seed"]) if kept else {}
+    known = _known(kept) if kept else {}
     print(HEADING)
     stories = []
     with ThreadPoolExecutor(jobs) as pool:
@@ -100,6 +100,10 @@ def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) ->
                 known[one.seed] = one._asdict()
                 lines.write(kept, known.values())
     return summed_up(stories)
+
+
+def _known(kept: Path) -> dict[int, dict]:
+    return lines.read(kept, lambda record: record["seed"])
 
 
 def _story_of(record: dict) -> Story:
@@ -117,9 +121,10 @@ def main() -> None:
     parser.add_argument("--records", type=Path, help="a line of JSON a demo; read first, and kept up to date")
     parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
     options = parser.parse_args()
+    if options.print and not options.records:
+        parser.error("--print says what is in a file of records: add --records FILE")
     if options.print:
-        known = lines.read(options.records, lambda record: record["seed"]) if options.records else {}
-        run(sorted(known), options.out, 1, options.records)
+        run(sorted(_known(options.records)), options.out, 1, options.records)
     else:
         seeds = range(options.first_seed, options.first_seed + options.seeds)
         run(seeds, options.out, options.jobs, options.records)
