@@ -45,7 +45,12 @@ ParameterSet Commands::at_power_up() {
   return set;
 }
 
-Result Commands::run() { return result_of(controller_.run()); }
+Result Commands::run() {
+  // What waited for a boundary of the walk before: there may have been no sample since that ended.
+  if (pending_ && controller_.state() != State::kRunning) use(wanted_);
+  return result_of(controller_.run());
+}
+
 Result Commands::stop() { return result_of(controller_.stop()); }
 Result Commands::clear() { return result_of(controller_.clear()); }
 

@@ -94,7 +94,7 @@ void Console::end_line() {
   if (echo_) print_line_end();
   line_[length_] = '\0';
   length_ = 0;
-  if (spoilt_) {
+  if (spoilt_ && !flash_equal(line_, reinterpret_cast<const char*>(BIFA_TEXT("stop")))) {
     print(BIFA_TEXT("error the line arrived damaged\r\n"));
   } else if (too_long_) {
     print(BIFA_TEXT("error the line exceeds 63 characters\r\n"));

@@ -21,7 +21,9 @@ class Console {
 
   /// Takes one byte of text. Only while not waiting().
   void feed(uint8_t byte);
-  /// Bytes were lost: the present line is answered with an error, whatever else it holds.
+  /// Whether the next byte is the first of a line.
+  bool between_lines() const { return length_ == 0; }
+  /// Bytes were lost: the present line is answered with an error, unless it reads "stop".
   void spoil() { spoilt_ = true; }
 
   /// Whether the last command is still busy (EEPROM) and its answer is owed.

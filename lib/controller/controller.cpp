@@ -59,6 +59,9 @@ Verdict Controller::hold(Chamber chamber, ChamberState state) {
 Verdict Controller::clear() {
   const Critical guard;
   if (emergency_stop_ || cause_stands()) return Verdict::kCauseStands;
+  if (!supervisor_.is_latched()) return Verdict::kDone;  // what the watches have counted stays
+  if (outdated_) return Verdict::kLatched;
+  schedule_.stop();
   supervisor_.clear();
   for (uint8_t i = 0; i < kChamberCount; ++i) sensors_[i].reset();
   regulator_.reset();
@@ -174,7 +177,7 @@ bool Controller::tick(bool emergency_stop_pressed) {
     const Critical guard;
     ++uptime_ms_;
     emergency_stop_ = emergency_stop_pressed;
-    if (emergency_stop_pressed) supervisor_.stop();
+    if (emergency_stop_pressed) stop_in_interrupt();
   }
   if (++since_sample_ms_ == kSamplePeriod_ms) {
     since_sample_ms_ = 0;

@@ -21,6 +21,8 @@ class HostPort {
   bool byte_in_interrupt(uint8_t byte, bool damaged = false) { return receiver_.push(byte, damaged); }
   /// In the interrupt of the 1 kHz timer.
   void tick_in_interrupt() { receiver_.tick(); }
+  /// The emergency stop, in any interrupt: commands that wait came before it.
+  void emergency_stop_in_interrupt();
 
   /// In the main loop: handles what has arrived, answers, sends telemetry, goes on writing the EEPROM.
   void poll();
@@ -29,6 +31,7 @@ class HostPort {
   bool has_input() const { return receiver_.has_input(); }
 
  private:
+  bool next(uint8_t& byte);
   void take(uint8_t byte);
   void recover();
 

@@ -131,7 +131,7 @@ struct ScheduleAddMessage {
 } __attribute__((packed));
 static_assert(sizeof(ScheduleAddMessage) == 6, "no holes");
 
-/// sent at start, and in answer to version and connect; session_key is 0 when no session is open.
+/// in answer to version and connect; session_key is 0 when no session is open.
 struct HelloMessage {
   uint8_t protocol;
   uint8_t firmware[3];

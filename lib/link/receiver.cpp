@@ -18,6 +18,7 @@ bool Receiver::push(uint8_t byte, bool damaged) {
   if (byte == '!' && (!in_frame_ || frame_length_ == 0)) {
     if (in_frame_) put(kDelimiter);  // no frame begins so: the delimiter was a stray one
     in_frame_ = false;
+    outdate();
     return true;
   }
   if (!in_frame_) {
@@ -42,6 +43,7 @@ bool Receiver::push(uint8_t byte, bool damaged) {
   stop_matched_ = byte == flash_byte(&kStopFrame[stop_matched_]) ? stop_matched_ + 1 : kOtherFrame;
   if (stop_matched_ != sizeof kStopFrame) return false;
   stop_matched_ = kOtherFrame;
+  outdate();
   return true;
 }
 
@@ -58,6 +60,7 @@ void Receiver::put(uint8_t byte) {
 
 bool Receiver::pop(uint8_t& byte) {
   if (head_ == tail_) return false;
+  if (!outdated()) holds_outdated_ = false;
   byte = queue_[tail_];
   tail_ = (tail_ + 1) % kQueueBytes;
   return true;

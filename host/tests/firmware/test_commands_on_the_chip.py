@@ -144,3 +144,25 @@ def test_zero_is_refused_with_its_reason_and_shows_the_old_and_the_new_offset(be
     assert old == ["[offset", "psi", "body", "0", "head", "0", "tail", "0"]
     assert float(new[3]) == pytest.approx(0.15 + 0.02, abs=0.04)
     assert float(new[5]) == pytest.approx(-0.075 + 0.02, abs=0.04)
+
+
+def test_set_that_waited_when_the_walk_ended_is_that_of_the_next_walk(bench):
+    uno = connected(bench.board)
+    uno.upload({"period_s": 20.0})
+    uno.run()
+    bench.wait(1.0)
+    uno.upload({"period_s": 20.0, "duty_body": 0.0, "duty_head": 0.0, "duty_tail": 0.0}, wait=False)
+    uno.session.call_all([("stop", ()), ("run", ())])
+    bench.wait(0.1)
+    assert bench.valves_on == [4, 6, 8], "positive for good"
+
+
+def test_host_that_waits_for_the_eeprom_is_not_silent(bench):
+    assert "ok" in bench.say("set host_timeout_s 0.2")
+    bench.say("run", 0.01)
+    bench.board.send(b"save night\n")
+    bench.wait(0.1)
+    assert bench.board.eeprom_writes > 0
+    assert "host_silent" not in bench.wait(0.25)
+    assert bench.valves_on
+    assert "host_silent" in bench.wait(1.0), "now it is"

@@ -2,7 +2,9 @@
 
 import pytest
 
+from bench.bench_uno import connected
 from bifa.link import frames
+from bifa.link.table import COMMANDS
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -161,3 +163,59 @@ def test_emergency_stop_while_a_transfer_cannot_end(bench, later_us):
     begin = bench.board.cycle
     bench.board.press_emergency_stop()
     assert all_off_after(bench, first, begin) <= LIMIT_CYCLES
+
+
+def tap(bench):
+    """The emergency stop, for an instant."""
+    bench.board.press_emergency_stop()
+    bench.board.run_for(0.02)
+    bench.board.press_emergency_stop(False)
+
+
+def stop_byte(bench):
+    bench.board.send(b"!")
+
+
+def stop_frame(bench):
+    bench.board.send(b"\x00\x00" + frames.STOP_FRAME + b"\x00")
+
+
+@pytest.mark.parametrize("stop", [stop_byte, stop_frame, tap], ids=lambda stop: stop.__name__)
+@pytest.mark.parametrize("first", [b"save zz\n", b"help\n", b""], ids=["saving", "printing", "idle"])
+def test_what_waits_when_a_stop_comes_does_not_undo_it(bench, first, stop):
+    bench.board.send(b"!")
+    bench.wait(0.05)
+    bench.board.send(first + b"clear\nrun\n")
+    while first and bench.board.bytes_on_the_wire:
+        bench.board.run_until(bench.board.cycle + 16)
+    stop(bench)
+    said = bench.wait(2.0)
+    assert not bench.valves_on
+    assert said.count("error") == 2, "both lines are answered"
+    assert bench.say("clear").rstrip().endswith("ok"), "one that comes after the stop"
+    assert bench.say("run").rstrip().endswith("ok")
+
+
+def test_the_rest_of_a_line_that_a_stop_cut_does_not_undo_it(bench):
+    walking(bench)
+    bench.board.send(b"cle!ar\n")
+    bench.wait(0.1)
+    assert "state stopped" in bench.say("status", 0.3)
+    assert bench.say("clear").rstrip().endswith("ok")
+
+
+def test_clear_frames_that_wait_when_a_stop_comes_do_not_undo_it(bench):
+    uno = connected(bench.board)
+    uno.stop()
+    seed, sequence = frames.session_seed(uno.session._key), uno.session._sequence
+    waiting = [frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("clear", "run"))]
+    bench.board.send(b"help\n" + b"".join(waiting) + frames.STOP)
+    bench.wait(1.0)
+    assert not bench.valves_on
+
+
+def test_stop_that_arrived_damaged_stops(bench):
+    walking(bench)
+    bench.board.send(b"\x80stop\n")
+    bench.wait(0.01)
+    assert not bench.valves_on

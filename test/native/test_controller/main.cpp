@@ -52,6 +52,12 @@ struct Bench {
     }
   }
 
+  /// A command that comes now.
+  Verdict clear() {
+    controller.command_begins();
+    return controller.clear();
+  }
+
   State state() const { return controller.state(); }
   Fault fault() const { return controller.status().fault.fault; }
   void pressure(uint8_t chamber, uint16_t conversion) { round.sum[chamber] = conversion * bifa::kOversampling; }
@@ -117,8 +123,24 @@ void test_a_stop_byte_latches_until_clear() {
   equal(Verdict::kLatched, bench.controller.schedule_start());
   equal(Verdict::kDone, bench.controller.stop());
   equal(State::kStopped, bench.state());
-  equal(Verdict::kDone, bench.controller.clear());
+  equal(Verdict::kDone, bench.clear());
   equal(State::kIdle, bench.state());
+}
+
+void test_a_clear_that_came_before_the_stop_does_not_undo_it() {
+  Bench bench;
+  bench.controller.command_begins();
+  bench.controller.stop_in_interrupt();
+  equal(Verdict::kLatched, bench.controller.clear());
+  equal(State::kStopped, bench.state());
+  equal(Verdict::kDone, bench.clear());
+  bench.controller.command_begins();
+  bench.pressed = true;
+  bench.tick();
+  bench.pressed = false;
+  bench.tick();
+  equal(Verdict::kLatched, bench.controller.clear());
+  equal(State::kStopped, bench.state());
 }
 
 void test_emergency_stop_holds_as_long_as_it_is_pressed() {
@@ -129,11 +151,11 @@ void test_emergency_stop_holds_as_long_as_it_is_pressed() {
   bench.tick();
   TEST_ASSERT_EQUAL_HEX8(0, pins);
   equal(State::kStopped, bench.state());
-  equal(Verdict::kCauseStands, bench.controller.clear());
+  equal(Verdict::kCauseStands, bench.clear());
   bench.pressed = false;
   bench.tick();
   equal(State::kStopped, bench.state());
-  equal(Verdict::kDone, bench.controller.clear());
+  equal(Verdict::kDone, bench.clear());
 }
 
 void test_emergency_stop_that_is_pressed_at_power_up_counts() {
@@ -187,7 +209,17 @@ void test_a_stop_ends_timed_holds() {
   bench.controller.schedule_start();
   bench.controller.stop_in_interrupt();
   bench.tick(2);
-  bench.controller.clear();
+  bench.clear();
+  bench.tick(200);
+  TEST_ASSERT_EQUAL_HEX8(0, pins);
+}
+
+void test_timed_holds_do_not_outlive_a_stop_that_is_cleared_within_a_tick() {
+  Bench bench;
+  bench.controller.schedule_add(50, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_start();
+  bench.controller.stop_in_interrupt();
+  equal(Verdict::kDone, bench.clear());
   bench.tick(200);
   TEST_ASSERT_EQUAL_HEX8(0, pins);
 }
@@ -295,6 +327,18 @@ void test_zero_is_not_taken_while_a_chamber_still_vents() {
 
 // ---- faults ----
 
+void test_a_clear_with_nothing_to_release_keeps_what_the_watches_have_counted() {
+  Bench bench;
+  bench.controller.run();
+  bench.tick(100);
+  bench.pressure(2, 512 + 330);
+  for (uint8_t i = 0; i < 5; ++i) {
+    bench.tick(50);
+    bench.clear();
+  }
+  equal(Fault::kOverPressure, bench.fault());
+}
+
 void test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands() {
   Bench bench;
   bench.controller.run();
@@ -309,10 +353,10 @@ void test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands() {
   TEST_ASSERT_EQUAL_INT16(10500, report.limit);
   TEST_ASSERT_INT16_WITHIN(40, 12100, report.value);
   TEST_ASSERT_INT16_WITHIN(40, 12100, report.highest_mpsi[2]);
-  equal(Verdict::kCauseStands, bench.controller.clear());
+  equal(Verdict::kCauseStands, bench.clear());
   bench.pressure(2, 512);
   bench.tick(20);
-  equal(Verdict::kDone, bench.controller.clear());
+  equal(Verdict::kDone, bench.clear());
   equal(State::kIdle, bench.state());
   TEST_ASSERT_TRUE(bench.controller.supply().counts() > 0);
 }
@@ -332,7 +376,7 @@ void test_a_broken_sensor_is_a_fault_in_any_state_even_idle() {
   bench.pressure(0, 0);
   bench.tick(100);
   equal(Fault::kSensorRange, bench.fault());
-  equal(Verdict::kCauseStands, bench.controller.clear());
+  equal(Verdict::kCauseStands, bench.clear());
 }
 
 void test_a_stuck_sensor_is_a_fault_while_walking() {
@@ -429,7 +473,7 @@ void test_a_silent_host_vents_when_it_was_asked_to() {
   equal(State::kRunning, bench.state());
   bench.tick(1);
   equal(Fault::kHostSilent, bench.fault());
-  equal(Verdict::kDone, bench.controller.clear());
+  equal(Verdict::kDone, bench.clear());
 }
 
 void test_without_a_time_out_the_host_may_be_silent_forever() {
@@ -446,16 +490,16 @@ void test_a_dac_that_does_not_answer_is_a_fault_until_it_does() {
   equal(State::kIdle, bench.state());
   bench.controller.supply_told(false);
   equal(Fault::kSupplyControl, bench.fault());
-  equal(Verdict::kCauseStands, bench.controller.clear());
+  equal(Verdict::kCauseStands, bench.clear());
   bench.controller.supply_told(true);
-  equal(Verdict::kDone, bench.controller.clear());
+  equal(Verdict::kDone, bench.clear());
 }
 
 void test_after_the_watchdog_it_starts_in_a_fault() {
   Bench bench(StartCause::kWatchdog);
   equal(Fault::kWatchdog, bench.fault());
   equal(Verdict::kLatched, bench.controller.run());
-  equal(Verdict::kDone, bench.controller.clear());
+  equal(Verdict::kDone, bench.clear());
 }
 
 void test_after_a_brown_out_it_starts_in_a_fault() {
@@ -495,11 +539,13 @@ void run() {
   RUN_TEST(test_stop_vents_and_returns_to_idle);
   RUN_TEST(test_hold_is_for_idle_and_holding_only);
   RUN_TEST(test_a_stop_byte_latches_until_clear);
+  RUN_TEST(test_a_clear_that_came_before_the_stop_does_not_undo_it);
   RUN_TEST(test_emergency_stop_holds_as_long_as_it_is_pressed);
   RUN_TEST(test_emergency_stop_that_is_pressed_at_power_up_counts);
   RUN_TEST(test_a_set_that_comes_while_running_does_not_make_the_phases_jump);
   RUN_TEST(test_timed_holds_come_on_their_tick);
   RUN_TEST(test_a_stop_ends_timed_holds);
+  RUN_TEST(test_timed_holds_do_not_outlive_a_stop_that_is_cleared_within_a_tick);
   RUN_TEST(test_a_schedule_has_room_for_sixteen);
   RUN_TEST(test_a_sample_every_ten_milliseconds_stamped_with_the_strobe);
   RUN_TEST(test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them);
@@ -511,6 +557,7 @@ void run() {
   RUN_TEST(test_an_open_input_is_found_within_two_seconds_whatever_the_valves_do);
   RUN_TEST(test_pressures_that_follow_their_valves_are_no_open_input_at_the_fastest_gait);
   RUN_TEST(test_over_pressure_in_pieces_adds_up);
+  RUN_TEST(test_a_clear_with_nothing_to_release_keeps_what_the_watches_have_counted);
   RUN_TEST(test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands);
   RUN_TEST(test_a_spike_of_a_hundred_milliseconds_is_borne);
   RUN_TEST(test_a_broken_sensor_is_a_fault_in_any_state_even_idle);
