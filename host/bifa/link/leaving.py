@@ -1,9 +1,10 @@
 """Leaving: however a command ends, the robot stands still before the port closes.
 
 Whoever talks to an Uno does so inside `with Uno(...)`, and that is all: its end stops the robot, repeats the stop
-until the Uno says that no valve is on, and raises StillMovingError if it does not say so. Ctrl-C, `kill` and a closed
-terminal end what is inside like any exception, wherever it is; their stop leaves before anything else is tidied up, and
-once a robot is being stopped nothing interrupts that.
+until the Uno says that no valve is on, and raises StillMovingError if it does not say so. Ctrl-C, Ctrl-\\, `kill` and a
+closed terminal end what is inside like any exception, wherever it is; their stop leaves before anything else is tidied
+up, and once a robot is being stopped nothing interrupts that. Ctrl-Z stops the robot before it suspends the program,
+which ends when it is resumed.
 """
 
 import contextlib
@@ -41,16 +42,17 @@ AGAIN_AFTER_S = 0.01
 
 
 def enter(robot: Robot) -> None:
-    """From now on, until `leave`, SIGINT, SIGTERM and SIGHUP stop `robot` at once and raise KeyboardInterrupt.
+    """From now on, until `leave`, signals that end a program, or suspend it, stop `robot` at once and raise
+    KeyboardInterrupt.
 
     What the program or `nohup` has decided otherwise is left alone, and so is everything in other threads than the main
     one, which get no signals.
     """
     if not _inside and threading.current_thread() is threading.main_thread():
-        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-            number = getattr(signal, name, None)  # Windows has no SIGHUP
+        for name, act in _ACTS.items():
+            number = getattr(signal, name, None)  # Windows has the first two
             if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                _earlier_handlers[number] = signal.signal(number, _end)
+                _earlier_handlers[number] = signal.signal(number, act)
         _earlier_hook.append(sys.unraisablehook)
         sys.unraisablehook = _end_again
     _inside.append(robot)
@@ -69,11 +71,18 @@ def leave(robot: Robot) -> None:
 
 
 def uninterrupted(function: Callable) -> Callable:
-    """Decorates what must come to its end: a signal meanwhile raises KeyboardInterrupt only after it."""
+    """Decorates what must come to its end: a signal meanwhile raises KeyboardInterrupt only after it. If that end is an
+    error, it is raised from the KeyboardInterrupt, so that nobody tries again."""
 
     @functools.wraps(function)
     def whole(*args, **kwargs):
-        result = function(*args, **kwargs)
+        try:
+            result = function(*args, **kwargs)
+        except Exception as error:
+            if not _held:
+                raise
+            _held.clear()
+            raise error from KeyboardInterrupt()
         if _held:
             _held.clear()
             raise KeyboardInterrupt
@@ -96,6 +105,17 @@ def _end(number: int, frame) -> None:
         with contextlib.suppress(ConnectionError):
             robot.send_stop()
     raise KeyboardInterrupt
+
+
+def _suspend(number: int, frame) -> None:
+    for robot in _inside:
+        with contextlib.suppress(ConnectionError):
+            robot.send_stop()
+    signal.raise_signal(signal.SIGSTOP)
+    _end(number, frame)
+
+
+_ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGTSTP": _suspend}
 
 
 def _end_again(lost) -> None:

@@ -31,10 +31,12 @@ def _drop_answers(uno: Uno) -> None:
 
 def type_line(uno: Uno, line: str, clock) -> list[str]:
     """Send one console line; returns the lines up to its answer, that included, behind those that came unasked.
-    Frames go on meanwhile.
+    Frames go on meanwhile. A line with characters that are no text is answered with an error here.
 
     Raises NoAnswerError, and RestartedError if the Uno restarts meanwhile.
     """
+    if not line.replace("\t", " ").isprintable():
+        return [f"error {line!r} holds characters that are no text; not sent"]
     _drop_answers(uno)
     uno.may_move = uno.may_move or line.split()[:1] in ([word] for word in MOVING)
     uno.session.transport.write(line.encode("ascii", "replace") + b"\n")

@@ -128,6 +128,8 @@ class Uno:
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
         self._read_set()
+        status = self.status()  # it may walk already: not every port restarts it
+        self.may_move = self.may_move or status.valves != 0 or status.state == "running" or status.is_schedule_running
         return hello
 
     @property

@@ -37,9 +37,22 @@ class Conversation:
             self._typed.put(line)
 
     def stop(self) -> None:
-        """The real-time stop, past everything that waits; the thread sees to its confirmation."""
-        self.uno.send_stop()
+        """The real-time stop, in place of everything that waits; the thread sees to its confirmation."""
+        with contextlib.suppress(ConnectionError):  # the thread finds out as well, and ends
+            self.uno.send_stop()
+        if dropped := self._dropped():
+            print(f"-- not carried out: {', '.join(dropped)}")
         self._is_stopping = True
+
+    def _dropped(self) -> list[str]:
+        """What was typed and has not begun; it waits no more."""
+        lines: list[str | None] = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                lines.append(self._typed.get_nowait())
+        if None in lines:
+            self._typed.put(None)
+        return [line for line in lines if line]
 
     def leave(self) -> None:
         """Carry out what has been typed, then end."""

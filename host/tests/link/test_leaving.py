@@ -113,9 +113,10 @@ def test_ctrl_c_while_the_robot_is_being_stopped_is_not_lost(board):
 
 
 def test_signals_mean_afterwards_what_they_meant_before(board):
-    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+    before = [signal.getsignal(number) for number in numbers]
     talk(board)
-    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == before
+    assert [signal.getsignal(number) for number in numbers] == before
 
 
 def test_ctrl_c_that_python_drops_comes_again(board):
@@ -134,12 +135,13 @@ def test_ctrl_c_that_python_drops_comes_again(board):
     assert (board.valves, board.state) == (0, "stopped")
 
 
-def test_kill_stops_before_anything_is_tidied_up(board):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGQUIT])
+def test_kill_stops_before_anything_is_tidied_up(board, number):
     def interrupted() -> None:
         with Uno(board, board) as uno:
             walk(uno, board)
             try:
-                signal.raise_signal(signal.SIGTERM)
+                signal.raise_signal(number)
             finally:
                 board.sleep(0.002)
                 seen.append(board.valves)
@@ -148,6 +150,24 @@ def test_kill_stops_before_anything_is_tidied_up(board):
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert seen == [0]
+
+
+def test_ctrl_z_stops_the_robot_before_it_suspends(board, monkeypatch):
+    def suspend(number: int) -> None:
+        board.sleep(0.002)
+        seen.append((number, board.valves))
+
+    def interrupted() -> None:
+        with Uno(board, board) as uno:
+            walk(uno, board)
+            pressed = signal.raise_signal
+            monkeypatch.setattr(signal, "raise_signal", suspend)
+            pressed(signal.SIGTSTP)
+
+    seen = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert seen == [(signal.SIGSTOP, 0)]
 
 
 @pytest.mark.parametrize("ending", [KeyboardInterrupt, ValueError, SystemExit, None])
@@ -197,6 +217,36 @@ def test_a_stop_that_nobody_confirms_is_said_aloud(board, line):
 
     with pytest.raises(StillMovingError, match=r"THE ROBOT MAY STILL BE MOVING.*emergency stop"):
         cut_off()
+
+
+def test_ctrl_c_while_a_stop_is_not_confirmed_is_not_lost_either(board, line):
+    def cut_off() -> None:
+        with Uno(line, board) as uno:
+            walk(uno, board)
+            line.swallow = press
+
+    def press(data: bytes) -> bool:
+        if data == STOP:
+            signal.raise_signal(signal.SIGINT)
+        return True
+
+    with pytest.raises(StillMovingError) as told:
+        cut_off()
+    assert isinstance(told.value.__cause__, KeyboardInterrupt), "whoever tries again must not"
+
+
+def test_a_robot_that_walked_before_one_came_is_said_aloud(board, line):
+    def unplugged() -> None:
+        with Uno(line, board) as uno:
+            uno.connect()
+            line.gone = True
+            uno.status()
+
+    board.write(b"run\n")
+    board.sleep(0.1)
+    assert board.valves != 0
+    with pytest.raises(StillMovingError):
+        unplugged()
 
 
 def test_a_port_that_vanishes_from_a_walking_robot_is_said_aloud(board, line):

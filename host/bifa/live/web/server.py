@@ -186,7 +186,12 @@ class LivePage:
         return handle
 
     def _ask(self, what: Callable, said: str) -> dict[str, Any]:
-        self._pilot.ask(what).result(_ANSWER_S)
+        asked = self._pilot.ask(what)
+        try:
+            asked.result(_ANSWER_S)
+        except TimeoutError:
+            asked.cancel()  # if it has not begun, it is not done behind the page's back
+            raise
         return {"said": said}
 
     def _predict(self, asked: Mapping[str, Any]) -> dict[str, Any]:
