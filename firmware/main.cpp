@@ -46,15 +46,14 @@ bool board::on_tick(bool emergency_stop_pressed) {
     attend = true;
   }
   port.tick_in_interrupt();
-  if (emergency_stop_pressed) port.emergency_stop_in_interrupt();
   return controller.tick(emergency_stop_pressed);
 }
 bool board::strobes() { return controller.strobes(); }
 void board::on_byte(uint8_t byte, bool damaged) {
   attend = true;
-  if (port.byte_in_interrupt(byte, damaged)) controller.stop_in_interrupt();
+  port.byte_in_interrupt(byte, damaged);
 }
-void board::on_emergency_stop() { port.emergency_stop_in_interrupt(); }
+void board::on_emergency_stop() { port.stop_in_interrupt(); }
 void board::on_round(const bifa::RawRound& round) { controller.converted_in_interrupt(round); }
 
 /// Instead of Arduino's, which would start three timers for PWM and the converter as nothing here uses them.

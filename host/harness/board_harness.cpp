@@ -47,7 +47,7 @@ void Board::step() {
   ++now_ms;
   if (cells_busy_ms > 0) --cells_busy_ms;
   for (int i = 0; i < kBytesPerMs && !input.empty(); ++i) {
-    if (program->port.byte_in_interrupt(input.front())) program->controller.stop_in_interrupt();
+    program->port.byte_in_interrupt(input.front());
     input.pop_front();
     if (i % 8 == 7) program->port.poll();
   }

@@ -6,60 +6,60 @@ namespace bifa {
 
 const char kCommandTexts[] BIFA_FLASH =
     "help [NAME]\0"
-    "li\207 ev\205y\215\213g\216\220expla\213\233ne\0"  // list everything, or explain one
+    "li\207 ev\205y\216\213g\217\214expla\213 \235e\0"  // list everything, or explain one
     "version\0"
-    "v\205\260ons\216ca\232e\200la\207 \207\242t\0"  // versions, cause of the last start
+    "v\205\260\235s\217ca\232e\200la\207 \207\242t\0"  // versions, cause of the last start
     "status\0"
-    "\207\221e\216f\250\216\210\216v\235ves\216l\213k\0"  // state, fault, pressures, valves, link
+    "\207\221e\217\244\217\210\217v\234ves\217l\213k\0"  // state, fault, pressures, valves, link
     "show [NAME]\0"
-    "v\235ues\216r\241es\237*\236\205\201\256w\205-up loads\211\226\215\205\0"  // values, ranges; * where power-up loads another
+    "v\234ues\217r\241es\237*\236\205\201\256w\205-up loads\212\225\216\205\0"  // values, ranges; * where power-up loads another
     "set NAME VALUE\0"
-    "ch\241\201\240\214\205,\211lso\236\252\201runn\213g\0"  // change a parameter, also while running
+    "ch\241\201\240\215\205,\212lso\236\252\201runn\213g\0"  // change a parameter, also while running
     "run\0"
-    "w\235k\0"  // walk
+    "w\234k\0"  // walk
     "stop\0"
-    "\207op,\211\253 v\230\211\225ch\247b\205s\0"  // stop, and vent all chambers
+    "\207op,\212\253 v\230\212\224ch\250b\205s\0"  // stop, and vent all chambers
     "hold CHAMBER positive|vacuum|off\0"
-    "\213fl\221e\216ev\246u\221\201\220v\230 body\216\222 \220ta\252\0"  // inflate, evacuate or vent body, head or tail
+    "\213fl\221e\217ev\247u\221\201\214v\230 body\217\222 \214ta\252\0"  // inflate, evacuate or vent body, head or tail
     "clear\0"
-    "\257\223as\201\240\207op (!)\233r\211\224\250\0"  // release a stop (!) or a fault
+    "\257\223as\201\240\207op \214\244\0"  // release a stop or fault
     "stream on|off\0"
-    "te\223m\243ry:\233n\201l\213\201(>)\211\245\247p\223\0"  // telemetry: one line (>) a sample
+    "te\223m\243ry: \235\201l\213\201(>)\212 s\250p\223\0"  // telemetry: one line (>) a sample
     "plot on|off\0"
-    "te\223m\243ry\224\220\215\201S\205i\235 Plott\205\0"  // telemetry for the Serial Plotter
+    "te\223m\243ry\227\214\216\201S\205i\234 Plott\205\0"  // telemetry for the Serial Plotter
     "save [NAME]\0"
-    "keep \215\201\214\205s\237wi\215ou\261NAME\224\220\256w\205-up\0"  // keep the parameters; without NAME for power-up
+    "keep \216\201\215\205s\237wi\216ou\246NAME\227\214\256w\205-up\0"  // keep the parameters; without NAME for power-up
     "load PRESET\0"
     "\232\201\240\202\0"  // use a preset
     "presets\0"
-    "li\207 \215\201\202s\0"  // list the presets
+    "li\207 \216\201\202s\0"  // list the presets
     "forget PRESET\0"
-    "de\223t\201\240\202\224r\244\234\0"  // delete a preset from EEPROM
+    "de\223t\201\240\202\227r\245\233\0"  // delete a preset from EEPROM
     "defaults confirm\0"
-    "\205as\201a\225\202s\211\253\245\243t\213gs\0"  // erase all presets and settings
+    "\205as\201a\224\202s\212\253 s\243t\213gs\0"  // erase all presets and settings
     "zero confirm|factory\0"
-    "tak\201\215\201\210\211\227z\205o\237\220u\253\254\215\221\0"  // take the pressures as zero; or undo that
+    "tak\201\216\201\210\212\226z\205o\237\214u\253\254\216\221\0"  // take the pressures as zero; or undo that
     "echo on|off\0"
-    "\257pe\221\236\221 you\204\201(b\242\201t\205m\213\235)\0";  // repeat what you type (bare terminal)
+    "\257pe\221\236\221 you\204\201(b\242\201t\205m\213\234)\0";  // repeat what you type (bare terminal)
 const char kResultTexts[] BIFA_FLASH =
     "ok\0"
-    "\226\212comma\253;\204\201help\0"  // no such command; type help
-    "wrong\211rgum\230s\0"  // wrong arguments
-    "\226\212\214\205;\204\201show\0"  // no such parameter; type show
-    "out\233f r\241e\0"  // out of range
-    "\207opp\251:\204\201c\223\242\224ir\207\0"  // stopped: type clear first
-    "\226\261\213 \215i\227\207\221e;\204\201\207\221\232\0"  // not in this state; type status
-    "\226\212\202;\204\201\202s\0"  // no such preset; type presets
-    "\240n\247\201i\2271 t\25412\233f\211-z 0-9 _ -\216\226t\224\246t\255y\0"  // a name is 1 to 12 of a-z 0-9 _ -, not factory
-    "\226 ro\244\223ft\0"  // no room left
-    "\215\201\234\224ai\223d\0"  // the EEPROM failed
-    "b\232y\245av\213g\237try\211ga\213\0"  // busy saving; try again
-    "\226 beg\213\216\255\211 p\242\261wa\227\257f\232\251\0"  // no begin, or a part was refused
-    "\215\201s\243\211rriv\251 d\247ag\251\0"  // the set arrived damaged
-    "it\227ca\232\201i\227\207i\225\215\205e;\204\201\207\221\232\0"  // its cause is still there; type status
-    "time\227mu\207 \226\261g\254b\246kw\242ds\0"  // times must not go backwards
-    "\210 \207i\225move: \257\207 4\245\224ir\207\0"  // pressures still move: rest 4 s first
-    "m\255\201\215an 0.9 p\260\224r\244z\205o\0";  // more than 0.9 psi from zero
+    "\225\211comma\253;\204\201help\0"  // no such command; type help
+    "wr\235g\212rgum\230s\0"  // wrong arguments
+    "\225\211\215\205;\204\201show\0"  // no such parameter; type show
+    "ou\246of r\241e\0"  // out of range
+    "\207opp\251:\204\201c\223\242\227ir\207\0"  // stopped: type clear first
+    "\225\246\213 \216i\226\207\221e;\204\201\207\221\232\0"  // not in this state; type status
+    "\225\211\202;\204\201\202s\0"  // no such preset; type presets
+    "\240n\250\201i\2261 t\25412 of\212-z 0-9 _ -\217\225t\227\247t\255y\0"  // a name is 1 to 12 of a-z 0-9 _ -, not factory
+    "\225 ro\245\223ft\0"  // no room left
+    "\216\201\233\227ai\223d\0"  // the EEPROM failed
+    "b\232y sav\213g\237try\212ga\213\0"  // busy saving; try again
+    "\225 beg\213\217\255\212 p\242\246wa\226\257f\232\251\0"  // no begin, or a part was refused
+    "\216\201s\243\212rriv\251 d\250ag\251\0"  // the set arrived damaged
+    "it\226ca\232\201i\226\207i\224\216\205e;\204\201\207\221\232\0"  // its cause is still there; type status
+    "time\226mu\207 \225\246g\254b\247kw\242ds\0"  // times must not go backwards
+    "\210 \207i\224move: \257\207 4 \226fir\207\0"  // pressures still move: rest 4 s first
+    "m\255\201\216an 0.9 p\260\227r\245z\205o\0";  // more than 0.9 psi from zero
 const char kChamberWords[] BIFA_FLASH =
     "body\0"
     "head\0"

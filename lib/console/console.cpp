@@ -94,9 +94,7 @@ void Console::end_line() {
   if (echo_) print_line_end();
   line_[length_] = '\0';
   length_ = 0;
-  if (spoilt_ && !flash_equal(line_, reinterpret_cast<const char*>(BIFA_TEXT("stop")))) {
-    print(BIFA_TEXT("error the line arrived damaged\r\n"));
-  } else if (too_long_) {
+  if (too_long_) {
     print(BIFA_TEXT("error the line exceeds 63 characters\r\n"));
   } else {
     execute();
@@ -106,6 +104,7 @@ void Console::end_line() {
 
 void Console::execute() {
   word_count_ = 0;
+  words_[0] = line_;  // no command if there is no word
   for (char* at = line_; *at != '\0';) {
     while (*at == ' ' || *at == '\t') *at++ = '\0';
     if (*at == '\0') break;
@@ -116,8 +115,11 @@ void Console::execute() {
     words_[word_count_++] = at;
     while (*at != '\0' && *at != ' ' && *at != '\t') ++at;
   }
-  if (word_count_ == 0) return answer(Result::kOk);
   command_ = find_command(words_[0]);
+  if (spoilt_ && command_ != static_cast<uint8_t>(CommandId::kStop)) {
+    return print(BIFA_TEXT("error the line arrived damaged\r\n"));
+  }
+  if (word_count_ == 0) return answer(Result::kOk);
   if (command_ == kCommandCount) return answer(Result::kUnknown);
   commands_.controller().host_heard();
   if (!takes_words(command_, word_count_)) return answer_usage();
@@ -156,7 +158,9 @@ void Console::poll(const LinkCounters& counters) {
     if (state == State::kStopped) print(BIFA_TEXT("[stopped: all valves off until clear\r\n"));
     if (state == State::kFault) print_fault(commands_.controller().status().fault);
   }
-  if (!waiting_ || commands_.store().busy()) return;
+  if (!waiting_) return;
+  commands_.controller().host_heard();  // what it says is not read before the EEPROM has been written
+  if (commands_.store().busy()) return;
   waiting_ = false;
   answer(commands_.store().result());
 }

@@ -21,8 +21,6 @@ class Console {
 
   /// Takes one byte of text. Only while not waiting().
   void feed(uint8_t byte);
-  /// Whether the next byte is the first of a line.
-  bool between_lines() const { return length_ == 0; }
   /// Bytes were lost: the present line is answered with an error, unless it reads "stop".
   void spoil() { spoilt_ = true; }
 

@@ -194,6 +194,12 @@ bool Controller::tick(bool emergency_stop_pressed) {
   return since_sample_ms_ == kSamplePeriod_ms - 1;
 }
 
+// Out of line: it is called twice.
+__attribute__((noinline)) void Controller::stop_in_interrupt() {
+  supervisor_.stop();
+  outdated_ = true;
+}
+
 void Controller::converted_in_interrupt(const RawRound& round) {
   round_ = round;
   round_complete_ = true;

@@ -57,7 +57,7 @@ class Controller {
   Verdict stop();  ///< to idle; all chambers vent (a latched stop or fault stays)
   /// From idle or holding. When all chambers are off again the controller is idle.
   Verdict hold(Chamber chamber, ChamberState state);
-  /// Not on behalf of a command that came before the last stop (see command_begins()).
+  /// Not on behalf of a command that came before the last stop (see hear_from_now_on()).
   Verdict clear();
 
   /// Takes effect at the next tick, also while running, without a jump of the phases. The set must be valid (is_valid()).
@@ -85,9 +85,8 @@ class Controller {
   State state() const { return supervisor_.state(); }
   uint32_t uptime_ms() const;
 
-  /// The first byte of a command that came after the last stop is taken; call it with interrupts off. Until the next call
-  /// a stop outdates the command.
-  void command_begins() { outdated_ = false; }
+  /// All commands from now on come after the last stop, until the next one; call it with interrupts off.
+  void hear_from_now_on() { outdated_ = false; }
 
   /// Call it whenever the host has said something that makes sense.
   void host_heard();
@@ -109,10 +108,7 @@ class Controller {
   void converted_in_interrupt(const RawRound& round);
 
   /// The byte `!`, the stop message or the emergency stop: all valves are off when it returns.
-  void stop_in_interrupt() {
-    supervisor_.stop();
-    outdated_ = true;
-  }
+  void stop_in_interrupt();
 
  private:
   void step_oscillators();
@@ -131,7 +127,6 @@ class Controller {
   uint8_t strobes_left_out_ = 0;  ///< still to be left out
   uint16_t marked_ = 0;
   volatile bool emergency_stop_ = false;
-  bool outdated_ = false;  ///< the command at hand came before the last stop
 
   uint16_t wanted_mpsi_ = 0;
   SupplyCode wanted_code_;
@@ -157,6 +152,7 @@ class Controller {
   Oscillators oscillators_;
   Schedule schedule_;
   LastSecond last_second_;
+  bool outdated_ = false;  ///< the command at hand came before the last stop
 };
 
 }  // namespace bifa

@@ -10,22 +10,23 @@ void HostPort::begin(uint16_t boot_nonce, StartCause cause) {
   console_.greet();
 }
 
-void HostPort::emergency_stop_in_interrupt() {
-  const Critical guard;
+void HostPort::stop_in_interrupt() {
   commands_.controller().stop_in_interrupt();
   receiver_.outdate();
 }
 
 void HostPort::poll() {
   commands_.store().poll();
-  // Until the EEPROM has been written nothing is read, so nobody can be heard.
-  if (console_.waiting()) commands_.controller().host_heard();
   session_.poll();
   console_.poll({frames_bad_, receiver_.lost()});
+  {
+    const Critical guard;
+    if (!receiver_.outdated()) commands_.controller().hear_from_now_on();
+  }
   uint8_t byte;
   // A bounded number, so that a flood keeps neither telemetry nor EEPROM waiting; and one line at most, whose answer may
   // take a twentieth of a second, so that the watchdog is not kept waiting either.
-  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && next(byte); --budget) {
+  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && receiver_.pop(byte); --budget) {
     take(byte);
     if (!in_frame_ && (byte == '\n' || byte == '\r')) break;
   }
@@ -35,17 +36,6 @@ void HostPort::poll() {
   commands_.follow(sample);
   session_.sample(sample);
   console_.sample(sample);
-}
-
-/// Takes the next byte, and tells the controller where a command begins that came after the last stop: what a stop finds
-/// waiting, or half done, must not undo it.
-bool HostPort::next(uint8_t& byte) {
-  const Critical guard;
-  const bool outdated = receiver_.outdated();
-  if (!receiver_.pop(byte)) return false;
-  const bool begins = !in_frame_ && (byte == 0 || console_.between_lines());
-  if (begins && !outdated) commands_.controller().command_begins();
-  return true;
 }
 
 void HostPort::take(uint8_t byte) {

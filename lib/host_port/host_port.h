@@ -17,12 +17,14 @@ class HostPort {
   /// Loads what is in EEPROM, starts the controller and greets. `boot_nonce` differs from that of the last start.
   void begin(uint16_t boot_nonce, StartCause cause);
 
-  /// In the receive interrupt. True: the byte asks for a stop; let the controller stop before returning.
-  bool byte_in_interrupt(uint8_t byte, bool damaged = false) { return receiver_.push(byte, damaged); }
+  /// In the receive interrupt. If the byte asks for a stop all valves are off on return.
+  void byte_in_interrupt(uint8_t byte, bool damaged = false) {
+    if (receiver_.push(byte, damaged)) stop_in_interrupt();
+  }
   /// In the interrupt of the 1 kHz timer.
   void tick_in_interrupt() { receiver_.tick(); }
-  /// The emergency stop, in any interrupt: commands that wait came before it.
-  void emergency_stop_in_interrupt();
+  /// The emergency stop, in an interrupt: all valves are off on return, and commands that wait cannot undo it.
+  void stop_in_interrupt();
 
   /// In the main loop: handles what has arrived, answers, sends telemetry, goes on writing the EEPROM.
   void poll();
@@ -31,7 +33,6 @@ class HostPort {
   bool has_input() const { return receiver_.has_input(); }
 
  private:
-  bool next(uint8_t& byte);
   void take(uint8_t byte);
   void recover();
 

@@ -1,5 +1,7 @@
 #include "receiver.h"
 
+#include "critical.h"
+
 namespace bifa {
 
 namespace {
@@ -18,7 +20,6 @@ bool Receiver::push(uint8_t byte, bool damaged) {
   if (byte == '!' && (!in_frame_ || frame_length_ == 0)) {
     if (in_frame_) put(kDelimiter);  // no frame begins so: the delimiter was a stray one
     in_frame_ = false;
-    outdate();
     return true;
   }
   if (!in_frame_) {
@@ -43,7 +44,6 @@ bool Receiver::push(uint8_t byte, bool damaged) {
   stop_matched_ = byte == flash_byte(&kStopFrame[stop_matched_]) ? stop_matched_ + 1 : kOtherFrame;
   if (stop_matched_ != sizeof kStopFrame) return false;
   stop_matched_ = kOtherFrame;
-  outdate();
   return true;
 }
 
@@ -60,7 +60,10 @@ void Receiver::put(uint8_t byte) {
 
 bool Receiver::pop(uint8_t& byte) {
   if (head_ == tail_) return false;
-  if (!outdated()) holds_outdated_ = false;
+  if (outdated_ > 0) {
+    const Critical guard;  // a stop may count anew
+    --outdated_;
+  }
   byte = queue_[tail_];
   tail_ = (tail_ + 1) % kQueueBytes;
   return true;

@@ -28,13 +28,11 @@ class Receiver {
   /// Takes the next byte out of the queue; false if it is empty.
   bool pop(uint8_t& byte);
 
-  /// What stands in the queue came before a stop; call it with interrupts off. push() does it for stops of its own.
-  void outdate() {
-    stopped_at_ = head_;
-    holds_outdated_ = true;
-  }
+  // With interrupts off:
+  /// What stands in the queue came before a stop.
+  void outdate() { outdated_ = static_cast<uint8_t>(head_ - tail_) % kQueueBytes; }
   /// Whether the next byte came before the last stop.
-  bool outdated() const { return holds_outdated_ && tail_ != stopped_at_; }
+  bool outdated() const { return outdated_ > 0; }
 
   bool has_input() const { return head_ != tail_; }
 
@@ -57,8 +55,7 @@ class Receiver {
   volatile bool overrun_ = false;
   volatile uint8_t silence_ms_ = 0;
   volatile uint16_t lost_ = 0;
-  volatile uint8_t stopped_at_ = 0;  ///< the end of the queue at the last stop
-  volatile bool holds_outdated_ = false;
+  uint8_t outdated_ = 0;  ///< how many of the bytes in the queue
   bool in_frame_ = false;
   uint8_t frame_length_ = 0;
   uint8_t stop_matched_ = 0;  ///< how many bytes of the frame are those of the stop message; 0xFF: it is another

@@ -7,16 +7,16 @@ namespace bifa {
 const char kParameterTexts[] BIFA_FLASH =
     "period_s\0"
     "s\0"
-    "tim\201of\233n\201cycl\201(1/f)\0"  // time of one cycle (1/f)
+    "tim\201of \235\201cycl\201(1/f)\0"  // time of one cycle (1/f)
     "psi12_deg\0"
     "deg\0"
-    "\231e\200\222\211\222\200\2172)\0"  // phase of the head ahead of the body (psi_12)
+    "\231e\200\222\212\222\200\2202)\0"  // phase of the head ahead of the body (psi_12)
     "psi13_deg\0"
     "deg\0"
-    "\231e\200ta\252\211\222\200\2173)\0"  // phase of the tail ahead of the body (psi_13)
+    "\231e\200ta\252\212\222\200\2203)\0"  // phase of the tail ahead of the body (psi_13)
     "duty_body\0"
     "\0"
-    "\203\200cyc\223: contr\246t\227(d_1)\0"  // vacuum part of the cycle: contracts (d_1)
+    "\203\200cyc\223: c\235tr\247t\226(d_1)\0"  // vacuum part of the cycle: contracts (d_1)
     "duty_head\0"
     "\0"
     "\203\200\2062)\0"  // vacuum part of the cycle: lets go (d_2)
@@ -25,13 +25,13 @@ const char kParameterTexts[] BIFA_FLASH =
     "\203\200\2063)\0"  // vacuum part of the cycle: lets go (d_3)
     "coupling_per_s\0"
     "1/s\0"
-    "osc\252l\221\255s' pu\225\213t\254\231\201(\235pha_phi)\0"  // oscillators' pull into phase (alpha_phi)
+    "osc\252l\221\255s' pu\224\213t\254\231\201(\234pha_phi)\0"  // oscillators' pull into phase (alpha_phi)
     "pressure_psi\0"
     "psi\0"
     "s\243-\256\213t\200\256\260tiv\201supply\0"  // set-point of the positive supply
     "host_timeout_s\0"
     "s\0"
-    "v\230\211ft\205\212\260\223nce\200ho\207\2370 = nev\205\0";  // vent after such silence of the host; 0 = never
+    "v\230\212ft\205\211\260\223nce\200ho\207\2370 = nev\205\0";  // vent after such silence of the host; 0 = never
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {
     {500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1},  // period_s

@@ -44,7 +44,6 @@ void Supervisor::trip(Fault fault, uint8_t channel, int16_t value, int16_t limit
 }
 
 void Supervisor::clear() {
-  if (!is_latched()) return;
   state_ = State::kIdle;
   fault_ = FaultReport();
 }

@@ -35,7 +35,7 @@ class Supervisor {
   /// To fault, unless one stands already; the valves are off on return.
   void trip(Fault fault, uint8_t channel, int16_t value, int16_t limit, uint32_t time_ms,
             const LastSecond& last_second);
-  /// From stopped or fault to idle.
+  /// Only from stopped or fault: to idle.
   void clear();
 
   /// Every millisecond: the outputs of the oscillators, bit i for chamber i; obeyed only while running.

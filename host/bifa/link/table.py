@@ -140,7 +140,7 @@ CONSOLE_COMMANDS = (
     ('run', 'run', 'walk'),
     ('stop', 'stop', 'stop, and vent all chambers'),
     ('hold', 'hold CHAMBER positive|vacuum|off', 'inflate, evacuate or vent body, head or tail'),
-    ('clear', 'clear', 'release a stop (!) or a fault'),
+    ('clear', 'clear', 'release a stop or fault'),
     ('stream', 'stream on|off', 'telemetry: one line (>) a sample'),
     ('plot', 'plot on|off', 'telemetry for the Serial Plotter'),
     ('save', 'save [NAME]', 'keep the parameters; without NAME for power-up'),

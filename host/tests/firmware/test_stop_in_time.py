@@ -196,14 +196,6 @@ def test_what_waits_when_a_stop_comes_does_not_undo_it(bench, first, stop):
     assert bench.say("run").rstrip().endswith("ok")
 
 
-def test_the_rest_of_a_line_that_a_stop_cut_does_not_undo_it(bench):
-    walking(bench)
-    bench.board.send(b"cle!ar\n")
-    bench.wait(0.1)
-    assert "state stopped" in bench.say("status", 0.3)
-    assert bench.say("clear").rstrip().endswith("ok")
-
-
 def test_clear_frames_that_wait_when_a_stop_comes_do_not_undo_it(bench):
     uno = connected(bench.board)
     uno.stop()

@@ -54,7 +54,7 @@ struct Bench {
 
   /// A command that comes now.
   Verdict clear() {
-    controller.command_begins();
+    controller.hear_from_now_on();
     return controller.clear();
   }
 
@@ -129,12 +129,12 @@ void test_a_stop_byte_latches_until_clear() {
 
 void test_a_clear_that_came_before_the_stop_does_not_undo_it() {
   Bench bench;
-  bench.controller.command_begins();
+  bench.controller.hear_from_now_on();
   bench.controller.stop_in_interrupt();
   equal(Verdict::kLatched, bench.controller.clear());
   equal(State::kStopped, bench.state());
   equal(Verdict::kDone, bench.clear());
-  bench.controller.command_begins();
+  bench.controller.hear_from_now_on();
   bench.pressed = true;
   bench.tick();
   bench.pressed = false;
