@@ -14,11 +14,15 @@ class TargetError(BifaError):
     """A file cannot be written where it was asked for; the text says why."""
 
 
-def check_targets(*files: Path | None, folders: tuple[Path | None, ...] = ()) -> None:
+def check_targets(
+    *files: Path | None, folders: tuple[Path | None, ...] = (), inputs: tuple[Path | None, ...] = ()
+) -> None:
     """Raise TargetError unless each of `files` can be written, and each of `folders` written into or made.
 
-    None is skipped, so that a command hands over its options as they are.
+    None is skipped, so that a command hands over its options as they are. A data set's files, and `inputs`, which the
+    same command reads, are not replaced.
     """
+    read = {path.resolve() for path in inputs if path is not None}
     for path in files:
         if path is None:
             continue
@@ -26,6 +30,10 @@ def check_targets(*files: Path | None, folders: tuple[Path | None, ...] = ()) ->
             raise TargetError(f"{path} is a folder; name a file in it")
         if not path.resolve().parent.is_dir():
             raise TargetError(f"the folder {path.resolve().parent} does not exist; create it first")
+        if path.resolve() in read:
+            raise TargetError(f"{path} is what this command reads; name another file for what it writes")
+        if path.exists() and (path.resolve().parent / "dataset.toml").exists():
+            raise TargetError(f"{path} belongs to a data set, which is never overwritten; choose another place")
         _check_writable(path if path.exists() else path.resolve().parent, path)
     for path in folders:
         if path is None:
@@ -74,6 +82,8 @@ def written_into(folder: Path) -> Iterator[Path]:
     """`with written_into(folder) as aside:` write files into `aside`; after the block they take their places in
     `folder`, which is made if need be. Nothing is half-written; an OSError in the block becomes a TargetError.
     """
+    if not folder.name:  # "."
+        folder = folder.resolve()
     aside = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}")
     try:
         aside.mkdir(parents=True)

@@ -26,7 +26,7 @@ def check(system: System) -> tuple[str, ...]:
         _check_trial(trial)
     _check_constant(trials)
     _check_repeats(trials)
-    return _check_model(system, trials)
+    return (*_gaps_in_inputs(trials), *_check_model(system, trials))
 
 
 # -- names and records ----------------------------------------------------------------------------------------
@@ -86,6 +86,17 @@ def _check_trial(trial: Record) -> None:
             raise MisuseError(f"{where}: infinite at sample {_first(np.isinf(column))}; mark missing samples as NaN.")
         if np.isfinite(column).sum() < _FEWEST_SAMPLES:
             raise MisuseError(f"{where}: fewer than {_FEWEST_SAMPLES} valid samples.")
+
+
+def _gaps_in_inputs(trials: Sequence[Record]) -> Iterable[str]:
+    """A missing sample of an output is left out of the comparison; without one of an input a model may not go on."""
+    for trial in trials:
+        for name, column in trial.inputs.items():
+            column = np.asarray(column)
+            if column.dtype.kind == "f" and not np.isfinite(column).all():
+                at = f" at sample {_first(~np.isfinite(column))}" if column.ndim else ""
+                where = f"Trial {trial.name}, input {name}"
+                yield f"{where}: no number{at}; a model that uses it cannot predict from there on."
 
 
 def _check_constant(trials: Sequence[Record]) -> None:

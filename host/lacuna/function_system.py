@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from copy import copy
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -113,11 +115,13 @@ class FunctionSystem(System):
             self._off |= typical | dict.fromkeys(effect.size_names, effect.absent)
         self._nuisances = nuisances if callable(nuisances) else tuple(nuisances)
         self._regressors = regressors or _regressors
-        self._sensor_noise, self._accuracy = dict(sensor_noise or {}), dict(accuracy or {})
+        for what, told in (("accuracy", accuracy), ("sensor_noise", sensor_noise), ("noise_time_s", noise_time_s)):
+            _check_amounts(what, told, by_output=what != "noise_time_s")
         if isinstance(noise_time_s, str) and noise_time_s != ESTIMATED:
             raise DeclarationError(
                 f'noise_time_s is seconds, seconds by output, or "{ESTIMATED}", not {noise_time_s!r}.'
             )
+        self._sensor_noise, self._accuracy = dict(sensor_noise or {}), dict(accuracy or {})
         self.estimates_noise_time = noise_time_s == ESTIMATED
         self._noise_time_s = 0.0 if self.estimates_noise_time else noise_time_s
         self._raised: dict[tuple[str, str], float] = {}
@@ -309,6 +313,19 @@ def _check_names(names: Sequence[str], what: str) -> None:
         if "." in name or name == LEARNT or hasattr(Values, name):
             raise DeclarationError(f"{what} {name!r}: choose another name, without a dot; this one is not free.")
     _all_different(names, what)
+
+
+def _check_amounts(what: str, told: Any, by_output: bool) -> None:
+    """None, or amounts by output; where that is not asked for, one for all or a word will do."""
+    if told is None or (isinstance(told, str) and not by_output):
+        return
+    if not isinstance(told, Mapping):
+        if by_output:
+            raise DeclarationError(f'{what} is told by output: write {{"OUTPUT": {told!r}}}.')
+        told = {"all outputs": told}
+    for output, amount in told.items():
+        if not isinstance(amount, Real) or not 0.0 <= amount < math.inf:
+            raise DeclarationError(f"{what} of {output} is {amount!r}: give a number that is not negative.")
 
 
 def _check_known(what: str, given: Iterable[Hashable], known: Collection[Hashable]) -> None:

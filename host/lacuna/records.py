@@ -182,7 +182,7 @@ def _folder(folder: Path) -> list[Record | Table]:
         return [_csv(folder)]
     if not folder.exists():
         raise RecordError(f"{folder}: no such folder.")
-    files = sorted(folder.glob("*.csv"))
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".csv" and file.is_file())
     if not files:
         raise RecordError(f"{folder} holds no CSV files.")
     return [_csv(file) for file in files]
@@ -270,8 +270,12 @@ def windows(
     """
     (table,) = _tables(data)
     time = table.time_s - table.time_s[0]
-    sample = float(np.median(np.diff(time)))
-    every = every or seconds
+    sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    every = seconds if every is None else every
+    asked = {"seconds": (seconds, _FEWEST), "every": (every, 1), "period": (seconds if period is None else period, 1)}
+    for what, (given, samples) in asked.items():
+        if not samples * sample <= given < np.inf:
+            raise RecordError(f"record {table.name}: {what} is {given!r}; its samples are {sample:g} s apart.")
     starts = np.arange(skip, time[-1] - seconds + 1.5 * sample, every)
     if len(starts) < 3:
         raise RecordError(f"record {table.name} has {time[-1]:.4g} s: not enough for three windows of {seconds:g} s.")
@@ -293,6 +297,8 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     and compared on its own samples. For records whose initial state is known only at the start; costs about half of
     `count` times a simulation of the whole. Raises RecordError."""
     (table,) = _tables(data)
+    if not isinstance(count, int) or count < 3:
+        raise RecordError(f"record {table.name}: {count!r} segments; a diagnosis needs a whole number, 3 or more.")
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)
     if len(table.time_s) < count * _FEWEST:
         raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")

@@ -95,6 +95,8 @@ def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:
 
 def with_records(system: System, records: Any) -> FunctionSystem:
     """`system` with these records as its trials. Raises MisuseError, RecordError."""
+    if not hasattr(system, "predict"):
+        raise MisuseError(f"diagnose(system, records): the first is a System, not {type(system).__name__}.")
     if not isinstance(system, FunctionSystem):
         raise MisuseError(f"{type(system).__name__} already has trials: call diagnose(system) without records.")
     given = read(records)

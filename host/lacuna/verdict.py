@@ -10,6 +10,7 @@ from typing import Any
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.named import Estimated
 from lacuna.diagnosis.record import as_record
+from lacuna.errors import MisuseError
 from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
 from lacuna.records import read, stretched
@@ -40,6 +41,8 @@ class Model:
         record = _one(record, self._system.outputs)
         own = {p.name: p.value for p in self._system.nuisances(record)}
         values = self._system.values(self._theta | own, self._corrections)
+        if unknown := set(theta or {}) - set(values):
+            raise MisuseError(f"no parameter {', '.join(sorted(unknown))}; there are {', '.join(values)}.")
         return self._system.simulated(record, Values(values | dict(theta or {})))
 
     def __repr__(self) -> str:

@@ -71,3 +71,16 @@ def test_targets_are_refused_before_work(tmp_path):
         check_targets(tmp_path)
     with pytest.raises(TargetError, match="is a file, so that"):
         check_targets(folders=(tmp_path / "file" / "pictures",))
+
+
+def test_what_a_command_reads_and_what_was_measured_are_never_its_target(tmp_path):
+    model, data = tmp_path / "model.toml", tmp_path / "day"
+    model.write_text("")
+    data.mkdir()
+    (data / "dataset.toml").write_text("")
+    (data / "walk_1.csv").write_text("")
+    with pytest.raises(TargetError, match="is what this command reads"):
+        check_targets(data / ".." / "model.toml", inputs=(model, None))
+    with pytest.raises(TargetError, match="belongs to a data set"):
+        check_targets(data / "walk_1.csv")
+    check_targets(data / "model.toml", inputs=(model,))

@@ -64,7 +64,7 @@ def diagnose(
     console = Console()
     good_enough = accuracies(matters or ())
     measured = read_dataset(dataset)
-    folder = dataset.with_name(dataset.name + "-resolved") if resolve else None
+    folder = dataset.resolve().with_name(dataset.resolve().name + "-resolved") if resolve else None
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     found = _found(console, measured, robot, good_enough, seed, folder, port, watch, workers)

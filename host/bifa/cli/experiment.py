@@ -75,10 +75,17 @@ def experiment(
     from bifa.data.write import refuse_existing
     from bifa.measure import plan
     from bifa.measure.known import parse_known
+    from bifa.ranges import RANGES
     from bifa.screen import Console
 
     console = Console()
     refuse_existing(out)
+    for psi in pressure or []:
+        low, high, _ = RANGES["pressure_psi"]
+        if not low <= psi <= high:
+            raise typer.BadParameter(f"--pressure is {low:g} to {high:g} psi, not {psi:g}")
+    if not -90.0 <= inclination <= 90.0:
+        raise typer.BadParameter(f"--inclination is -90 to 90 degrees, not {inclination:g}")
     gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
@@ -92,7 +99,7 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(console, instrument, telemetry, trials[0], out, parse_known(known))
+        _import(console, instrument, telemetry, _only(trials), out, parse_known(known))
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {_kept(out)}; run the same command to resume"):
@@ -163,6 +170,17 @@ def _run(console, port, options, out, trials, name, known, watch) -> None:
             f"Instruments and Uno synchronised to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
         )
     console.print(f"Next: bifa check {out}, then bifa fit {out} --out model.toml")
+
+
+def _only(trials):
+    """The one condition that was named: what a record is of cannot be guessed."""
+    first = [trial for trial in trials if trial.repeat == 1]
+    if len(first) > 1:
+        raise typer.BadParameter(
+            f"--instrument holds one trial, and {len(first)} conditions fit these options, from {first[0].title!r} to "
+            f"{first[-1].title!r}: name the experiment, --actuator, --pressure, --rate or --gait"
+        )
+    return first[0]
 
 
 def _import(console, instrument, telemetry, planned, out, known) -> None:

@@ -57,7 +57,7 @@ def optimize(
     from bifa.files import check_targets
 
     folder = pictures or out.with_suffix("")
-    check_targets(out, folders=() if no_pictures else (folder,))
+    check_targets(out, folders=() if no_pictures else (folder,), inputs=(model,))
 
     from bifa.gait import Settings, paper_space, simulations
     from bifa.gait.library.scenarios import provenance

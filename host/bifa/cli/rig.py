@@ -1,5 +1,6 @@
 """`bifa rig`: the virtual bench on a pseudo-terminal in real time, for people and for any serial program."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -34,10 +35,14 @@ def register(app: typer.Typer) -> None:
             list[str] | None,
             typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; may be given several times", autocompletion=effects),
         ] = None,
-        sealed: Annotated[int | None, typer.Option(help="seed that draws a robot with an undisclosed effect")] = None,
-        seed: Annotated[int, typer.Option(help="seed of noise, clocks and run-to-run variation")] = 0,
+        sealed: Annotated[
+            int | None, typer.Option(min=0, help="seed that draws a robot with an undisclosed effect")
+        ] = None,
+        seed: Annotated[int, typer.Option(min=0, help="seed of noise, clocks and run-to-run variation")] = 0,
         firmware: Annotated[Path | None, typer.Option(help="ELF image instead of the one that is built")] = None,
-        eeprom: Annotated[Path | None, typer.Option(help="file that keeps the EEPROM between runs")] = None,
+        eeprom: Annotated[
+            Path | None, typer.Option(help="file that keeps the EEPROM between runs", dir_okay=False)
+        ] = None,
         link: Annotated[Path | None, typer.Option(help="symbolic link to the pty for as long as it is served")] = None,
     ) -> None:
         """Offer the virtual robot, with the real firmware, as a serial port in real time.
@@ -74,6 +79,8 @@ def _effect(text: str) -> tuple[str, dict[str, float]]:
         values = {key: float(value) for key, value in (part.split("=") for part in rest.split(",") if part)}
     except ValueError:
         raise RigOptionError(f"--effect {text}: write NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE") from None
+    if not all(map(math.isfinite, values.values())):
+        raise RigOptionError(f"--effect {text}: a value is not a finite number")
     return name, values
 
 

@@ -44,7 +44,7 @@ def simulate(
     """
     from bifa.files import check_targets, written_into
 
-    check_targets(out, folders=(pictures,))
+    check_targets(out, folders=(pictures,), inputs=(model, gait))
 
     from bifa import robot
     from bifa.screen import Console

@@ -58,6 +58,8 @@ class DatasetWriter:
         resume: bool = False,
     ):
         self.folder = Path(folder)
+        if not self.folder.name:  # "."
+            self.folder = self.folder.resolve()
         self.partial = self.folder.with_name(self.folder.name + PARTIAL_SUFFIX)
         refuse_existing(self.folder)
         head = Dataset(self.partial, name, dict(known or {}), (), dict(provenance or {}))

@@ -45,6 +45,7 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
     steps = read_gait_file(gait_file) if gait_file else GaitFile(BASELINE)
     gait = steps.gait
     writer = DatasetWriter(out, f"walks, {time.strftime('%Y-%m-%d')}", resume=True)
+    _check_same(writer, _settings(steps), round(cycles * gait.period_s, 2))
     with Progress(console=console) as progress, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
         uno.clear()
@@ -65,6 +66,17 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
         f"{out}: {repeats} walk{'' if repeats == 1 else 's'} of {cycles} cycles, firmware {hello.firmware}; "
         f"look at it with: bifa check {out}"
     )
+
+
+def _check_same(writer, settings: dict[str, object], duration_s: float) -> None:
+    """What an interrupted session has walked is what is asked for now."""
+    for kept in writer.trials:
+        asked = dict(kept.gait or {}), kept.pressure_psi, float(kept.time_s[-1])
+        if asked[:2] != (settings["gait"], settings["pressure_psi"]) or abs(asked[2] - duration_s) > 0.1:
+            raise RecordError(
+                f"{writer.partial} holds {kept.file} with another gait, pressure or number of cycles; go on with "
+                "the same options, name another folder, or move it away"
+            )
 
 
 def _settings(steps: GaitFile) -> dict[str, object]:

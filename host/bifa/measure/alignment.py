@@ -69,10 +69,16 @@ def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndar
 
 
 def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """What a camera saw at other times, shape of `time_s`; before and after its record, what it saw first and last.
+    """What a camera saw at other times, shape of `time_s`; up to two samples beside its record, the first or the last.
 
-    A snap-through lasts a few samples: a cubic through them follows it, a straight line would not.
+    A snap-through lasts a few samples: a cubic through them follows it, a straight line would not. Raises
+    AlignmentError where the record begins later or ends earlier.
     """
+    away_s = 2 * np.median(np.diff(instrument_s))
+    late_s, early_s = instrument_s[0] - time_s[0], time_s[-1] - instrument_s[-1]
+    if max(late_s, early_s) > away_s:
+        what = f"begins {late_s:.2f} s too late" if late_s > away_s else f"ends {early_s:.2f} s too early"
+        raise AlignmentError(f"the instrument's record {what}: it has to cover the whole experiment; repeat")
     from scipy.interpolate import CubicSpline  # slow to import
 
     return CubicSpline(instrument_s, values)(np.clip(time_s, instrument_s[0], instrument_s[-1]))

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bifa.data import Dataset, DatasetWriter
+from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.errors import BifaError
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, align, align_after_restart, resampled
@@ -43,15 +43,35 @@ def import_trial(
     Raises InstrumentFileError where a column is missing, the two do not overlap or their clocks do not line up,
     DatasetError where `folder` exists.
     """
-    measured = read_columns(instrument, ("time_s", *CHANNELS[planned.experiment]))
-    edges = read_columns(instrument.with_suffix(".sync.csv"), ("sync_time_s",))["sync_time_s"]
+    measured, edges = read_instrument(instrument, CHANNELS[planned.experiment])
     uno = read_columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
     columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
-    writer = DatasetWriter(folder, f"{planned.experiment} from {instrument.name}", known or {})
-    writer.add(planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S}))
-    return writer.finish(), clock
+    trial = planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S})
+    name = f"{planned.experiment} from {instrument.name}"
+    return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
+
+
+def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s] from the
+    file beside it. Raises InstrumentFileError."""
+    columns = read_columns(path, ("time_s", *channels))
+    _all_there(path, {name: columns[name] for name in ("time_s", *channels)})
+    sync = path.with_suffix(".sync.csv")
+    edges = read_columns(sync, ("sync_time_s",))["sync_time_s"]
+    _all_there(sync, {"sync_time_s": edges})
+    return columns, edges
+
+
+def _all_there(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    for name, column in columns.items():
+        if not np.isfinite(column).all():
+            line = int(np.flatnonzero(~np.isfinite(column))[0]) + 2
+            raise InstrumentFileError(
+                f"{path}, line {line}, column {name}: no value (a lost marker?); fill the gap by the instrument's own "
+                "means, or record again"
+            )
 
 
 def _telemetry_file(path: Path) -> Path:
@@ -64,20 +84,24 @@ def _telemetry_file(path: Path) -> Path:
 
 
 def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Columns of numbers; an empty field is NaN (a chamber that is off), text columns are left out."""
+    """Columns of numbers; an empty field is NaN (a chamber that is off), columns of text that nobody asks for are left
+    out."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:  # a spreadsheet begins its files with a mark
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError) as error:
         raise InstrumentFileError(f"{path} cannot be read: {error}") from None
+    while rows and not any(rows[-1]):
+        rows.pop()
     header = rows[0] if rows else []
     missing = [name for name in required if name not in header]
     if missing:
         raise InstrumentFileError(f"{path} lacks the column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
     columns = {}
     for place, name in enumerate(header):
-        if name == "state":
-            continue
+        cells = [row[place] for row in rows[1:] if len(row) > place and row[place]]
+        if name not in required and cells and not any(map(_is_number, cells)):
+            continue  # text
         try:
             columns[name] = np.array([float(row[place]) if row[place] else np.nan for row in rows[1:]])
         except (ValueError, IndexError):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bifa.measure.desk import Desk
-from bifa.measure.instrument_csv import InstrumentFileError, read_columns
+from bifa.measure.instrument_csv import InstrumentFileError, read_instrument
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PULL_MM, PlannedTrial
 
@@ -186,8 +186,7 @@ class OwnInstruments:
 
     def _take(self, path: Path) -> bool:
         try:
-            columns = read_columns(path, ("time_s", *CHANNELS[self._experiment]))
-            edges = read_columns(sync_file(path), ("sync_time_s",))["sync_time_s"]
+            columns, edges = read_instrument(path, CHANNELS[self._experiment])
         except InstrumentFileError as error:
             self._desk.say(f"{error}. Correct it and save it again.")
             return False

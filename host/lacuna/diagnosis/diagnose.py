@@ -95,8 +95,8 @@ def diagnose(
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Explanations are tried
-    on `executor`, if there is one that can ship the system. Ctrl-C during the search ends it with the best so far.
-    Raises MisuseError before the search where the system or its trials would mislead it."""
+    on `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves are tried ends that
+    with the best so far. Raises MisuseError before the search where the system or its trials would mislead it."""
     began = time.monotonic()
     cautions = check(system)
     split = split_trials(system.trials, system.spare())
@@ -114,7 +114,11 @@ def diagnose(
     judged = _judged(case, found, choice)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
-        final = _corrected(case, found, choice, judged, None if stopped else crew)
+        try:
+            final = _corrected(case, found, choice, judged, None if stopped else crew)
+        except KeyboardInterrupt:
+            crew.say("stopped: no curve is learnt (Ctrl-C again gives up)")
+            stopped, say = True, lambda _: None
     say("estimating how well the parameters are known")
     said = (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split))
     return _reported(case, found, choice, judged, final, said, time.monotonic() - began)

@@ -63,12 +63,13 @@ def _errors(error: Mapping[str, Any]) -> Section:
 
 
 def _held_out(found: Diagnosis) -> Section:
+    which = "records that were not fitted" if found.split.held_out else "all records, which were fitted"
     figure = both_palettes(
         lambda stream, dark: draw_held_out(found, stream, dark),
-        "measured and predicted, before and after, on records that were not fitted",
+        f"measured and predicted, before and after, on {which}",
         "The records that the base model predicts worst. Left: measured and predicted; right: the residual.",
     )
-    return Section("On records that were not fitted", figures=(figure,))
+    return Section(f"On {which}", figures=(figure,))
 
 
 def _rejected(record: Mapping[str, Any]) -> list[Section]:

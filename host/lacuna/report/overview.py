@@ -73,8 +73,8 @@ def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
 
 
 def held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
-    """Held-out records, the worst predicted first: each with its worst channel, predictions before and after, and the
-    floor's standard deviation of that channel."""
+    """Records that were not fitted (without any, all), the worst predicted first: each with its worst channel,
+    predictions before and after, and the floor's standard deviation of that channel."""
     trials = diagnosis.split.held_out or diagnosis.split.known
     before, after = (evaluate_on(fit, trials).predictions() for fit in (diagnosis.base, diagnosis.final))
     found = []
@@ -92,7 +92,7 @@ def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple, legend: bool) 
     left.plot(trial.time_s, trial.channels[channel], color=palette.measured, linewidth=2.0, alpha=0.5, label="measured")
     left.plot(trial.time_s, before[channel], color=palette.before, label="model as it is")
     left.plot(trial.time_s, after[channel], color=palette.after, linestyle="--", label="completed")
-    left.set_title(f"{trial.name} (not fitted)", loc="left", fontsize=8)
+    left.set_title(trial.name, loc="left", fontsize=8)
     left.set_ylabel(channel)
     for prediction, colour in ((before, palette.before), (after, palette.after)):
         right.plot(trial.time_s, (trial.channels[channel] - prediction[channel]) / floor, color=colour, linewidth=0.9)

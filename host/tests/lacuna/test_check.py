@@ -1,5 +1,6 @@
 """Every misuse is refused before the search, by the name of its trial and channel; what may mislead is a warning."""
 
+import math
 from dataclasses import replace
 
 import heater
@@ -331,3 +332,27 @@ def test_warns_of_a_parameter_that_changes_nothing():
 
 def _all():
     return (heater.SENSOR, heater.OFFSET, heater.LIMITED, heater.DEAD)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"accuracy": {"temperature_C": -1.0}},
+        {"accuracy": {"temperature_C": math.nan}},
+        {"accuracy": 0.1},
+        {"sensor_noise": {"temperature_C": "little"}},
+        {"noise_time_s": -1.0},
+    ],
+)
+def test_refuses_amounts_that_are_none(told):
+    with pytest.raises(DeclarationError, match=f"{next(iter(told))} .*(not negative|by output)"):
+        heater.system(**told)
+
+
+def test_warns_of_an_input_with_a_gap():
+    given = heater.records(2)
+    for one in given.values():
+        one["outside_C"] = np.where(np.arange(len(one["time_s"])) == 7, np.nan, 20.0)
+    said = check(with_records(heater.system(), given))
+    assert len(said) >= len(given)
+    assert all("input outside_C: no number at sample 7" in sentence for sentence in said[: len(given)])

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bifa.link.uno import MARK_PAUSE
-from bifa.measure.alignment import AlignmentError, align, align_after_restart
+from bifa.measure.alignment import AlignmentError, align, align_after_restart, resampled
 
 PERIOD_S = 0.01
 MARKED = 4711
@@ -122,3 +122,12 @@ def test_edges_that_scatter_are_refused():
     edges_s, _ = edges_from(0.0, jitter_s=2.5e-3)
     with pytest.raises(AlignmentError, match=r"check the sync wiring|repeat"):
         align(np.sort(edges_s), STROBES_S, NUMBERS, MARKED)
+
+
+@pytest.mark.parametrize(("first_s", "last_s", "said"), [(-1.0, 0.8, "ends 0.2"), (0.3, 2.0, "begins 0.3")])
+def test_a_record_that_does_not_cover_the_experiment_is_not_completed(first_s, last_s, said):
+    camera_s = np.arange(first_s, last_s, 0.01)
+    with pytest.raises(AlignmentError, match=said):
+        resampled(np.arange(0.0, 1.0, 0.01), camera_s, np.sin(camera_s))
+    within = np.arange(first_s - 0.015, last_s, 0.01)
+    assert resampled(within, camera_s, np.sin(camera_s)) == pytest.approx(np.sin(within), abs=0.02)

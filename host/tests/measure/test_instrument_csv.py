@@ -144,3 +144,21 @@ def test_edges_that_do_not_fit_the_uno_are_refused(files):
     (files / "pull.sync.csv").write_text("sync_time_s\n" + "\n".join(f"{t:.6f}" for t in own(edges)))
     with pytest.raises(InstrumentFileError, match=r"pull\.sync\.csv"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+def test_a_lost_marker_is_named_by_file_line_and_column_and_leaves_nothing_behind(files):
+    lines = (files / "pull.csv").read_text().splitlines()
+    time_s, _, force = lines[40].split(",")
+    (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},,{force}", *lines[41:]]))
+    with pytest.raises(InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: no value"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+    (files / "pull.csv").write_text("\n".join(lines))
+    import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+def test_what_a_spreadsheet_adds_does_not_matter(files):
+    header, *rows = (files / "pull.csv").read_text().splitlines()
+    table = [f"{header},remark", *(f"{row},good" for row in rows), ",,,"]
+    (files / "pull.csv").write_text("\ufeff" + "\n".join(table) + "\n")
+    dataset, _ = import_trial(files / "pull.csv", files, PULL, files / "out")
+    assert len(dataset.trials) == 1
