@@ -51,6 +51,11 @@ def _check_writable(there: Path, asked: Path) -> None:
         raise TargetError(f"{asked} cannot be written (no permission); choose another place")
 
 
+def named(path: Path) -> Path:
+    """`path` with a name of its own, to put something beside it; "." has none."""
+    return path if path.name else path.resolve()
+
+
 @contextmanager
 def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     """`with written(path) as aside:` write to `aside`, a file beside it; after the block it takes the place of `path`.
@@ -82,8 +87,7 @@ def written_into(folder: Path) -> Iterator[Path]:
     """`with written_into(folder) as aside:` write files into `aside`; after the block they take their places in
     `folder`, which is made if need be. Nothing is half-written; an OSError in the block becomes a TargetError.
     """
-    if not folder.name:  # "."
-        folder = folder.resolve()
+    folder = named(folder)
     aside = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}")
     try:
         aside.mkdir(parents=True)

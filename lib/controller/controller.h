@@ -152,7 +152,7 @@ class Controller {
   Oscillators oscillators_;
   Schedule schedule_;
   LastSecond last_second_;
-  bool outdated_ = false;  ///< the command at hand came before the last stop
+  volatile bool outdated_ = false;  ///< the command at hand came before the last stop
 };
 
 }  // namespace bifa

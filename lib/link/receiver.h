@@ -55,7 +55,7 @@ class Receiver {
   volatile bool overrun_ = false;
   volatile uint8_t silence_ms_ = 0;
   volatile uint16_t lost_ = 0;
-  uint8_t outdated_ = 0;  ///< how many of the bytes in the queue
+  volatile uint8_t outdated_ = 0;  ///< how many of the bytes in the queue
   bool in_frame_ = false;
   uint8_t frame_length_ = 0;
   uint8_t stop_matched_ = 0;  ///< how many bytes of the frame are those of the stop message; 0xFF: it is another

@@ -52,7 +52,7 @@ def diagnose(
     report the error before and after on trials that were not fitted. Exit status 0 for any verdict."""
     from contextlib import nullcontext
 
-    from bifa.files import check_targets
+    from bifa.files import check_targets, named
 
     check_targets(json, out, report)
 
@@ -64,7 +64,8 @@ def diagnose(
     console = Console()
     good_enough = accuracies(matters or ())
     measured = read_dataset(dataset)
-    folder = dataset.resolve().with_name(dataset.resolve().name + "-resolved") if resolve else None
+    beside = named(dataset)
+    folder = beside.with_name(f"{beside.name}-resolved") if resolve else None
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     found = _found(console, measured, robot, good_enough, seed, folder, port, watch, workers)

@@ -72,6 +72,7 @@ def experiment(
     check_targets(folders=(out,))
     check_port(port)
 
+    from bifa.data.layout import INCLINATION_RANGE_DEG
     from bifa.data.write import refuse_existing
     from bifa.measure import plan
     from bifa.measure.known import parse_known
@@ -81,11 +82,8 @@ def experiment(
     console = Console()
     refuse_existing(out)
     for psi in pressure or []:
-        low, high, _ = RANGES["pressure_psi"]
-        if not low <= psi <= high:
-            raise typer.BadParameter(f"--pressure is {low:g} to {high:g} psi, not {psi:g}")
-    if not -90.0 <= inclination <= 90.0:
-        raise typer.BadParameter(f"--inclination is -90 to 90 degrees, not {inclination:g}")
+        _check_within("--pressure", psi, *RANGES["pressure_psi"])
+    _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
     gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
@@ -106,11 +104,17 @@ def experiment(
         _run(console, port, options, out, trials, name.value, parse_known(known), watch)
 
 
+def _check_within(option: str, value: float, low: float, high: float, unit: str) -> None:
+    """Not left to typer, for whose ranges NaN is within."""
+    if not low <= value <= high:
+        raise typer.BadParameter(f"{option} is {low:g} to {high:g} {unit}, not {value:g}")
+
+
 def _kept(out: Path) -> str:
     """What an interrupted session has on disk, in words."""
-    from bifa.data.write import PARTIAL_SUFFIX
+    from bifa.data.write import partial_of
 
-    partial = out.with_name(out.name + PARTIAL_SUFFIX)
+    partial = partial_of(out)
     return f"{len(list(partial.glob('*.csv')))} finished trials are kept in {partial}"
 
 

@@ -7,6 +7,7 @@ TABLE_FILE = "dataset.toml"
 ACTUATORS = ("large", "small")
 DIRECTIONS = ("forward", "backward")
 
+INCLINATION_RANGE_DEG = (-90.0, 90.0)
 PRESSURE_RANGE_PSI = (-15.0, 15.0)  # the sensor's span, Honeywell ABP...015PD: +-15 psi
 
 # Parameters of a trial's gait, and those that may stand beside them.

@@ -18,6 +18,7 @@ from .layout import (
     FORMAT,
     GAIT,
     GAIT_OPTIONAL,
+    INCLINATION_RANGE_DEG,
     NOTED,
     PRESSURE_RANGE_PSI,
     SETTINGS,
@@ -113,7 +114,7 @@ def _setting(fields: Fields, key: str, source: Source, number: int) -> Any:
     if key == "pressure_psi":
         return fields.number(key, *PRESSURE_RANGE_PSI)
     if key == "inclination_deg":
-        return fields.number(key, -90.0, 90.0)
+        return fields.number(key, *INCLINATION_RANGE_DEG)
     if key == "gait":
         return _gait(Fields(fields.take(key), source, trial=number, table=key))
     return fields.positive(key)  # rate_mm_s, load_cell_N_m

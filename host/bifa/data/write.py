@@ -9,7 +9,7 @@ from typing import Any
 
 import tomli_w
 
-from bifa.files import TargetError, write_text
+from bifa.files import TargetError, named, write_text
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError
@@ -42,6 +42,11 @@ def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
     return target
 
 
+def partial_of(folder: Path) -> Path:
+    """Where the data set `folder` grows until it is finished."""
+    return named(folder).with_name(named(folder).name + PARTIAL_SUFFIX)
+
+
 class DatasetWriter:
     """A data set that grows trial by trial in `<folder>.partial`, and takes its name when it is finished.
 
@@ -57,10 +62,8 @@ class DatasetWriter:
         provenance: Mapping[str, Any] | None = None,
         resume: bool = False,
     ):
-        self.folder = Path(folder)
-        if not self.folder.name:  # "."
-            self.folder = self.folder.resolve()
-        self.partial = self.folder.with_name(self.folder.name + PARTIAL_SUFFIX)
+        self.folder = named(Path(folder))
+        self.partial = partial_of(self.folder)
         refuse_existing(self.folder)
         head = Dataset(self.partial, name, dict(known or {}), (), dict(provenance or {}))
         if self.partial.exists():

@@ -101,18 +101,20 @@ def _end(number: int, frame) -> None:
     _held.clear()
     _again.clear()
     # First of all: what lies between here and the end of the command may take long, or write to a pipe that is full.
-    for robot in _inside:
-        with contextlib.suppress(ConnectionError):
-            robot.send_stop()
+    _stop_all()
     raise KeyboardInterrupt
 
 
 def _suspend(number: int, frame) -> None:
+    _stop_all()
+    signal.raise_signal(signal.SIGSTOP)
+    _end(number, frame)
+
+
+def _stop_all() -> None:
     for robot in _inside:
         with contextlib.suppress(ConnectionError):
             robot.send_stop()
-    signal.raise_signal(signal.SIGSTOP)
-    _end(number, frame)
 
 
 _ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGTSTP": _suspend}

@@ -56,22 +56,25 @@ def import_trial(
 def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s] from the
     file beside it. Raises InstrumentFileError."""
-    columns = read_columns(path, ("time_s", *channels))
-    _all_there(path, {name: columns[name] for name in ("time_s", *channels)})
-    sync = path.with_suffix(".sync.csv")
-    edges = read_columns(sync, ("sync_time_s",))["sync_time_s"]
-    _all_there(sync, {"sync_time_s": edges})
-    return columns, edges
+    return _whole(path, ("time_s", *channels)), _whole(sync_file(path), ("sync_time_s",))["sync_time_s"]
 
 
-def _all_there(path: Path, columns: Mapping[str, np.ndarray]) -> None:
-    for name, column in columns.items():
-        if not np.isfinite(column).all():
-            line = int(np.flatnonzero(~np.isfinite(column))[0]) + 2
+def sync_file(path: Path) -> Path:
+    """Where the edges of the strobe stand that belong to the record in `path`."""
+    return path.with_suffix(".sync.csv")
+
+
+def _whole(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """As `read_columns`, with a value in every field of what is required."""
+    columns = read_columns(path, required)
+    for name in required:
+        if not np.isfinite(columns[name]).all():
+            line = int(np.flatnonzero(~np.isfinite(columns[name]))[0]) + 2
             raise InstrumentFileError(
                 f"{path}, line {line}, column {name}: no value (a lost marker?); fill the gap by the instrument's own "
                 "means, or record again"
             )
+    return columns
 
 
 def _telemetry_file(path: Path) -> Path:
@@ -99,12 +102,12 @@ def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]
         raise InstrumentFileError(f"{path} lacks the column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
     columns = {}
     for place, name in enumerate(header):
-        cells = [row[place] for row in rows[1:] if len(row) > place and row[place]]
-        if name not in required and cells and not any(map(_is_number, cells)):
-            continue  # text
         try:
             columns[name] = np.array([float(row[place]) if row[place] else np.nan for row in rows[1:]])
         except (ValueError, IndexError):
+            cells = [row[place] for row in rows[1:] if len(row) > place and row[place]]
+            if name not in required and cells and not any(map(_is_number, cells)):
+                continue  # text
             line = next(i for i, row in enumerate(rows[1:], 2) if len(row) <= place or not _is_number(row[place]))
             raise InstrumentFileError(f"{path}, line {line}, column {name}: not a number") from None
     if len(rows) < 3:
@@ -127,7 +130,7 @@ def _line_up(edges_s: np.ndarray, uno: dict[str, np.ndarray], instrument: Path, 
             return align_after_restart(edges_s, uno["time_s"], sequence)
         return align(edges_s, uno["time_s"], sequence, _marked(uno["strobe"], sequence, telemetry))
     except AlignmentError as error:
-        raise InstrumentFileError(f"{instrument.with_suffix('.sync.csv')}: {error}") from None
+        raise InstrumentFileError(f"{sync_file(instrument)}: {error}") from None
 
 
 def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:

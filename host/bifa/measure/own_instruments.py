@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bifa.measure.desk import Desk
-from bifa.measure.instrument_csv import InstrumentFileError, read_instrument
+from bifa.measure.instrument_csv import InstrumentFileError, read_instrument, sync_file
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PULL_MM, PlannedTrial
 
@@ -198,8 +198,3 @@ class OwnInstruments:
 def on_machine(experiment: str) -> bool:
     """Whether a testing machine moves and measures, and not a camera."""
     return experiment in _MACHINE
-
-
-def sync_file(path: Path) -> Path:
-    """Where the edges of the strobe stand that belong to the record in `path`."""
-    return path.with_suffix(".sync.csv")
