@@ -115,15 +115,6 @@ def test_a_stop_acts_as_it_is_pressed_also_while_the_uno_erases(console, uno):
     enters(console, "clear", "ok")
 
 
-def test_what_waits_when_a_stop_is_pressed_is_dropped(console, uno):
-    console.presses("!")
-    console.sees(" stopped ")
-    console.presses("save one" + ENTER + "clear" + ENTER + "run" + ENTER + "!")
-    console.sees("-- not carried out: clear, run")
-    console.until(lambda: "ok" in console.look())
-    assert (uno.board.state, uno.board.valves) == ("stopped", 0)
-
-
 def close_window(console: Terminal) -> None:
     console.program.ptyproc.delayafterclose = 3  # before pexpect kills
     console.program.close(force=False)

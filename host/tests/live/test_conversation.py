@@ -1,0 +1,47 @@
+"""Whoever types at the console: lines in order, a stop past them all."""
+
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from bifa.link import Uno
+from bifa.live.conversation import Conversation
+from harness.board import Board
+
+PATIENCE_S = 30.0
+
+
+class Held:
+    """A board as transport that keeps back a line that begins with `held` until `release` is set."""
+
+    def __init__(self, board: Board, held: bytes) -> None:
+        self._board, self._held = board, held
+        self.reached, self.release = threading.Event(), threading.Event()
+        self.read = board.read
+
+    def write(self, data: bytes) -> None:
+        if data.startswith(self._held):
+            self.reached.set()
+            assert self.release.wait(PATIENCE_S)
+        self._board.write(data)
+
+
+@pytest.mark.parametrize("held", [b"save one", b"version"])
+def test_a_stop_drops_what_was_typed_and_has_not_begun(held, capsys):
+    board = Board()
+    line = Held(board, held)
+    with Uno(line, board, seed=1) as uno:
+        uno.connect()
+        uno.send_stop()
+        conversation = Conversation(uno, SimpleNamespace(clock=board))
+        conversation.type(f"{held.decode()}\nclear\nrun\n")
+        assert line.reached.wait(PATIENCE_S)
+        conversation.stop()
+        line.release.set()
+        conversation.leave()
+        assert conversation.error is None
+        printed = capsys.readouterr().out
+        assert "-- not carried out: clear, run" in printed
+        assert (board.state, board.valves) == ("stopped", 0)
+        assert "ok" in printed.splitlines(), "the line that had begun is answered"
