@@ -22,6 +22,7 @@ LARGEST_STEP, SMALLEST_STEP = 0.02, 1e-5  # of a parameter's scale, for derivati
 SOFT_LIMIT = 10.0  # standard deviations beyond which a residual counts less than its square
 _OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
 _REMEMBERED = 4  # points whose residuals are kept
+_WORTH_A_PACK = 3  # trials: fewer gain little from each other, and more from a core each
 FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
 
 
@@ -49,9 +50,15 @@ def use_threads(count: int | None) -> None:
     _pool.cache_clear()
 
 
-def in_parallel(function: Callable, items: Iterable) -> list:
-    """`[function(x) for x in items]` on all cores, by threads: simulations release the GIL."""
-    return list(_pool().map(function, items) if cores() > 1 else map(function, items))
+def in_parallel(function: Callable, items: Iterable, work: Sequence[float] = ()) -> list:
+    """`[function(x) for x in items]` on all cores, by threads: simulations release the GIL. What is most `work` begins
+    first, so that no core waits for another's last."""
+    if cores() == 1:
+        return list(map(function, items))
+    items = list(items)
+    order = sorted(range(len(items)), key=lambda k: -work[k]) if work else range(len(items))
+    found = dict(zip(order, _pool().map(function, [items[k] for k in order]), strict=True))
+    return [found[k] for k in range(len(items))]
 
 
 @dataclass(frozen=True)
@@ -106,6 +113,7 @@ class Problem:
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
         self._recent: dict[tuple, list[np.ndarray]] = {}  # residuals: a search begins where the one before ended
+        self.sizes = [len(keep) for *_, keep in self._weighing]  # samples of all channels of each trial
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
     def __getstate__(self) -> dict:
@@ -206,8 +214,11 @@ class Problem:
         )
         return Steps(structure, nuisances)
 
-    def jacobians(self, point: Point, free: Sequence[int], steps: Steps) -> list[tuple[np.ndarray, np.ndarray]]:
-        """For each trial the derivatives of its residuals, shapes (n, len(free)) and (n, q), by absolute steps."""
+    def jacobians(
+        self, point: Point, free: Sequence[int], steps: Steps, then: Callable[..., Any] = lambda *blocks: blocks
+    ) -> list:
+        """For each trial the derivatives of its residuals, shapes (n, len(free)) and (n, q), by absolute steps; or what
+        `then` makes of the two."""
 
         def blocks(i: int) -> tuple[np.ndarray, np.ndarray]:
             values, nuisances = point.values, point.nuisances[i]
@@ -227,7 +238,7 @@ class Problem:
                 own[k] = sum(self._by_factor(j, values[j]) * structure[free.index(j)] for j in of) / nuisances[k]
             return structure.T, own.T
 
-        return in_parallel(blocks, range(len(self.trials)))
+        return in_parallel(lambda i: then(*blocks(i)), range(len(self.trials)), self.sizes)
 
     def _by_factor(self, index: int, value: float) -> float:
         return self.structure.system.times_slope(self.structure.names[index], value)
@@ -278,7 +289,7 @@ class Problem:
             for i, prediction in zip(members, self._simulate_trials(point, members, coarse=coarse), strict=True):
                 found[i] = finish(prediction, i)
 
-        in_parallel(together, self._together)
+        in_parallel(together, self._together, [sum(self.sizes[i] for i in pack) for pack in self._together])
         return found
 
     def _simulate_trials(self, point: Point, members: Sequence[int], *, coarse: bool) -> list[Channels]:
@@ -357,11 +368,16 @@ def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
 
 
 def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:
-    """Indices of the trials that are simulated together: of one experiment, so many at once."""
+    """Indices of the trials that are simulated together: of one experiment, so many at once; a few go apart."""
     experiments: dict[str, list[int]] = {}
     for i, trial in enumerate(trials):
         experiments.setdefault(trial.experiment, []).append(i)
-    return [members[k : k + at_once] for members in experiments.values() for k in range(0, len(members), at_once)]
+    packs: list[list[int]] = []
+    for members in experiments.values():
+        for k in range(0, len(members), at_once):
+            pack = members[k : k + at_once]
+            packs += [pack] if len(pack) >= _WORTH_A_PACK else [[i] for i in pack]
+    return packs
 
 
 def _stepped(values: np.ndarray, index: int, parameter: Parameter, step: float) -> tuple[np.ndarray, float]:

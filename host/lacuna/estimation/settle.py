@@ -113,4 +113,4 @@ def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _
         own = changes[:, len(free) :] / spread
         return Sensitivity.of((changes[:, : len(free)] - own @ follow) @ back, own)
 
-    return in_parallel(of_trial, range(len(problem.trials)))
+    return in_parallel(of_trial, range(len(problem.trials)), problem.sizes)

@@ -164,7 +164,7 @@ def _descended(
 
 
 def _sensitivities(problem: Problem, point: Point, free, steps: Steps) -> tuple[Sensitivity, ...]:
-    return tuple(in_parallel(lambda block: Sensitivity.of(*block), problem.jacobians(point, free, steps)))
+    return tuple(problem.jacobians(point, free, steps, Sensitivity.of))
 
 
 def _corrected(sensitivities, step, scale, before, after, p: int) -> tuple[Sensitivity, ...]:
