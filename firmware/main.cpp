@@ -53,8 +53,9 @@ void board::on_byte(uint8_t byte, bool damaged) {
   attend = true;
   port.byte_in_interrupt(byte, damaged);
 }
-void board::on_emergency_stop() { port.stop_in_interrupt(); }
+void board::on_emergency_stop() { controller.stop_in_interrupt(); }
 void board::on_round(const bifa::RawRound& round) { controller.converted_in_interrupt(round); }
+void bifa::outdate_input() { port.outdate(); }
 
 /// Instead of Arduino's, which would start three timers for PWM and the converter as nothing here uses them.
 int main() {

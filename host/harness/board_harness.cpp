@@ -65,6 +65,7 @@ void Board::step() {
 
 namespace bifa {
 void set_valves(ValvePattern pattern) { running->valves = pattern.bits(); }
+void outdate_input() { running->program->port.outdate(); }
 uint8_t eeprom_read(uint16_t address) { return running->cells[address % kEepromBytes]; }
 void eeprom_write(uint16_t address, uint8_t value) {
   running->cells[address % kEepromBytes] = value;

@@ -60,7 +60,7 @@ Verdict Controller::clear() {
   const Critical guard;
   if (emergency_stop_ || cause_stands()) return Verdict::kCauseStands;
   if (!supervisor_.is_latched()) return Verdict::kDone;  // what the watches have counted stays
-  if (outdated_) return Verdict::kLatched;
+  if (supervisor_.outdated()) return Verdict::kLatched;
   schedule_.stop();
   supervisor_.clear();
   for (uint8_t i = 0; i < kChamberCount; ++i) sensors_[i].reset();
@@ -192,12 +192,6 @@ bool Controller::tick(bool emergency_stop_pressed) {
   watch_host();
   if (round_complete_) finish_sample();
   return since_sample_ms_ == kSamplePeriod_ms - 1;
-}
-
-// Out of line: it is called twice.
-__attribute__((noinline)) void Controller::stop_in_interrupt() {
-  supervisor_.stop();
-  outdated_ = true;
 }
 
 void Controller::converted_in_interrupt(const RawRound& round) {

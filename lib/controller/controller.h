@@ -57,7 +57,7 @@ class Controller {
   Verdict stop();  ///< to idle; all chambers vent (a latched stop or fault stays)
   /// From idle or holding. When all chambers are off again the controller is idle.
   Verdict hold(Chamber chamber, ChamberState state);
-  /// Not on behalf of a command that came before the last stop (see hear_from_now_on()).
+  /// Not on behalf of a command that came before the last stop or fault (see hear_from_now_on()).
   Verdict clear();
 
   /// Takes effect at the next tick, also while running, without a jump of the phases. The set must be valid (is_valid()).
@@ -85,8 +85,8 @@ class Controller {
   State state() const { return supervisor_.state(); }
   uint32_t uptime_ms() const;
 
-  /// All commands from now on come after the last stop, until the next one; call it with interrupts off.
-  void hear_from_now_on() { outdated_ = false; }
+  /// All commands from now on come after the last stop or fault, until the next one; call it with interrupts off.
+  void hear_from_now_on() { supervisor_.hear_from_now_on(); }
 
   /// Call it whenever the host has said something that makes sense.
   void host_heard();
@@ -108,7 +108,7 @@ class Controller {
   void converted_in_interrupt(const RawRound& round);
 
   /// The byte `!`, the stop message or the emergency stop: all valves are off when it returns.
-  void stop_in_interrupt();
+  void stop_in_interrupt() { supervisor_.stop(); }
 
  private:
   void step_oscillators();
@@ -152,7 +152,6 @@ class Controller {
   Oscillators oscillators_;
   Schedule schedule_;
   LastSecond last_second_;
-  volatile bool outdated_ = false;  ///< the command at hand came before the last stop
 };
 
 }  // namespace bifa

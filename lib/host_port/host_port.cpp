@@ -10,11 +10,6 @@ void HostPort::begin(uint16_t boot_nonce, StartCause cause) {
   console_.greet();
 }
 
-void HostPort::stop_in_interrupt() {
-  commands_.controller().stop_in_interrupt();
-  receiver_.outdate();
-}
-
 void HostPort::poll() {
   commands_.store().poll();
   session_.poll();

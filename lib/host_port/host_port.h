@@ -19,12 +19,12 @@ class HostPort {
 
   /// In the receive interrupt. If the byte asks for a stop all valves are off on return.
   void byte_in_interrupt(uint8_t byte, bool damaged = false) {
-    if (receiver_.push(byte, damaged)) stop_in_interrupt();
+    if (receiver_.push(byte, damaged)) commands_.controller().stop_in_interrupt();
   }
   /// In the interrupt of the 1 kHz timer.
   void tick_in_interrupt() { receiver_.tick(); }
-  /// The emergency stop, in an interrupt: all valves are off on return, and commands that wait cannot undo it.
-  void stop_in_interrupt();
+  /// Commands that wait came before a stop or a fault, which they must not undo; call it with interrupts off.
+  void outdate() { receiver_.outdate(); }
 
   /// In the main loop: handles what has arrived, answers, sends telemetry, goes on writing the EEPROM.
   void poll();

@@ -29,9 +29,9 @@ class Receiver {
   bool pop(uint8_t& byte);
 
   // With interrupts off:
-  /// What stands in the queue came before a stop.
+  /// What stands in the queue came before a stop or a fault.
   void outdate() { outdated_ = static_cast<uint8_t>(head_ - tail_) % kQueueBytes; }
-  /// Whether the next byte came before the last stop.
+  /// Whether the next byte came before the last of them.
   bool outdated() const { return outdated_ > 0; }
 
   bool has_input() const { return head_ != tail_; }

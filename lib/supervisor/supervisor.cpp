@@ -24,14 +24,14 @@ void Supervisor::hold(Chamber chamber, ChamberState state) {
 
 void Supervisor::stop() {
   if (state_ != State::kFault) state_ = State::kStopped;
-  vent();
+  latch();
 }
 
 void Supervisor::trip(Fault fault, uint8_t channel, int16_t value, int16_t limit, uint32_t time_ms,
                       const LastSecond& last_second) {
-  vent();
-  if (state_ == State::kFault) return;
+  if (state_ == State::kFault) return vent();
   state_ = State::kFault;
+  latch();
   fault_.fault = fault;
   fault_.channel = channel;
   fault_.value = value;
@@ -60,6 +60,13 @@ void Supervisor::tick() {
   ChamberStates now;
   for (uint8_t i = 0; i < kChamberCount; ++i) now.of[i] = sequencers_[i].tick(wanted_.of[i]);
   write(ValvePattern(now));
+}
+
+/// What was sent before nobody can have meant for this stop or fault.
+void Supervisor::latch() {
+  vent();
+  outdated_ = true;
+  outdate_input();
 }
 
 void Supervisor::vent() {

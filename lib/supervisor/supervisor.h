@@ -15,12 +15,18 @@
 
 namespace bifa {
 
+/// What the host has sent so far came before a stop or a fault and must not release it; called with interrupts off. The
+/// owner of the receive queue provides it.
+void outdate_input();
+
 class Supervisor {
  public:
   State state() const { return state_; }
   bool is_latched() const { return state_ == State::kStopped || state_ == State::kFault; }
   bool moves_air() const { return state_ == State::kRunning || state_ == State::kHolding; }
   const FaultReport& fault() const { return fault_; }
+  /// Whether the command at hand came before the last stop or fault.
+  bool outdated() const { return outdated_; }
   ValvePattern valves() const { return on_pins_; }
   ChamberState wanted(uint8_t chamber) const { return wanted_.of[chamber]; }
 
@@ -37,6 +43,8 @@ class Supervisor {
             const LastSecond& last_second);
   /// Only from stopped or fault: to idle.
   void clear();
+  /// All commands from now on come after the last stop or fault, until the next one.
+  void hear_from_now_on() { outdated_ = false; }
 
   /// Every millisecond: the outputs of the oscillators, bit i for chamber i; obeyed only while running.
   void walk(uint8_t outputs);
@@ -44,6 +52,7 @@ class Supervisor {
   void tick();
 
  private:
+  void latch();
   void vent();
   void write(ValvePattern pattern);
 
@@ -52,6 +61,7 @@ class Supervisor {
   ValveSequencer sequencers_[kChamberCount];
   ValvePattern on_pins_;
   FaultReport fault_ = {};
+  volatile bool outdated_ = false;
 };
 
 }  // namespace bifa

@@ -28,7 +28,8 @@ const uint16_t kHalfScale = 512 * bifa::kOversampling;
 const int16_t kTrip_mpsi = 10000;
 const uint8_t kTripSamples = bifa::kTripTime_ms / bifa::kSamplePeriod_ms;
 
-uint8_t pins = 0;  ///< what stands on the valves' pins
+uint8_t pins = 0;      ///< what stands on the valves' pins
+uint8_t outdated = 0;  ///< how often what waits was told that it came before a stop or fault
 
 Fault look(SensorWatch& watch, int16_t pressure_mpsi, uint16_t sum = kHalfScale, ChamberState chamber = kOff) {
   return watch.look(sum, pressure_mpsi, kTrip_mpsi, chamber).fault;
@@ -258,6 +259,23 @@ void test_a_fault_keeps_its_first_cause_with_channel_value_limit_time_and_extrem
   TEST_ASSERT_TRUE(supervisor.fault().fault == Fault::kNone);
 }
 
+void test_every_stop_and_every_new_fault_outdates_what_came_before_it() {
+  Supervisor supervisor;
+  LastSecond last_second;
+  supervisor.stop();
+  supervisor.stop();
+  TEST_ASSERT_EQUAL_UINT8(2, outdated);
+  supervisor.hear_from_now_on();
+  TEST_ASSERT_FALSE(supervisor.outdated());
+  supervisor.trip(Fault::kOverPressure, 1, 12345, 10500, 777, last_second);
+  TEST_ASSERT_EQUAL_UINT8(3, outdated);
+  TEST_ASSERT_TRUE(supervisor.outdated());
+  supervisor.hear_from_now_on();
+  supervisor.trip(Fault::kOverPressure, 1, 12345, 10500, 787, last_second);
+  TEST_ASSERT_EQUAL_UINT8(3, outdated);
+  TEST_ASSERT_FALSE(supervisor.outdated());
+}
+
 void run() {
   RUN_TEST(test_two_short_spikes_a_minute_apart_do_not_trip);
   RUN_TEST(test_over_pressure_trips_after_exactly_its_time_and_not_before);
@@ -279,13 +297,15 @@ void run() {
   RUN_TEST(test_a_stop_vents_before_it_returns_from_every_state);
   RUN_TEST(test_stopped_nothing_moves_until_it_is_cleared);
   RUN_TEST(test_a_fault_keeps_its_first_cause_with_channel_value_limit_time_and_extremes);
+  RUN_TEST(test_every_stop_and_every_new_fault_outdates_what_came_before_it);
 }
 
 }  // namespace
 
 void bifa::set_valves(ValvePattern pattern) { pins = pattern.bits(); }
+void bifa::outdate_input() { ++outdated; }
 
-void setUp() { pins = 0; }
+void setUp() { pins = outdated = 0; }
 void tearDown() {}
 
 RUN_SUITE(run)

@@ -5,7 +5,9 @@ import struct
 
 import pytest
 
-from bifa.link.table import PARAMETERS
+from bench.bench_uno import connected
+from bifa.link import frames
+from bifa.link.table import COMMANDS, PARAMETERS
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -112,6 +114,50 @@ def test_silent_host_vents(bench):
     bench.wait(0.3)
     assert not bench.valves_on
     assert "host_silent" in bench.say("status", 0.5)
+
+
+def lose_a_sensor(bench):
+    """For an instant, but for long enough."""
+    bench.volts[1] = 0.02
+    bench.wait(0.1)
+    bench.volts[1] = 2.5
+
+
+def lose_the_dac(bench):
+    bench.board.set_bus("absent")
+    bench.wait(0.3)
+    bench.board.set_bus("dac")
+
+
+@pytest.mark.parametrize(
+    ("first", "lose", "name"),
+    [
+        (b"save zz\n", lose_a_sensor, "sensor_range"),
+        (b"help\n" * 4, lose_a_sensor, "sensor_range"),
+        (b"save zz\n", lose_the_dac, "supply_control"),
+    ],
+    ids=["sensor-saving", "sensor-printing", "dac-saving"],
+)
+def test_what_waits_when_a_fault_comes_does_not_undo_it(bench, first, lose, name):
+    bench.board.send(first + b"clear\nrun\n")
+    lose(bench)
+    said = bench.wait(2.0)
+    assert not bench.valves_on
+    assert said.count("error") == 2, "both lines are answered"
+    assert name in bench.say("status")
+    assert bench.say("clear").rstrip().endswith("ok"), "one that comes after the fault"
+    assert bench.say("run").rstrip().endswith("ok")
+
+
+def test_clear_frames_that_wait_when_a_fault_comes_do_not_undo_it(bench):
+    uno = connected(bench.board)
+    seed, sequence = frames.session_seed(uno.session._key), uno.session._sequence
+    waiting = [frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("clear", "run"))]
+    bench.board.send(b"help\n" * 4 + b"".join(waiting))
+    lose_a_sensor(bench)
+    bench.wait(1.0)
+    assert not bench.valves_on
+    assert "sensor_range" in bench.say("status")
 
 
 def test_samples_are_exactly_10_ms_apart_and_their_stamps_are_the_strobe_s(bench):

@@ -10,6 +10,7 @@
 
 static uint8_t cells[bifa::kEepromBytes];
 static std::string text;  ///< what came out
+static bifa::HostPort* listening;
 
 namespace bifa {
 uint8_t eeprom_read(uint16_t address) {
@@ -27,6 +28,7 @@ void set_valves(ValvePattern pattern) {
   const uint8_t bits = pattern.bits();
   if (bits & (bits >> 1) & 0x15) __builtin_trap();  // both valves of a chamber
 }
+void outdate_input() { listening->outdate(); }
 }  // namespace bifa
 
 class FuzzBoard {
@@ -34,6 +36,7 @@ class FuzzBoard {
   FuzzBoard() : port(controller) {
     memset(cells, 0xFF, sizeof cells);
     text.clear();
+    listening = &port;
     port.begin(1, bifa::StartCause::kPower);
   }
 
