@@ -207,16 +207,32 @@ def _csv(file: Path) -> Table:
 
 
 def _lines(file: Path) -> list[tuple[int, list[str]]]:
-    """The cells of each line that holds any, with its number; remarks (#) are left out."""
+    """The cells of each line that holds any, with its number, the columns' names first; remarks (#) are left out."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as lines:  # a spreadsheet begins its files with a mark
             reader = csv.reader(lines, skipinitialspace=True)
-            found = [(reader.line_num, row) for row in reader if "".join(row) and not row[0].startswith("#")]
+            written = [(reader.line_num, row) for row in reader if "".join(row)]
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordError(f"{file.name} is not a table of text in UTF-8: {error}") from None
+    found = [(line, row) for line, row in written if not row[0].startswith("#")]
     if not found:
         raise RecordError(f"{file.name} is empty.")
+    first, cells = found[0]
+    if all(_number(value) is not None for cell in cells for value in cell.split()):
+        return [_names_in_remark([row for line, row in written if line < first], cells, file, first), *found]
     return found
+
+
+def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path, line: int) -> tuple[int, list[str]]:
+    """The columns' names, where numpy.savetxt wrote them as a remark right above the first row of numbers, `cells`."""
+    names = [cell.lstrip("#").strip() for cell in remarks[-1]] if remarks else []
+    parted = all(_number(cell) is not None for cell in cells)
+    if parted and len(names) == len(cells) and any(time in names for time in _TIMES):
+        return line - 1, names
+    raise RecordError(
+        f"{file.name}, line {line}: numbers where the names of the columns belong. With numpy:"
+        ' savetxt(file, rows, delimiter=",", header="time_s,force_N", comments="").'
+    )
 
 
 def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:

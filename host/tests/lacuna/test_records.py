@@ -31,6 +31,24 @@ def test_quoted_cells_and_remarks_are_read(tmp_path):
     assert (one.time_s[0], one.columns["y"][0]) == (0.5, 7.0)
 
 
+@pytest.mark.parametrize("header", ["time_s,y", "time_s, y", "run 1\ntime_s,y", "2 W, 20 C\ntime_s,y"])
+@pytest.mark.parametrize("comments", ["# ", "#"])
+def test_names_that_numpy_wrote_as_a_remark_are_names(tmp_path, header, comments):
+    table = np.column_stack([np.arange(10) / 10, np.arange(10) ** 2])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=header, comments=comments)
+    (one,) = read(tmp_path)
+    assert list(one.columns) == ["y"]
+    assert (len(one.time_s), one.time_s[1], one.columns["y"][3]) == (10, 0.1, 9.0)
+
+
+@pytest.mark.parametrize("remark", ["", "# run 1\n", "# time_s\n", "# time_s y\n", "# time_s,y,z\n", "# a, remark\n"])
+@pytest.mark.parametrize("between", [",", " "])
+def test_numbers_without_names_are_refused_with_how_to_write_them(tmp_path, remark, between):
+    text = remark + "".join(f"{k}{between}{k * k}\n" for k in range(10))
+    with pytest.raises(RecordError, match=r'a\.csv, line \d: numbers where .*delimiter=",", .*header=.*comments=""'):
+        read(write(tmp_path, "a.csv", text))
+
+
 def test_an_empty_cell_is_a_missing_sample_and_a_column_of_words_an_input(tmp_path):
     (one,) = read(write(tmp_path, "a.csv", "time_s,y,who\n0,1,Ann\n1,,Bob\n"))
     assert np.isnan(one.columns["y"]).tolist() == [False, True]
