@@ -10,7 +10,9 @@ _LONG_KEY = re.compile(rf"(?<![\w\\-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MOST_
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The document in `text`. Raises tomllib.TOMLDecodeError, whatever is wrong with it."""
+    """The document in `text`, without the mark that some editors begin a file with. Raises tomllib.TOMLDecodeError,
+    whatever is wrong with it."""
+    text = text.removeprefix("\ufeff")
     if long := _LONG_KEY.search(text):
         line = text.count("\n", 0, long.start()) + 1
         raise tomllib.TOMLDecodeError(f"A key of over {MOST_PARTS} parts (at line {line})")

@@ -61,10 +61,12 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
 def _read_toml(folder: Path) -> tuple[Fields, Source]:
     try:
         raw = (folder / TABLE_FILE).read_bytes()
+    except FileNotFoundError:
+        raise DatasetError(_no_table(folder)) from None
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=TABLE_FILE) from None
     try:
-        text = raw.decode("utf-8")
+        text = raw.decode("utf-8").removeprefix("\ufeff")  # a mark that some editors begin a file with
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise DatasetError(f"byte 0x{raw[error.start]:02x} is not UTF-8", file=TABLE_FILE, line=line) from None
@@ -75,6 +77,17 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
     listed = values.get("trial")
     source = Source(text, len(listed) if isinstance(listed, list) else 0)
     return Fields(values, source), source
+
+
+def _no_table(folder: Path) -> str:
+    inside = sorted(path.parent.name for path in folder.glob(f"*/{TABLE_FILE}"))
+    if inside:
+        return f"{folder} is no data set, but holds {', '.join(inside)}: name {folder / inside[0]}"
+    return (
+        f"{folder} has no {TABLE_FILE}: a data set is a folder with this file, which lists the trials, and a CSV file "
+        "for each. Write it beside your files (docs/data-format.md shows how), or let `bifa experiment` record one; "
+        "with --instrument it takes the record of your own instrument"
+    )
 
 
 def _known(top: Fields, source: Source) -> dict[str, float]:

@@ -58,6 +58,9 @@ def _decode(path: Path, file: str) -> str:
 def _header(lines: list[str], file: str, layout: Layout) -> list[str]:
     names = [name.strip(_BLANKS) for name in lines[0].split(",")]
     expected = ", ".join(layout.all_columns)
+    if names[0].startswith("#"):
+        problem = 'the header begins with #, as numpy.savetxt writes it; have it written with comments=""'
+        raise DatasetError(problem, file=file, line=1, column=names[0])
     seen: set[str] = set()
     for name in names:
         if name in seen:

@@ -134,6 +134,7 @@ MALFORMED_CSV = {
         None,
         "byte order",
     ),
+    "header as a remark": (write_walk(b"# " + HEADER + b"0,0,0,0,0,0,0,0\n"), 1, "# time_s", 'comments=""'),
     "Latin 1": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\xb5,0,0,0\n"), 3, None, "0xb5 is not UTF-8"),
     "NUL": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\0,0,0,0\n"), 3, "displacement_head_mm", "not a"),
     "semicolons": (write_walk(HEADER.replace(b",", b";")), 1, None, "unknown column"),
@@ -281,10 +282,25 @@ def test_table_in_the_wrong_encoding(folder):
 
 
 def test_no_table_and_no_folder(tmp_path):
-    with pytest.raises(DatasetError, match=r"dataset\.toml: cannot be read"):
+    with pytest.raises(DatasetError, match=r"no dataset\.toml: .*docs/data-format\.md.*`bifa experiment`"):
         read_dataset(tmp_path)
     with pytest.raises(DatasetError, match="is not a folder"):
         read_dataset(tmp_path / "nowhere")
+
+
+def test_a_folder_above_a_data_set_is_told_its_name(folder):
+    with pytest.raises(DatasetError, match=f"is no data set, but holds bench: name {folder}"):
+        read_dataset(folder.parent)
+
+
+def test_a_table_that_begins_with_a_mark_is_read(folder):
+    path = folder / "dataset.toml"
+    text = path.read_text()
+    path.write_text(text, "utf-8-sig")
+    assert_same(read_dataset(folder), make_dataset())
+    path.write_text(text.replace("format = 1", "format = 2"), "utf-8-sig")
+    with pytest.raises(DatasetError, match="line 1, format: format 2 is not supported"):
+        read_dataset(folder)
 
 
 def test_links_may_not_leave_the_folder(folder, tmp_path):

@@ -23,6 +23,11 @@ def written(tmp_path, text: str):
 BY_HAND = "".join(f"{name} = {value}\n" for name, value in BASELINE.as_dict().items())
 
 
+def test_a_mark_that_an_editor_began_the_file_with_is_no_part_of_it(tmp_path):
+    (tmp_path / "g.toml").write_text(BY_HAND, "utf-8-sig")
+    assert load_gait(tmp_path / "g.toml") == BASELINE
+
+
 def test_other_parameters_of_the_uno_may_stand_beside_the_gait(tmp_path):
     path = written(tmp_path, BY_HAND + "coupling_per_s = 5\npressure_psi = 7\n[provenance]\nby = 'me'\n")
     file = read_gait_file(path)
