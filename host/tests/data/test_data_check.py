@@ -79,6 +79,15 @@ def test_a_snap_through_is_no_spike_and_a_coarse_sensor_is_not_clipped():
     assert damaged("static_loading_1.csv", displacement_mm=lambda x: np.round(x)) == []
 
 
+def test_a_pressure_of_the_wrong_sign_is_called_that():
+    (found,) = damaged("anchor_pull_2.csv", pressure_psi=lambda x: -x)
+    assert str(found).endswith("psi on average where 8.5 psi was commanded: its sign is turned")
+
+
+def test_an_actuator_that_vacuum_draws_in_begins_where_it_should():
+    assert damaged("step_response_1.csv", displacement_mm=lambda x: 4.0 * x - 7.0) == []
+
+
 def test_missing_repeats_and_experiments():
     dataset = sound()
     kept = [t for t in dataset.trials if t.experiment != "anchor_pull" and t.file != "locomotion_2.csv"]
