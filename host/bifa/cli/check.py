@@ -1,11 +1,15 @@
 """`bifa check`: what is in a data set, pictures of it, and what looks wrong."""
 
+import re
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bifa.cli._options import DATASET, PICTURES
+
+_MOST_ALIKE = 3  # warnings that say the same of other files, but for their numbers
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 
 def register(app: typer.Typer) -> None:
@@ -22,25 +26,24 @@ def register(app: typer.Typer) -> None:
         """List what is in a data set, warn of what looks wrong, and plot it with --pictures.
 
         A malformed data set gives status 2 and an error with file, line and column. Data that are well-formed but
-        doubtful (a clipped sensor, a clock that jumps, missing repeats) are listed as warnings, status 0.
+        doubtful (a clipped sensor, a clock that jumps, missing repeats) are listed as warnings, status 0; so are what
+        seem to be mistakes (a sign turned, tubes exchanged, a gait of another walk, a mass in grams).
         """
         from bifa.files import check_targets, written_into
 
         check_targets(folders=(pictures,))
 
-        from rich.text import Text
-
         from bifa.data import read_dataset
         from bifa.data.check import check_dataset
+        from bifa.mistakes import find_mistakes
         from bifa.screen import Console
 
         console = Console()
         with console.status("reading"):
             content = read_dataset(dataset)
-            findings = check_dataset(content)
+            findings = check_dataset(content) + find_mistakes(content)
         _print_contents(console, content)
-        for finding in findings:
-            console.print(Text.assemble(("warning", "yellow"), f" [{finding.kind}] {finding}"), highlight=False)
+        _print_findings(console, findings)
         if not findings:
             console.print("Nothing looks wrong.")
         if pictures is not None:
@@ -51,6 +54,23 @@ def register(app: typer.Typer) -> None:
             console.print(f"{len(written)} pictures in {pictures}", highlight=False)
         if strict and findings:
             raise typer.Exit(1)
+
+
+def _print_findings(console, findings) -> None:
+    from rich.text import Text
+
+    alike: dict[tuple, list] = {}
+    for finding in findings:
+        apart = finding if finding.file is None or finding.line is not None else None
+        key = (finding.kind, finding.column, _NUMBER.sub("", finding.text), apart)
+        alike.setdefault(key, []).append(finding)
+    for first, *others in alike.values():
+        shown, named = ([first], others) if len(others) >= _MOST_ALIKE else ([first, *others], [])
+        for finding in shown:
+            console.print(Text.assemble(("warning", "yellow"), f" [{finding.kind}] {finding}"), highlight=False)
+        if named:
+            files = ", ".join(finding.file for finding in named)
+            console.print(Text(f"  likewise in {len(named)} more: {files}"), highlight=False)
 
 
 def _print_contents(console, dataset) -> None:

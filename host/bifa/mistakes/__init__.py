@@ -1,0 +1,39 @@
+"""Mistakes made at a bench that the format cannot refuse: signs, mirrors, exchanged tubes, another gait, a wrong unit.
+
+A diagnosis would look for their cause in the robot. Each check has its own file, with its limits and how far from them
+healthy data stay, strong effects included. Nothing here changes what is fitted.
+"""
+
+from collections.abc import Sequence
+
+from bifa.data import Dataset, Trial
+from bifa.data.check import Finding
+
+from .known import check_known
+from .loadings import check_anchor_pull, check_static_loading
+from .repeats import check_repeats
+from .steps import check_step_response
+from .walks import check_walk
+
+__all__ = ["find_mistakes", "mistakes_in"]
+
+_CHECKS = {
+    "static_loading": check_static_loading,
+    "step_response": check_step_response,
+    "anchor_pull": check_anchor_pull,
+}
+
+
+def mistakes_in(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
+    """What was mistaken in one trial, as it seems; `walks`, others of the day, may have the gait that it was."""
+    if trial.experiment == "locomotion":
+        return list(check_walk(trial, walks))
+    return list(_CHECKS[trial.experiment](trial))
+
+
+def find_mistakes(dataset: Dataset) -> list[Finding]:
+    """What was mistaken in a data set, as it seems: what is known beforehand, single trials, odd repeats."""
+    walks = dataset.of("locomotion")
+    found = [finding for trial in dataset.trials for finding in mistakes_in(trial, walks)]
+    files = {finding.file for finding in found}
+    return [*check_known(dataset.known), *found, *check_repeats(dataset, files)]

@@ -1,0 +1,52 @@
+"""Static loadings and anchor pulls whose displacement or force has the wrong sign."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bifa.data import Trial
+from bifa.data.check import Finding
+
+_TRAVEL_MM = 5.0  # less of it shows no stable end
+_ENDS = ((0.0, 0.05), (0.15, 0.25), (0.75, 0.85), (0.95, 1.0))  # of the travel
+_FALLS = -0.05  # of the force's range, at both ends; healthy: +0.15 or more at the one, +0.28 at the other
+_OTHER_WAY = 2.0  # how much further to the wrong side than to the right one; healthy: less than 0.1
+
+
+def check_static_loading(trial: Trial) -> Iterator[Finding]:
+    """At either stable end an actuator resists both ways, whatever the pressure: K rises there, and so the force."""
+    mm, force_N = trial.columns["displacement_mm"], trial.columns["force_N"]
+    if -mm.min() > max(_TRAVEL_MM, _OTHER_WAY * mm.max()):
+        text = (
+            f"goes down to {mm.min():.1f} mm where it should go up: displacement is positive when extending; turn its "
+            "sign"
+        )
+        yield Finding("sign", text, trial.file, column="displacement_mm")
+        return
+    if mm.max() < _TRAVEL_MM:
+        return
+    means = [_mean(force_N[(mm >= low * mm.max()) & (mm <= high * mm.max())]) for low, high in _ENDS]
+    first, last = means[1] - means[0], means[3] - means[2]
+    limit = _FALLS * np.ptp(force_N)
+    if first < limit and last < limit:
+        text = (
+            f"falls by {-first:.2f} N over the first fifth of the travel and by {-last:.2f} N over the last, where "
+            "pulling an actuator out of a stable state takes a rising force: is pushing counted as positive? "
+            "Positive is pulling; turn the sign"
+        )
+        yield Finding("sign", text, trial.file, column="force_N")
+
+
+def check_anchor_pull(trial: Trial) -> Iterator[Finding]:
+    """An anchor resists: its force is positive, whichever way the head is pulled."""
+    force_N = trial.columns["force_N"]
+    if np.median(force_N) < 0.0 and -force_N.min() > _OTHER_WAY * force_N.max():
+        text = (
+            f"{np.median(force_N):.2f} N in the middle (median), where a resistance is positive: does the load cell "
+            "count the other way? Turn the sign"
+        )
+        yield Finding("sign", text, trial.file, column="force_N")
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if values.size else np.nan

@@ -1,0 +1,142 @@
+"""A repeat unlike the others of its condition: what differs that much was not repeated.
+
+What is compared does not depend on when a recording was started: forces at equal displacement, steps and walks from
+the first switch on. Of a walk only the pressures and the length count: two runs of a brittle gait may end far apart.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.data import Dataset, Trial
+from bifa.data.check import Finding
+from bifa.data.layout import is_command
+
+# Of a channel's range, as an RMS difference. Healthy: 0.08 at most, where areas drift or sensors warm.
+_UNLIKE = 0.10
+_UNLIKE_OF_TWO = 0.20  # where nothing tells which of the two it is
+_OF_OTHERS = 4.0  # times as far as the others are from one another
+_OF_DAY = 5.0  # times the day's usual difference between repeats of this experiment: a lab's ordinary scatter
+_POINTS = 400
+_LENGTH = "displacement_head_mm - displacement_tail_mm"
+
+Curve = tuple[np.ndarray, np.ndarray]  # at what, rising; and the values
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Repeats of a condition: `apart[channel]`, shape (n, n), how far they are from one another, and the ranges."""
+
+    trials: Sequence[Trial]
+    apart: dict[str, np.ndarray]
+    ranges: dict[str, float]
+
+
+def check_repeats(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[Finding]:
+    """`besides`: files in which a mistake is known already; they are compared with nothing."""
+    kept = [[trial for trial in group if trial.file not in besides] for group in dataset.repeats()]
+    groups = [_compared(group) for group in kept if len(group) > 1]
+    for group in groups:
+        usual = _usual(group, groups)
+        yield from _of_two(group, usual) if len(group.trials) == 2 else _of_more(group, usual)
+
+
+def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
+    """A repeat is as far from the others as from the nearest of them: two that agree, of five, are no mistake."""
+    for place, trial in enumerate(group.trials):
+        others = [k for k in range(len(group.trials)) if k != place]
+        found = []
+        for channel, apart in group.apart.items():
+            alike = float(np.median([min(apart[k, j] for j in others if j != k) for k in others]))
+            far = float(apart[place, others].min())
+            if far > max(_UNLIKE, _OF_OTHERS * alike, _OF_DAY * usual[channel]):
+                found.append((far, alike, channel))
+        if found:
+            far, alike, channel = max(found)
+            span, unit = group.ranges[channel], _unit(channel)
+            text = (
+                f"repeat {trial.repeat} of {trial.label} differs from the others by {far * span:.3g} {unit} (RMS), "
+                f"they from one another by {alike * span:.2g} {unit}: was something else mounted or set? Record it "
+                "again, or leave it out"
+            )
+            yield Finding("repeat", text, trial.file, column=channel)
+
+
+def _of_two(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
+    one, other = group.trials
+    found = [(float(apart[0, 1]), channel) for channel, apart in group.apart.items()]
+    found = [(far, channel) for far, channel in found if far > max(_UNLIKE_OF_TWO, _OF_DAY * usual[channel])]
+    if found:
+        far, channel = max(found)
+        text = (
+            f"{one.file} and {other.file} differ by {far * group.ranges[channel]:.3g} {_unit(channel)} (RMS), "
+            f"{100 * far:.0f} % of the range: one of these repeats was recorded otherwise; a third tells which"
+        )
+        yield Finding("repeat", text, column=channel)
+
+
+def _usual(group: _Group, groups: Sequence[_Group]) -> dict[str, float]:
+    """The median difference between repeats in the experiment's other conditions, by channel; 0 without any."""
+    found: dict[str, list[float]] = {channel: [] for channel in group.apart}
+    for other in groups:
+        if other is not group and other.trials[0].experiment == group.trials[0].experiment:
+            for channel in found.keys() & other.apart.keys():
+                found[channel].extend(other.apart[channel][np.triu_indices(len(other.trials), 1)])
+    return {channel: float(np.median(values)) if values else 0.0 for channel, values in found.items()}
+
+
+def _compared(trials: Sequence[Trial]) -> _Group:
+    curves = [_curves(trial) for trial in trials]
+    channels = set.intersection(*(set(found) for found in curves))
+    ranges = {c: float(np.median([max(np.ptp(v) for _, v in found[c]) for found in curves])) for c in channels}
+    apart = {}
+    for channel in sorted(c for c in channels if ranges[c] > 0.0):
+        apart[channel] = np.zeros((len(trials), len(trials)))
+        for i in range(len(trials)):
+            for j in range(i):
+                far = _apart(curves[i][channel], curves[j][channel]) / ranges[channel]
+                apart[channel][i, j] = apart[channel][j, i] = far
+    return _Group(trials, apart, ranges)
+
+
+def _apart(one: Sequence[Curve], other: Sequence[Curve]) -> float:
+    """RMS difference where both were recorded."""
+    squares, spans = [], []
+    for (at_one, values_one), (at_other, values_other) in zip(one, other, strict=True):
+        low, high = max(at_one[0], at_other[0]), min(at_one[-1], at_other[-1])
+        if low < high:
+            at = np.linspace(low, high, _POINTS)
+            squares.append(np.mean((np.interp(at, at_one, values_one) - np.interp(at, at_other, values_other)) ** 2))
+            spans.append(high - low)
+    return float(np.sqrt(np.average(squares, weights=spans))) if spans else 0.0
+
+
+def _curves(trial: Trial) -> dict[str, list[Curve]]:
+    """What of a trial is compared, by channel; a loading in its two branches."""
+    columns = trial.columns
+    if trial.experiment in ("static_loading", "anchor_pull"):
+        mm, force_N = columns["displacement_mm"], columns["force_N"]
+        turn = int(np.argmax(mm))
+        return {"force_N": [_sorted(mm[part], force_N[part]) for part in (slice(turn + 1), slice(turn, None))]}
+    time_s = trial.time_s - trial.time_s[_first_switch(trial)]
+    found = {name: values for name, values in columns.items() if name.startswith("pressure")}
+    if trial.experiment == "step_response":
+        found["displacement_mm"] = columns["displacement_mm"]
+    elif "displacement_tail_mm" in columns:
+        found[_LENGTH] = columns["displacement_head_mm"] - columns["displacement_tail_mm"]
+    return {name: [(time_s, values)] for name, values in found.items()}
+
+
+def _sorted(at: np.ndarray, values: np.ndarray) -> Curve:
+    order = np.argsort(at, kind="stable")
+    return at[order], values[order]
+
+
+def _first_switch(trial: Trial) -> int:
+    switches = [np.flatnonzero(np.diff(values)) for name, values in trial.columns.items() if is_command(name)]
+    return int(min((rows[0] for rows in switches if rows.size), default=0))
+
+
+def _unit(channel: str) -> str:
+    return channel.rsplit("_", 1)[1]

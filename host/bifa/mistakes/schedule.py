@@ -1,0 +1,118 @@
+"""Does a walk's gait say what its recorded commands did? Both are written down, and either may be of another walk."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from bifa.data import Trial
+from bifa.data.check import Finding
+from bifa.ranges import RANGES
+from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
+
+# A record at 100 Hz tells a phase to 0.2 % of a cycle of 4 s; the Uno's resonator is good to 0.5 %.
+_PERIOD_SHARE = 0.02
+_CYCLE_SHARE = 0.05  # of duties and phases
+_SETTLED = 5.0  # time constants of the coupling, after which phases are what the gait says
+
+_PHASES = {"head": "psi12_deg", "tail": "psi13_deg"}
+_DUTIES = {chamber: f"duty_{chamber}" for chamber in CHAMBERS}
+
+
+def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
+    """A gait that the commands contradict; `walks`, others of the day, may have the gait that they fit."""
+    commands = {f"command_{c}": trial.columns[f"command_{c}"] for c in CHAMBERS}
+    seen = seen_gait(trial, commands)
+    wrong = contradicted(trial.gait, seen)
+    if wrong:
+        values = ", ".join(f"{name} = {_written(name, seen[name])}" for name in wrong)
+        given = ", ".join(f"{trial.gait[name]:g}" for name in wrong)
+        text = f"the recorded commands have {values}, the gait in dataset.toml {given}"
+        yield Finding("gait", f"{text}: {_why(trial, seen, wrong, walks)}", trial.file)
+
+
+def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Those parameters of a gait that the columns `command_body` ... tell, by name, phases in 0 to 360 degrees."""
+    time_s = trial.time_s * trial.extra.get("clock_rate", 1.0)  # by the Uno's clock, as the gait is
+    falls, rises = {}, {}
+    for chamber in CHAMBERS:
+        step = np.diff(commands[f"command_{chamber}"])
+        middle_s = 0.5 * (time_s[1:] + time_s[:-1])
+        falls[chamber], rises[chamber] = middle_s[step < 0], middle_s[step > 0]
+    lasted_s = np.concatenate([np.diff(edges) for edges in (*falls.values(), *rises.values())])
+    period_s = _agreed(lasted_s, _PERIOD_SHARE * np.median(lasted_s)) if lasted_s.size else None
+    if period_s is None:
+        return {}
+    seen: dict[str, float | None] = {"period_s": period_s}
+    for chamber, name in _DUTIES.items():
+        seen[name] = _agreed(_vacuum_s(falls[chamber], rises[chamber]) / period_s, _CYCLE_SHARE)
+    begin_s = time_s[0] + _settled_s(trial.gait)
+    for chamber, name in _PHASES.items():
+        ahead = _ahead(falls[chamber][falls[chamber] > begin_s], falls["body"], period_s)
+        turns = _agreed(ahead, _CYCLE_SHARE)
+        seen[name] = None if turns is None else 360.0 * (turns % 1.0)
+    return {name: value for name, value in seen.items() if value is not None}
+
+
+def contradicted(gait: Mapping[str, float], seen: Mapping[str, float]) -> list[str]:
+    """The parameters of `gait` that differ from those `seen`, in the gait's order."""
+    return [name for name in gait if name in seen and not _same(name, gait[name], seen[name])]
+
+
+def _same(name: str, given: float, seen: float) -> bool:
+    if name == "period_s":
+        return abs(seen / given - 1.0) <= _PERIOD_SHARE
+    if name in _PHASES.values():
+        return abs(_wrapped((seen - given) / 360.0)) <= _CYCLE_SHARE
+    return abs(seen - given) <= _CYCLE_SHARE
+
+
+def _why(trial: Trial, seen: Mapping[str, float], wrong: Sequence[str], walks: Sequence[Trial]) -> str:
+    given = trial.gait
+    if all(name in _PHASES.values() and _same(name, 360.0 - given[name], seen[name]) for name in wrong):
+        return "a phase is how far head and tail are ahead of the body, not behind it; correct dataset.toml"
+    if all(name in _DUTIES.values() and _same(name, 1.0 - given[name], seen[name]) for name in wrong):
+        return "a duty is the part of the cycle at vacuum, not under pressure; correct dataset.toml"
+    for other in walks:
+        if other.gait != given and not contradicted(other.gait, seen):
+            return f"that is the gait of {other.file}; does dataset.toml name the right file?"
+    return "another gait was walked than dataset.toml says; correct it there, or walk again"
+
+
+def _written(name: str, value: float) -> str:
+    unit = RANGES[name][2]
+    return f"{value:.0f} {unit}" if unit == "deg" else f"{value:.2f} {unit}".rstrip()
+
+
+def _settled_s(gait: Mapping[str, float]) -> float:
+    """When the phases have settled: three oscillators pull one another straight at three times the coupling's rate."""
+    coupling_per_s = gait.get("coupling_per_s", COUPLING_PER_S)
+    return _SETTLED / (3.0 * coupling_per_s) if coupling_per_s > 0.0 else np.inf
+
+
+def _vacuum_s(falls_s: np.ndarray, rises_s: np.ndarray) -> np.ndarray:
+    """How long each vacuum lasted that the record shows whole."""
+    after = np.searchsorted(rises_s, falls_s)
+    whole = after < len(rises_s)
+    return rises_s[after[whole]] - falls_s[whole]
+
+
+def _ahead(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarray:
+    """By how many turns each fall, where a phase begins, is ahead of the body's next; near to one another."""
+    if not len(falls_s) or not len(body_s):
+        return np.zeros(0)
+    next_one = np.minimum(np.searchsorted(body_s, falls_s), len(body_s) - 1)
+    turns = (body_s[next_one] - falls_s) / period_s
+    return turns[0] + _wrapped(turns - turns[0])
+
+
+def _agreed(values: np.ndarray, tolerance: float) -> float | None:
+    """The median, where two of the values at least agree with it: a start or an end may have made the others."""
+    if len(values) < 2:
+        return None
+    middle = float(np.median(values))
+    return middle if np.sum(np.abs(values - middle) <= tolerance) >= 2 else None
+
+
+def _wrapped(turns):
+    """Turns in -0.5 to 0.5."""
+    return (turns + 0.5) % 1.0 - 0.5

@@ -1,0 +1,33 @@
+"""How far a quantity goes with a valve's command: it tells signs, mirrors and swaps without a model of the robot.
+
+A chamber fills while its command is 1 and empties while it is 0, so that over its own command's spans its pressure goes
+the whole way up and down; over another chamber's it goes less far, and what has its sign turned goes the other way.
+"""
+
+import numpy as np
+
+
+def swing(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float | None:
+    """By how much `values` rise while the command is 1 and fall while it is 0: the mean over spans between switches.
+
+    All of shape (samples,). Whole cycles count, freed from their steady drift (a robot that slides down a slope). None
+    where the command never switches.
+    """
+    at = np.flatnonzero(np.diff(command))
+    if not at.size:
+        return None
+    if at.size == 1:
+        at = np.append(at, len(command) - 1)
+    whole = (at.size - 1) // 2 * 2
+    drift = 0.0
+    if whole:
+        at = at[: whole + 1]
+        drift = (values[at[-1]] - values[at[0]]) / (time_s[at[-1]] - time_s[at[0]])
+    change = np.diff(values[at]) - drift * np.diff(time_s[at])
+    return float(np.mean(np.where(command[at[:-1] + 1] > 0.5, change, -change)))
+
+
+def follow(command: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> float | None:
+    """`swing` as a share of the values' range, -1 to 1; None where command or values never change."""
+    span, gone = float(np.ptp(values)), swing(command, values, time_s)
+    return None if gone is None or span == 0.0 else gone / span

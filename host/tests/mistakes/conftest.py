@@ -1,0 +1,20 @@
+import pytest
+
+from .days import drawn
+
+
+@pytest.fixture(scope="package")
+def day(tmp_path_factory):
+    """A sound day, with an effect in it that moves everything: friction unlike each way, walks that slide."""
+    return drawn(tmp_path_factory.mktemp("days"), 3, effect="inclination")
+
+
+@pytest.fixture(scope="package")
+def foreign_day(tmp_path_factory):
+    """A sound day of a robot that shares no formula with the model."""
+    return drawn(tmp_path_factory.mktemp("days"), 4, "foreign", "hysteresis")
+
+
+@pytest.fixture(params=["own", "foreign"])
+def any_day(request, day, foreign_day):
+    return day if request.param == "own" else foreign_day

@@ -1,0 +1,64 @@
+"""Days in the lab from robots that are drawn, and the mistakes that are made with their data."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bifa.data import Dataset, Trial, read_dataset
+from bifa.mistakes import find_mistakes
+from virtual_robot import sealed
+from virtual_robot.truths import foreign
+
+Change = Callable[[Trial], Trial]
+
+
+def drawn(folder: Path, seed: int, truth: str = "own", effect: str | None = None, size: float = 1.5) -> Dataset:
+    """A sealed day with `effect` at so many times its modest size; without one, none."""
+    out = folder / f"{truth}_{effect}_{seed}"
+    if truth == "foreign":
+        kind, form = ("one" if effect else "none"), None
+        foreign.generate(seed, out, kind, effect, size if effect else None, form, out.with_suffix(".sealed.toml"))
+    else:
+        sealed.generate(seed, out, "single" if effect else "none", effect, size)
+    return read_dataset(out)
+
+
+def mistaken(day: Dataset, file: str, change: Change) -> Dataset:
+    """The day with one trial changed."""
+    return replace(day, trials=tuple(change(trial) if trial.file == file else trial for trial in day.trials))
+
+
+def said(day: Dataset) -> list[tuple[str, str | None]]:
+    """Kind and file of all that is found in it."""
+    return [(found.kind, found.file) for found in find_mistakes(day)]
+
+
+def with_columns(trial: Trial, **columns: np.ndarray) -> Trial:
+    return replace(trial, columns=trial.columns | columns)
+
+
+def turned(*names: str) -> Change:
+    """The sign of these columns turned, of those that the trial has."""
+    return lambda trial: with_columns(trial, **{n: -trial.columns[n] for n in names if n in trial.columns})
+
+
+def exchanged(one: str, other: str) -> Change:
+    """The names of two columns exchanged."""
+    return lambda trial: with_columns(trial, **{one: trial.columns[other], other: trial.columns[one]})
+
+
+def inverted(trial: Trial) -> Trial:
+    """0 written for positive, 1 for vacuum."""
+    return with_columns(trial, **{n: 1 - v for n, v in trial.columns.items() if n.startswith("command")})
+
+
+def head_only(trial: Trial) -> Trial:
+    """Of a walk the tail was not tracked."""
+    return replace(trial, columns={n: v for n, v in trial.columns.items() if n != "displacement_tail_mm"})
+
+
+def told(**gait: float) -> Change:
+    """Another gait in dataset.toml."""
+    return lambda trial: replace(trial, gait=trial.gait | gait)

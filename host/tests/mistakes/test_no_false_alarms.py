@@ -1,0 +1,91 @@
+"""Strong effects, foreign robots, instruments with clocks of their own, any gait: none of it passes for a mistake."""
+
+import numpy as np
+import pytest
+from independent_lab import Lab as IndependentLab
+from independent_lab import session
+
+from bench.sealed_campaign import generate
+from bifa.data import Trial, read_dataset
+from bifa.measure.plan import BRISK, PlannedTrial
+from bifa.mistakes import find_mistakes, mistakes_in
+from virtual_robot.effects import EFFECTS, plant_parameters
+from virtual_robot.gait import Gait
+from virtual_robot.sealed import specimen
+from virtual_robot.trials import Lab, Plan
+from virtual_robot.truths.foreign.effects import EFFECTS as FOREIGN_EFFECTS
+
+from .days import drawn, head_only
+
+STRONG = ["sensor_calibration", "backlash", "leak", "choked_flow", "pump_fade"]  # slides: the fixture `day`
+
+
+def assert_nothing_is_found(day):
+    assert [str(found) for found in find_mistakes(day)] == []
+
+
+@pytest.mark.parametrize("effect", STRONG)
+def test_a_strong_effect_is_no_mistake(tmp_path, effect):
+    assert_nothing_is_found(drawn(tmp_path, STRONG.index(effect) + 21, effect=effect))
+
+
+@pytest.mark.parametrize("effect", ["warm_air", "converter_crosstalk"])
+def test_a_foreign_robot_is_no_mistake(tmp_path, effect):
+    assert_nothing_is_found(drawn(tmp_path, 31, "foreign", effect))
+
+
+def test_another_laboratory_with_coloured_noise_makes_none(tmp_path):
+    assert_nothing_is_found(session(IndependentLab().with_seed(1), tmp_path))
+
+
+def test_days_from_which_the_mistakes_of_these_tests_are_made_have_none(any_day):
+    assert_nothing_is_found(any_day)
+
+
+@pytest.mark.uno
+def test_a_day_measured_through_the_firmware_has_none(tmp_path):
+    plan = [
+        PlannedTrial("static_loading", "small", 8.0, 20.0),
+        PlannedTrial("step_response", "small", 8.5),
+        PlannedTrial("anchor_pull", None, 5.0, 20.0),
+        PlannedTrial("locomotion", gait=BRISK, cycles=3),
+    ]
+    generate(7, tmp_path / "day", effect="choked_flow", size=1.5, trials=plan)
+    assert_nothing_is_found(read_dataset(tmp_path / "day"))
+
+
+def any_walk(seed: int) -> Trial:
+    """A walk of any gait on a robot with any effect, at up to three times its modest size."""
+    random = np.random.default_rng(seed)
+    parameters, curves = specimen(random)
+    effect = str(random.choice(list(EFFECTS)))
+    inside = {effect: EFFECTS[effect].at(float(random.uniform(0.5, 3.0)), random)}
+    period_s = float(np.exp(random.uniform(np.log(0.6), np.log(8.0))))
+    gait = Gait(period_s, *random.uniform(0.0, 360.0, 2).tolist(), *random.uniform(0.15, 0.85, 3).tolist())
+    plan = Plan("locomotion", "walk", gait=gait, cycles=int(random.integers(3, 7)))
+    columns = Lab(parameters | plant_parameters(inside), curves).run(plan, 0.5, random)
+    return Trial("walk_1.csv", columns=columns, **plan.entry())
+
+
+def assert_walks_have_none(seeds):
+    for seed in seeds:
+        walk = any_walk(seed)
+        for seen in (walk, head_only(walk)):
+            assert [(seed, str(found)) for found in mistakes_in(seen)] == []
+
+
+def test_no_gait_is_a_mistake():
+    assert_walks_have_none(range(40))
+
+
+@pytest.mark.soak
+def test_no_gait_of_a_thousand_is_a_mistake():
+    assert_walks_have_none(range(1000))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    ("truth", "effect"), [*(("own", name) for name in EFFECTS), *(("foreign", name) for name in FOREIGN_EFFECTS)]
+)
+def test_no_effect_is_a_mistake(tmp_path, truth, effect):
+    assert_nothing_is_found(drawn(tmp_path, 200, truth, effect))

@@ -1,0 +1,82 @@
+"""A repeat that was none is found; a lab's ordinary scatter is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bifa.data import Trial
+from bifa.mistakes import find_mistakes
+
+from .days import mistaken, said, with_columns
+
+
+def recorded_as(day, other: str):
+    """Another trial's record under this one's name."""
+    columns = next(trial.columns for trial in day.trials if trial.file == other)
+    return lambda trial: replace(trial, columns=columns)
+
+
+def scaled(factor: float, *names: str):
+    return lambda trial: with_columns(trial, **{name: factor * trial.columns[name] for name in names})
+
+
+@pytest.mark.parametrize(
+    ("file", "other"),
+    [
+        ("static_large_4psi_2mm_s_2.csv", "static_large_8.5psi_2mm_s_2.csv"),
+        ("static_large_0psi_2mm_s_3.csv", "static_small_0psi_2mm_s_3.csv"),
+        ("step_small_8.5psi_1.csv", "step_large_8.5psi_1.csv"),
+        ("anchor_8.5psi_2.csv", "anchor_0psi_2.csv"),
+    ],
+)
+def test_what_was_mounted_or_set_otherwise_is_named(day, file, other):
+    assert said(mistaken(day, file, recorded_as(day, other))) == [("repeat", file)]
+
+
+def test_another_scale_of_the_camera_is_named_with_how_much_it_makes(any_day):
+    file = "walk_baseline_2.csv"
+    (found,) = find_mistakes(mistaken(any_day, file, scaled(1.3, "displacement_head_mm", "displacement_tail_mm")))
+    assert (found.kind, found.file) == ("repeat", file)
+    assert "repeat 2 of walk, period 5.7 s differs from the others by 1" in str(found)
+    assert "mm (RMS)" in str(found)
+
+
+def late(samples: int):
+    """Recording began so much later."""
+    return lambda trial: replace(trial, columns={name: values[samples:] for name, values in trial.columns.items()})
+
+
+def test_when_a_recording_was_started_makes_no_difference(day):
+    changed = mistaken(day, "step_large_8.5psi_2.csv", late(30))
+    assert said(mistaken(changed, "static_large_0psi_2mm_s_1.csv", late(90))) == []
+
+
+def test_of_two_repeats_nobody_knows_which_is_the_odd_one(day):
+    pair = replace(day, trials=tuple(trial for trial in day.trials if trial.repeat < 3))
+    assert said(pair) == []
+    wrong = mistaken(pair, "step_small_8.5psi_1.csv", recorded_as(day, "step_large_8.5psi_1.csv"))
+    (found,) = find_mistakes(wrong)
+    assert (found.kind, found.file) == ("repeat", None)
+    assert "step_small_8.5psi_1.csv and step_small_8.5psi_2.csv differ by" in str(found)
+
+
+def test_the_only_condition_of_an_experiment_is_compared_too(day):
+    alone = replace(day, trials=tuple(trial for trial in day.trials if trial.file.startswith("anchor_8.5")))
+    assert said(mistaken(alone, "anchor_8.5psi_2.csv", scaled(1.5, "force_N"))) == [("repeat", "anchor_8.5psi_2.csv")]
+
+
+def test_a_lab_with_much_scatter_has_no_odd_repeats(day):
+    random = np.random.default_rng(1)
+    trials = [scaled(float(np.exp(0.15 * random.standard_normal())), "force_N")(t) for t in day.of("static_loading")]
+    assert said(replace(day, trials=tuple(trials))) == []
+
+
+def slid(trial: Trial) -> Trial:
+    way_mm = 20.0 * trial.time_s
+    ends = ("displacement_head_mm", "displacement_tail_mm")
+    return with_columns(trial, **{name: trial.columns[name] - way_mm for name in ends})
+
+
+def test_a_walk_that_ends_elsewhere_is_no_odd_repeat(day):
+    assert said(mistaken(day, "walk_easy_2.csv", slid)) == []

@@ -1,0 +1,102 @@
+"""Mirrored cameras, exchanged tubes and columns, and gaits that were not walked."""
+
+import pytest
+
+from bifa.mistakes import find_mistakes
+from bifa.robot.cpg import CHAMBERS
+
+from .days import exchanged, head_only, inverted, mistaken, said, told, turned
+
+DISPLACEMENTS = ("displacement_head_mm", "displacement_tail_mm")
+PAIRS = [("body", "head"), ("head", "tail"), ("body", "tail")]
+
+
+def test_a_camera_whose_axis_points_backwards(any_day):
+    for trial in any_day.of("locomotion"):
+        assert said(mistaken(any_day, trial.file, turned(*DISPLACEMENTS))) == [("mirrored", trial.file)]
+
+
+def test_a_camera_that_tracks_the_head_only(any_day):
+    for trial in any_day.of("locomotion"):
+        wrong = mistaken(any_day, trial.file, lambda t: head_only(turned("displacement_head_mm")(t)))
+        assert said(wrong) == [("mirrored", trial.file)]
+
+
+def test_head_and_tail_exchanged(any_day):
+    for trial in any_day.of("locomotion"):
+        assert said(mistaken(any_day, trial.file, exchanged(*DISPLACEMENTS))) == [("mirrored", trial.file)]
+
+
+@pytest.mark.parametrize("chambers", [("body",), ("tail",), CHAMBERS], ids=str)
+def test_pressures_of_the_wrong_sign(any_day, chambers):
+    columns = [f"pressure_{chamber}_psi" for chamber in chambers]
+    for trial in any_day.of("locomotion"):
+        (found,) = find_mistakes(mistaken(any_day, trial.file, turned(*columns)))
+        assert (found.kind, found.file, found.column) == ("sign", trial.file, ", ".join(columns))
+
+
+def test_commands_written_the_other_way_round(any_day):
+    for trial in any_day.of("locomotion"):
+        (found,) = find_mistakes(mistaken(any_day, trial.file, inverted))
+        assert (found.kind, found.file) == ("sign", trial.file)
+        assert "1 is positive pressure, 0 vacuum; exchange them in all three columns" in str(found)
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=str)
+def test_exchanged_commands_are_told_from_exchanged_pressures_by_the_gait(any_day, pair):
+    names = " and ".join(pair)
+    for trial in any_day.of("locomotion"):
+        for columns, words in (
+            ("command_{}", f"the command columns of {names} are exchanged, as the gait says too"),
+            ("pressure_{}_psi", f"the pressures' columns, sensors or tubes of {names} are exchanged"),
+        ):
+            change = exchanged(*(columns.format(chamber) for chamber in pair))
+            (found,) = find_mistakes(mistaken(any_day, trial.file, change))
+            assert (found.kind, found.file) == ("swapped", trial.file)
+            assert words in str(found)
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [{"period_s": 5.9}, {"psi12_deg": 295.0}, {"duty_head": 0.58}, {"period_s": 60.0, "duty_tail": 0.2}],
+    ids=str,
+)
+def test_a_gait_that_was_not_walked(any_day, gait):
+    (found,) = find_mistakes(mistaken(any_day, "walk_baseline_2.csv", told(**gait)))
+    assert (found.kind, found.file) == ("gait", "walk_baseline_2.csv")
+    assert all(f"{name} = " in str(found) for name in gait)
+
+
+def test_a_rounded_gait_and_an_uncertain_clock_are_none(any_day):
+    near = told(period_s=5.65, psi12_deg=262.0, psi13_deg=98.0, duty_body=0.52, duty_head=0.48)
+    assert said(mistaken(any_day, "walk_baseline_2.csv", near)) == []
+
+
+def test_the_walk_whose_gait_it_is_is_named(day):
+    easy = next(trial for trial in day.trials if trial.file == "walk_easy_1.csv")
+    (found,) = find_mistakes(mistaken(day, "walk_baseline_2.csv", told(**easy.gait)))
+    assert "period_s = 5.70 s, psi12_deg = 270 deg, psi13_deg = 90 deg" in str(found)
+    assert "that is the gait of walk_baseline_1.csv; does dataset.toml name the right file?" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("gait", "cause"),
+    [
+        ({"psi12_deg": 120.0, "psi13_deg": 300.0}, "a phase is how far head and tail are ahead of the body"),
+        ({"duty_body": 0.44}, "a duty is the part of the cycle at vacuum"),
+        ({"period_s": 3.0}, "another gait was walked than dataset.toml says"),
+    ],
+)
+def test_a_likely_cause_is_named(day, gait, cause):
+    walks = [f"walk_leisurely_{repeat}.csv" for repeat in (1, 2, 3)]
+    wrong = day
+    for file in walks:
+        wrong = mistaken(wrong, file, told(**gait))
+    found = find_mistakes(wrong)
+    assert [finding.file for finding in found] == walks
+    assert all(cause in str(finding) for finding in found)
+
+
+def test_phases_that_no_coupling_settles_contradict_nothing(day):
+    uncoupled = told(coupling_per_s=0.0, psi12_deg=10.0)
+    assert said(mistaken(day, "walk_baseline_2.csv", uncoupled)) == []
