@@ -19,6 +19,7 @@ from bifa.measure.own_instruments import STOP, OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import idle
 from bifa.measure.sketch import sketch
+from bifa.mistakes import mistakes_in
 
 RAW = "raw"  # folder in a data set: the instruments' files as they came
 _REPEAT = ("r", "repeat")
@@ -67,7 +68,7 @@ class ByHand:
     def _accepted(self, rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
         for line in sketch(trial, self._plain):
             self._desk.say(line)
-        wrong = [str(finding) for finding in check_trial(trial)]
+        wrong = [str(finding) for finding in [*check_trial(trial), *mistakes_in(trial)]]
         if misfit := misfit_of(trial, writer.trials):
             wrong.append(misfit)
         seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."

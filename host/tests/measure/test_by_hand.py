@@ -105,6 +105,12 @@ def test_what_looks_wrong_is_said_and_the_trial_repeated_on_request(bench, tmp_p
     assert np.ptp(dataset.trials[0].columns["force_N"]) > 1.0
 
 
+def test_what_seems_to_be_a_mistake_is_said_while_it_can_be_put_right(bench, tmp_path):
+    here = bench(spoil=lambda asked, record: record | {"force_N": -record["force_N"]})
+    here.run(tmp_path / "day", (PULL,))
+    assert "where a resistance is positive: does the load cell count the other way?" in "\n".join(here.said)
+
+
 def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_path):
     here = bench()
     save, tries = here.lab._save, []
