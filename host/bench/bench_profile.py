@@ -1,5 +1,5 @@
-"""Where the time of a diagnosis goes: of the case with one effect in `bench_diagnosis`, by what it says that it does,
-and how much of a fit is the compiled kernel.
+"""Where the time of a diagnosis goes, by what it says that it does: of the cases of `bench_diagnosis` with one effect
+and with one that nothing explains; and how much of a fit is the compiled kernel.
 
 Processor seconds are of all processes; the clock says something on an idle machine only.
 """
@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-_CASE = "diagnosis"
+_CASES = {"diagnosis": "one effect", "diagnosis_unexplained": "nothing explains them"}
 _LIBRARY_WORDS = {"+", "nothing"}
 _LITTLE_S = 0.1
 
@@ -38,28 +38,41 @@ class _Stages:
 
 
 def run() -> dict[str, float]:
-    """Print the stages of a diagnosis and the kernel's share of a fit; returns the figures flat."""
+    """Print the stages of each diagnosis and the kernel's share of a fit; returns the figures flat."""
     from bench.bench_diagnosis import CASES, SEED
 
-    drawn = next(case.drawn for case in CASES if case.key == _CASE)
+    drawn = {case.key: case.drawn for case in CASES}
+    figures: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) / _CASE
-        sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(SEED), "--out", str(folder), *drawn]
-        subprocess.run(sealed, check=True)
-        stages, share = _diagnosed(folder), _kernel_share(folder)
-    print(f"{'45 trials, one effect':52}{'clock':>8}{'processor':>11}{'cores':>7}")
+        for key, what in _CASES.items():
+            folder = Path(scratch) / key
+            sealed = ["-m", "virtual_robot.sealed", "--seed", str(SEED), "--out", str(folder), *drawn[key]]
+            subprocess.run([sys.executable, *sealed], check=True)
+            figures |= _told(what, key.replace("diagnosis", "profile"), _diagnosed(folder))
+        share = _kernel_share(Path(scratch) / "diagnosis")
+    print(f"of the base fit's processor time, on one thread, {share:.0%} is the compiled kernel")
+    return figures | {"profile_kernel_share_of_fit": share}
+
+
+def _told(what: str, key: str, stages: _Stages) -> dict[str, float]:
+    """Print a table of stages; its figures, their names beginning with `key`."""
+    print(f"{f'45 trials, {what}':52}{'clock':>8}{'processor':>11}{'cores':>7}")
     for stage, clock in stages.clock.items():
         if clock > _LITTLE_S:
-            used = stages.processor[stage]
-            print(f"{stage:52}{clock:7.1f}s{used:10.1f}s{used / clock:7.1f}")
+            _print_row(stage, clock, stages.processor[stage])
     clock, used = sum(stages.clock.values()), sum(stages.processor.values())
-    print(f"{'in all, without starting Python':52}{clock:7.1f}s{used:10.1f}s{used / clock:7.1f}")
-    print(f"of the base fit's processor time, on one thread, {share:.0%} is the compiled kernel")
-    return {
-        **{f"profile_{stage.replace(' ', '_')}_processor_seconds": used for stage, used in stages.processor.items()},
-        "profile_cores_busy": used / clock,
-        "profile_kernel_share_of_fit": share,
-    }
+    _print_row("in all, without starting Python", clock, used)
+    print(flush=True)
+    each = {f"{key}_{_word(stage)}_processor_seconds": used for stage, used in stages.processor.items()}
+    return each | {f"{key}_cores_busy": used / clock}
+
+
+def _print_row(stage: str, clock: float, used: float) -> None:
+    print(f"{stage:52}{clock:7.1f}s{used:10.1f}s{used / clock:7.1f}")
+
+
+def _word(stage: str) -> str:
+    return stage.replace(",", "").replace(" ", "_")
 
 
 def _diagnosed(folder: Path) -> _Stages:
