@@ -38,7 +38,7 @@ def check_known(known: Mapping[str, float]) -> Iterator[Finding]:
     for name, value in known.items():
         if name not in BASE_PARAMETERS:
             near = get_close_matches(name, BASE_PARAMETERS, 1)
-            meant = f"; is it {near[0]}?" if near else f"; it has {', '.join(BASE_PARAMETERS)}"
+            meant = f"; is it {near[0]}?" if near else f"; it has {', '.join(BASE_PARAMETERS)}."
             text = f"the model has no parameter {printable(name)}{meant} A fit refuses it"
             yield Finding("known", text, TABLE_FILE, column="[known]")
         elif not (exchanged and name in _SUPPLIES) and (cause := _cause(BASE_PARAMETERS[name], value)):
