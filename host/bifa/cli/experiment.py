@@ -57,6 +57,9 @@ def experiment(
     telemetry: Annotated[
         Path | None, typer.Option(help="The Uno's telemetry from the same time (bifa record).", exists=True)
     ] = None,
+    add: Annotated[
+        bool, typer.Option("--add", help="With --instrument: to the data set OUT, as the next repeat of its condition.")
+    ] = False,
 ) -> None:
     """Run a characterisation experiment and write the measurements as a data set.
 
@@ -69,6 +72,8 @@ def experiment(
     from bifa.files import check_targets
     from bifa.rig import check_port
 
+    if add and instrument is None:
+        raise typer.BadParameter("--add goes with --instrument; a session with a rig is resumed by the same command")
     check_targets(folders=(out,))
     check_port(port)
 
@@ -80,7 +85,8 @@ def experiment(
     from bifa.screen import Console
 
     console = Console()
-    refuse_existing(out)
+    if not add:
+        refuse_existing(out)
     for psi in pressure or []:
         _check_within("--pressure", psi, *RANGES["pressure_psi"])
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
@@ -97,7 +103,7 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(console, instrument, telemetry, _only(trials), out, parse_known(known))
+        _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add)
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {_kept(out)}; run the same command to resume"):
@@ -187,14 +193,14 @@ def _only(trials):
     return first[0]
 
 
-def _import(console, instrument, telemetry, planned, out, known) -> None:
+def _import(console, instrument, telemetry, planned, out, known, add) -> None:
     from bifa.measure.instrument_csv import import_trial
 
     if telemetry is None:
         raise typer.BadParameter(
             "--instrument needs --telemetry: the Uno's record of the same time, from `bifa record`"
         )
-    dataset, clock = import_trial(instrument, telemetry, planned, out, known)
+    dataset, clock = import_trial(instrument, telemetry, planned, out, known, add=add)
     trial = dataset.trials[-1]
     console.print(
         f"{out}: {trial.file}, {len(trial.time_s)} samples; synchronised over {clock.edges} edges to "

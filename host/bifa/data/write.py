@@ -4,6 +4,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from .layout import FORMAT, SETTINGS, TABLE_FILE
 from .read import read_dataset
 
 PARTIAL_SUFFIX = ".partial"
+_PROBE = ".probe."  # where a trial is written and read again before it counts
 
 
 def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
@@ -100,33 +102,32 @@ class DatasetWriter:
         """Record one more trial. On an error nothing of it stays."""
         if self.has(trial) or any(old.file == trial.file for old in self.trials):
             raise DatasetError(f"{trial.file}: this trial is already recorded in {self.partial}")
-        grown = Dataset(
-            self.partial,
-            self._dataset.name,
-            self._dataset.known,
-            (*self.trials, trial),
-            self._dataset.provenance,
-        )
-        alone = Dataset(None, grown.name, grown.known, (trial,), grown.provenance)
-        probe = self.partial / f".probe.{secrets.token_hex(4)}"
-        write_dataset(probe, alone)
-        try:
-            target = self.partial / trial.file
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(probe / trial.file, target)
-            _write_toml(self.partial, grown)
-        finally:
-            shutil.rmtree(probe, ignore_errors=True)
-        self._dataset = grown
+        self._dataset = add_trial(self._dataset, trial)
 
     def finish(self) -> Dataset:
         """Give the data set its name; returns it as read back from disk."""
         refuse_existing(self.folder)
-        for stray in self.partial.glob(".probe.*"):
+        for stray in self.partial.glob(f"{_PROBE}*"):
             shutil.rmtree(stray)
         read_dataset(self.partial)
         _publish(self.partial, self.folder)
         return read_dataset(self.folder)
+
+
+def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
+    """Add one trial to a data set on disk; returns the larger one. On an error nothing of it is listed. Raises
+    DatasetError where it breaks the format."""
+    grown = replace(dataset, trials=(*dataset.trials, trial))
+    probe = dataset.path / f"{_PROBE}{secrets.token_hex(4)}"
+    write_dataset(probe, replace(dataset, path=None, trials=(trial,)))
+    try:
+        target = dataset.path / trial.file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(probe / trial.file, target)
+        _write_toml(dataset.path, grown)
+    finally:
+        shutil.rmtree(probe, ignore_errors=True)
+    return grown
 
 
 def refuse_existing(folder: Path) -> None:

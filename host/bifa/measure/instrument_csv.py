@@ -12,11 +12,14 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from bifa.data import Dataset, read_dataset, write_dataset
+from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
+from bifa.data.layout import TABLE_FILE
+from bifa.data.write import add_trial
 from bifa.errors import BifaError
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, align, align_after_restart, resampled
@@ -34,23 +37,54 @@ class InstrumentFileError(BifaError):
 
 
 def import_trial(
-    instrument: Path, telemetry: Path, planned: PlannedTrial, folder: Path, known: Mapping[str, float] | None = None
+    instrument: Path,
+    telemetry: Path,
+    planned: PlannedTrial,
+    folder: Path,
+    known: Mapping[str, float] | None = None,
+    *,
+    add: bool = False,
 ) -> tuple[Dataset, ClockLine]:
-    """Write a data set of one trial, `planned`, from an instrument's CSV and the folder or file of telemetry.
+    """Write a data set of one trial, `planned`, from an instrument's CSV and the folder or file of telemetry; or `add`
+    it to the data set that there is, as the next repeat of its condition.
 
     known: what was measured directly (`bifa.measure.known`).
 
-    Raises InstrumentFileError where a column is missing, the two do not overlap or their clocks do not line up,
-    DatasetError where `folder` exists.
+    Raises InstrumentFileError where a column is missing, the two do not overlap, their clocks do not line up, or the
+    data set has this record already; DatasetError where `folder` exists, or is no data set to be added to.
     """
+    recorded = _added_to(folder, known) if add else None
     measured, edges = read_instrument(instrument, CHANNELS[planned.experiment])
     uno = read_columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
     columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
     trial = planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S})
-    name = f"{planned.experiment} from {instrument.name}"
-    return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
+    if recorded is None:
+        name = f"{planned.experiment} from {instrument.name}"
+        return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
+    trial = _next_repeat(recorded, planned, trial, instrument)
+    return read_dataset(add_trial(recorded, trial).path), clock
+
+
+def _added_to(folder: Path, known: Mapping[str, float] | None) -> Dataset:
+    recorded = read_dataset(folder)
+    if known and dict(known) != recorded.known:
+        problem = f"[known] has {recorded.known}, --known {dict(known)}: correct [known], or leave --known out"
+        raise DatasetError(problem, file=str(folder / TABLE_FILE))
+    return recorded
+
+
+def _next_repeat(recorded: Dataset, planned: PlannedTrial, trial: Trial, instrument: Path) -> Trial:
+    """`trial` under the first number and file name that are free."""
+    for old in recorded.trials:
+        if all(np.array_equal(old.columns.get(name), values) for name, values in trial.columns.items()):
+            raise InstrumentFileError(f"{instrument} is in {recorded.path} already, as {old.file}")
+    alike = [old.repeat for old in recorded.trials if old.condition == trial.condition]
+    planned = replace(planned, repeat=1 + max(alike, default=0))
+    if (recorded.path / planned.file).exists():
+        raise InstrumentFileError(f"{recorded.path / planned.file} is in the way: it is not listed in {TABLE_FILE}")
+    return replace(trial, file=planned.file, repeat=planned.repeat)
 
 
 def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np.ndarray], np.ndarray]:

@@ -1,8 +1,11 @@
 """A lab's own instrument: its CSV lined up with the Uno's telemetry, and every way in which that can fail."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import MARK_PAUSE
 from bifa.measure.instrument_csv import InstrumentFileError, import_trial
@@ -60,6 +63,46 @@ def test_the_two_records_are_brought_onto_one_clock(files):
     dropped = trial.time_s[np.flatnonzero(trial.columns["pressure_psi"] < 8.0)[0]]
     assert dropped - began == pytest.approx(1.0, abs=0.021)  # one sample of the machine
     assert trial.extra["clock_error_s"] < 1e-4
+
+
+def another(files, name, shift_mm):
+    """The pull once more, by another record."""
+    header, *rows = (files / "pull.csv").read_text().splitlines()
+    moved = [row.split(",") for row in rows]
+    text = [f"{time_s},{float(mm) + shift_mm},{force}" for time_s, mm, force in moved]
+    (files / f"{name}.csv").write_text("\n".join([header, *text]))
+    (files / f"{name}.sync.csv").write_text((files / "pull.sync.csv").read_text())
+    return files / f"{name}.csv"
+
+
+def test_further_records_are_added_as_repeats_of_their_conditions(files):
+    folder = files / "out"
+    import_trial(files / "pull.csv", files, PULL, folder, {"supply_positive_psi": 8.5})
+    import_trial(another(files, "second", 0.1), files, PULL, folder, add=True)
+    other = replace(PULL, rate_mm_s=10.0)
+    dataset, _ = import_trial(another(files, "third", 0.2), files, other, folder, add=True)
+    assert [(trial.rate_mm_s, trial.repeat) for trial in dataset.trials] == [(20.0, 1), (20.0, 2), (10.0, 1)]
+    assert dataset.known == {"supply_positive_psi": 8.5}
+    assert dataset.trials[1].columns["displacement_mm"][0] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_what_is_refused_when_it_is_added_changes_nothing(files):
+    folder = files / "out"
+    with pytest.raises(BifaError, match="dataset"):
+        import_trial(files / "pull.csv", files, PULL, folder, add=True)
+    assert not folder.exists()
+    import_trial(files / "pull.csv", files, PULL, folder)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(InstrumentFileError, match=r"already, as anchor_8\.5psi_20mm_s_1\.csv"):
+        import_trial(files / "pull.csv", files, PULL, folder, add=True)
+    second = another(files, "second", 0.1)
+    with pytest.raises(BifaError, match=r"dataset\.toml.*--known"):
+        import_trial(second, files, PULL, folder, {"supply_positive_psi": 8.0}, add=True)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    (folder / "anchor_8.5psi_20mm_s_2.csv").write_text("mine")
+    with pytest.raises(InstrumentFileError, match="in the way"):
+        import_trial(second, files, PULL, folder, add=True)
+    assert (folder / "anchor_8.5psi_20mm_s_2.csv").read_text() == "mine"
 
 
 @pytest.mark.parametrize("files", ["marked"], indirect=True)
