@@ -16,7 +16,7 @@ from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, best_of, evaluate_on, renewed, spread_starts, starting_point
 from lacuna.estimation.graduated import solve_graduated
-from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
@@ -27,6 +27,7 @@ _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
 _ABSURD = 10.0  # times the parent's cost: of a size that begins beyond, nothing is to be hoped
 _PROFILED_FURTHER = 2  # sizes, of those after one step, that get the rest of the steps
+LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
 _ELSEWHERE = 2  # further sizes that a refit is begun at
@@ -113,6 +114,13 @@ def _outside(parameter: Parameter, value: float) -> float:
 
 def judge(fitted: Fit, split: Split, near: Fit | None = None) -> Candidate:
     return Candidate(fitted, evaluate_on(fitted, split.judging, near=near))
+
+
+def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
+    """The floor as the repeats show it once a better explanation has taken its share of what differs between runs."""
+    residuals = candidate.fitted.residuals() | candidate.checked.residuals()
+    system = candidate.fitted.structure.system
+    return floor.lowered_by(estimate_noise(system, split.known, residuals))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,15 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-from lacuna.diagnosis.candidate import Candidate, helps_at_once, judge, profiles, sketches
+from lacuna.diagnosis.candidate import (
+    LOWER,
+    Candidate,
+    helps_at_once,
+    judge,
+    profiles,
+    sharpened_floor,
+    sketches,
+)
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
@@ -14,11 +22,12 @@ from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_di
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, foreseen, refit_on, released, renewed, spread_starts
 from lacuna.estimation.intervals import intervals
-from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
 from lacuna.estimation.structure import Structure
 from lacuna.system import System
 
+_SHARPENED = 5  # times at most
 _ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another follows, and one that is reported
 _HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away,
 _DOUBTFUL = 1.5  # and no last digits of it so much
@@ -54,9 +63,26 @@ class Case:
         first = fit(structure, split.fit, floor, starts=vectors, max_iterations=30, relative=_ROUGH, graduated=True)
         residuals = first.residuals() | evaluate_on(first, split.judging).residuals()
         sharper = floor.lowered_by(estimate_noise(self.system, split.fit + split.judging, residuals))
-        again = fit(structure, split.fit, sharper, starts=[first.solution.point.values], relative=_FINE)
+        return self._again(first, sharper)
+
+    def _again(self, fitted: Fit, floor: NoiseFloor) -> Fit:
+        """The same explanation fitted to the end against another floor."""
+        starts = [fitted.solution.point.values]
+        again = fit(fitted.structure, self.split.fit, floor, starts=starts, relative=_FINE)
         solution = renewed(again.problem, again.solution, relative=_FINE)
-        return Fit(again.problem, solution, first.starts, first.starts_agreeing)
+        return Fit(again.problem, solution, fitted.starts, fitted.starts_agreeing)
+
+    def sharply(self, candidate: Candidate) -> Candidate:
+        """The same against the floor that its own residuals show, for as long as that falls and the explanation
+        suffices. What differs from run to run by more than the noise (a nuisance) is in the first floor, and holds the
+        nuisances where they are expected, so that the next floor still has some of it: nothing would stand out."""
+        for _ in range(_SHARPENED):
+            floor = candidate.fitted.problem.floor
+            lower = sharpened_floor(candidate, self.split, floor)
+            if not self.suffices(candidate) or lower.share_of(floor) >= LOWER:
+                break
+            candidate = self.judge(self._again(candidate.fitted, lower))
+        return candidate
 
     def judge(self, fitted: Fit) -> Candidate:
         return judge(fitted, self.split)

@@ -204,6 +204,7 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
     if case.may_be_lost(first):
         crew.say("fitting the base model from elsewhere, too")
         first = finished_afresh(first, case.split, case.seed, crew)
+    first = case.sharply(first)
     if case.suffices(first):
         floor = first.fitted.problem.floor
         return Search(first, floor, (first,), tuple(screen(first.fitted, case.split, floor))), False

@@ -9,6 +9,7 @@ import numpy as np
 
 from lacuna.diagnosis.anew import Anew
 from lacuna.diagnosis.candidate import (
+    LOWER,
     Candidate,
     Profile,
     finish,
@@ -17,6 +18,7 @@ from lacuna.diagnosis.candidate import (
     from_initial_guess,
     judge,
     profiles,
+    sharpened_floor,
     sketches,
 )
 from lacuna.diagnosis.case import Case
@@ -27,7 +29,7 @@ from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, reweigh
-from lacuna.estimation.noise import NoiseFloor, estimate_noise
+from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
@@ -39,7 +41,6 @@ _FROM_INITIAL_GUESS = {1: 4, 2: 1, 3: 1}  # the most promising of these from the
 _FINISHED = {1: 3, 2: 3, 3: 2}  # and to the end
 _ROUNDS = 4  # of finishing at most
 _PROFILED = 7  # effects profiled on a parent that has one already, by the gain of a linear regression
-_LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _REWEIGHED_ITERATIONS = 5
 _LEAST = 3.0  # log-likelihood: gaining less, a further round of finishing is not worth it
 _ABSORBED = 0.02  # a change in the residual of which less than this share is left after the base's is absorbed
@@ -137,7 +138,7 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
             _grow([better], afar, split, floor, found, enough, policy, crew)
             tried |= {s: min(c, tried.get(s, c), key=lambda c: c.cost) for s, c in found.items()}
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
-        if lower.share_of(floor) < _LOWER:
+        if lower.share_of(floor) < LOWER:
             floor = lower
             crew.say("weighing again against a lower floor")
             ranked = _ranked(tried, size)
@@ -185,13 +186,6 @@ def _best_to_grow(tried: dict[frozenset[str], Candidate], size: int, split: Spli
         if not candidate.fitted.solution.sensitivities:
             tried[frozenset(candidate.effects)] = reweighed(candidate, split, floor)
     return _ranked(tried, size)[: _BEAM[size]]
-
-
-def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
-    """The floor as the repeats show it once a better explanation has taken its share of what differs between runs."""
-    residuals = candidate.fitted.residuals() | candidate.checked.residuals()
-    system = candidate.fitted.structure.system
-    return floor.lowered_by(estimate_noise(system, split.known, residuals))
 
 
 def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
