@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "lacuna-reference.md"
-BESIDE = ("lacuna.records.read", "lacuna.system.System", "lacuna.check.MisuseError")
+BESIDE = ("lacuna.records.read", "lacuna.system.System", "lacuna.errors.MisuseError")
 
 
 def main() -> int:

@@ -13,3 +13,7 @@ class MisuseError(LacunaError):
 
 class TooLittleDataError(MisuseError):
     """There is nothing to fit, or nothing to judge a fit by."""
+
+
+class DeclarationError(LacunaError, ValueError):
+    """The declaration of a system contradicts itself; the text says where."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.coordinates import PLAIN, Coordinate, of_effect, of_parameter
-from lacuna.errors import LacunaError, MisuseError
+from lacuna.errors import DeclarationError, LacunaError, MisuseError
 from lacuna.records import Stretch
 from lacuna.system import (
     LEARNT,
@@ -30,10 +30,6 @@ from lacuna.values import Values
 ESTIMATED = "estimated"
 
 Simulate = Callable[[Record, Values], Any]
-
-
-class DeclarationError(LacunaError):
-    """The declaration of a system contradicts itself; the text says where."""
 
 
 class Curve:
@@ -98,6 +94,9 @@ class FunctionSystem(System):
         _check_names([p.name for p in given], "parameter")
         _check_names([e.name for e in library], "effect")
         _all_different([*(p.name for p in given), *(e.name for e in library), *(s.name for s in sites)], "name")
+        for p in given:
+            if p.at_least is not None:
+                _check_known(f"at_least of {p.name}", [p.at_least], [q.name for q in given], "is no parameter")
         ordered = {p.name for p in given if p.at_least} | {p.at_least for p in given}
         self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in given}
         self.parameters = tuple(self._coordinates[p.name].of(p) for p in given)
@@ -138,7 +137,11 @@ class FunctionSystem(System):
         outputs is of none of them."""
         trials = tuple(trials)
         conditions, outputs = {t.condition for t in trials}, {name for t in trials for name in t.channels}
+        experiments = {t.experiment for t in trials}
         _check_known("spare", self._spare, conditions)
+        for effect in self.effects.values():
+            if not experiments.intersection(effect.experiments):
+                _check_known(f"experiments of effect {effect.name}", effect.experiments, experiments)
         for what, told in (("accuracy", self._accuracy), ("sensor_noise", self._sensor_noise)):
             _check_known(what, told, outputs)
         if isinstance(self._noise_time_s, Mapping):
@@ -328,11 +331,13 @@ def _check_amounts(what: str, told: Any, by_output: bool) -> None:
             raise DeclarationError(f"{what} of {output} is {amount!r}: give a number that is not negative.")
 
 
-def _check_known(what: str, given: Iterable[Hashable], known: Collection[Hashable]) -> None:
+def _check_known(
+    what: str, given: Iterable[Hashable], known: Collection[Hashable], which: str = "none of the records has"
+) -> None:
     for one in given:
         if one not in known:
             there = ", ".join(sorted(map(str, known)))
-            raise DeclarationError(f"{what} names {one!r}, which none of the records has; there are {there}.")
+            raise DeclarationError(f"{what} names {one!r}, which {which}; there are {there}.")
 
 
 def _all_different(names: Sequence[str], what: str) -> None:

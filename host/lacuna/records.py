@@ -146,7 +146,8 @@ def _numbers(column: Any, record: str, name: str) -> np.ndarray:
     try:
         return np.asarray(column, float)
     except (TypeError, ValueError):
-        raise RecordError(f"record {record}: column {name} is not all numbers.") from None
+        seconds = "; count seconds from its start" if name == "time" else ""
+        raise RecordError(f"record {record}: column {name} is not all numbers{seconds}.") from None
 
 
 def _seconds(time: Any, name: str) -> np.ndarray:
@@ -191,8 +192,9 @@ def _folder(folder: Path) -> list[Record | Table]:
 def _csv(file: Path) -> Table:
     (_, names), *rows = _lines(file)
     names = [name.strip() for name in names]
-    if len(names) == 1 and ";" in names[0]:
-        raise RecordError(f"{file.name} separates its columns by semicolons: separate them by commas.")
+    for mark, what in ((";", "semicolons"), ("\t", "tabs")):
+        if len(names) == 1 and mark in names[0]:
+            raise RecordError(f"{file.name} separates its columns by {what}: separate them by commas.")
     if twice := [name for name in names if names.count(name) > 1]:
         raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
     if not rows:

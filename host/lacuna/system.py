@@ -12,9 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any, Protocol
 
 import numpy as np
+
+from lacuna.errors import DeclarationError
 
 Theta = Mapping[str, float]
 Channels = dict[str, np.ndarray]
@@ -56,10 +59,13 @@ class Parameter:
     prior_from_trials: bool = False
 
     def __post_init__(self) -> None:
+        for what in ("value", "lower", "upper"):
+            if not isinstance(given := getattr(self, what), Real):
+                raise DeclarationError(f"{self.name}: {what} is {given!r}, not a number")
         if not self.lower < self.upper:
-            raise ValueError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
+            raise DeclarationError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
         if not self.lower <= self.value <= self.upper:
-            raise ValueError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
+            raise DeclarationError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
 
     @property
     def step_scale(self) -> float:
@@ -107,7 +113,7 @@ class Effect:
             given = getattr(self, each)
             object.__setattr__(self, each, (given,) if isinstance(given, Parameter) else tuple(given))
         if not 1 <= self.sizes <= len(self.parameters):
-            raise ValueError(f"effect {self.name}: `sizes` is {self.sizes}, of {len(self.parameters)} parameters")
+            raise DeclarationError(f"effect {self.name}: `sizes` is {self.sizes}, of {len(self.parameters)} parameters")
 
     def full_name(self, parameter: Parameter) -> str:
         return f"{self.name}.{parameter.name}"
@@ -143,10 +149,18 @@ class Record:
         for columns in (self.inputs, self.channels):
             if name in columns:
                 return columns[name]
-        raise KeyError(f"{name}: record {self.name} has {', '.join([*self.inputs, *self.channels])}")
+        raise KeyError(f"{name}: record {self.name} has {', '.join([*self.inputs, *self.channels]) or 'none'}")
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}, {len(self.time_s)} samples of {', '.join(self.channels)})"
+
+
+def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
+    """Trials of the same experiment and condition, in the order in which these first appear."""
+    groups: dict[Hashable, list[Record]] = {}
+    for trial in trials:
+        groups.setdefault((trial.experiment, trial.condition), []).append(trial)
+    return list(groups.values())
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ class Model:
     """The completed model, called like `simulate`: `model(record)` or `model(record, theta)`.
 
     `record` is anything that `diagnose` takes as one record, `theta` a mapping of values that differ from the fitted
-    ones, `model.theta`. Returns what `simulate` returns, of a window or a segment its own samples.
+    ones, `model.theta`. What differs from run to run (a nuisance) has its expected value, if `theta` does not say
+    otherwise. Returns what `simulate` returns, of a window or a segment its own samples.
     """
 
     def __init__(self, system: System, diagnosis: Diagnosis):
@@ -43,7 +44,10 @@ class Model:
         values = self._system.values(self._theta | own, self._corrections)
         if unknown := set(theta or {}) - set(values):
             raise MisuseError(f"no parameter {', '.join(sorted(unknown))}; there are {', '.join(values)}.")
-        return self._system.simulated(record, Values(values | dict(theta or {})))
+        try:
+            return self._system.simulated(record, Values(values | dict(theta or {})))
+        except KeyError as error:  # of a record, or of the model's own
+            raise MisuseError(f"the model finds no {error.args[0]}.") from error
 
     def __repr__(self) -> str:
         return f"Model({', '.join(f'{name}={value:.4g}' for name, value in self.theta.items())})"

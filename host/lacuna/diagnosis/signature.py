@@ -86,7 +86,7 @@ def _dependence(key: tuple[str, str], rows: _Rows) -> Dependence | None:
     if half == 0:
         return None
     make, check = rows[::2], rows[1::2]
-    names = list(rows[0][1])
+    names = [n for n in rows[0][1] if all(n in quantities for _, quantities in rows)]
     if not names:  # the system offers nothing that a residual may depend on
         return None
     singles = {(n,): _predicted_share(make, check, (n,)) for n in names}

@@ -20,7 +20,7 @@ from scipy.ndimage import median_filter
 from scipy.optimize import brentq
 
 from lacuna.estimation.autocorrelation import correlation_samples
-from lacuna.system import Channels, Record, System
+from lacuna.system import Channels, Record, System, groups_of_repeats
 
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
@@ -111,10 +111,7 @@ def estimate_noise(
 
 def repeat_pairs(trials: Sequence[Record]) -> Iterator[tuple[Record, Record]]:
     """All pairs of trials with the same experiment and condition."""
-    groups: dict[object, list[Record]] = defaultdict(list)
-    for trial in trials:
-        groups[trial.experiment, trial.condition].append(trial)
-    for members in groups.values():
+    for members in groups_of_repeats(trials):
         yield from combinations(members, 2)
 
 

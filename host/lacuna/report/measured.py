@@ -32,7 +32,8 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
     repeats = sum(noise.repeats for noise in channels.values())
     alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
     if not alone:
-        return f"The floor comes from the differences between {repeats} pairs of repeats."
+        pairs = "one pair" if repeats == 1 else f"{repeats} pairs"
+        return f"The floor comes from the differences between {pairs} of repeats."
     told = {c: noise_time for c in alone if (noise_time := _noise_time(diagnosis, c))}
     if len(told) == len(alone):
         listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())

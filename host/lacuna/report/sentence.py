@@ -42,4 +42,5 @@ def verdict_sentence(
     left = remainder["share_of_gap"]
     closed = share_in_words(None if left is None else 1 - left)
     rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
-    return f"What the base model lacks is {names}, which closes {closed}{rest}."
+    close = "which closes" if len(effects) == 1 else "which together close"
+    return f"What the base model lacks is {names}, {close} {closed}{rest}."

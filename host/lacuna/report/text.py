@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -22,6 +22,7 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
     lines += _wrapped(floor_sentence(diagnosis))
     where = record["remainder"]["text"] if record["verdict"] == "identified" else record["signature"]["text"]
     lines += ["", *_wrapped(("What is left: " if record["verdict"] == "identified" else "") + where)]
+    lines += _learnt(record["learnt"])
     lines += _nearest(record)
     lines += _next(record["next_experiment"])
     warnings = record["warnings"]
@@ -64,6 +65,14 @@ def _errors(error: Mapping[str, Any]) -> Iterator[str]:
         if error["before"][side] is not None:
             values = (error[column][side] for column in ("before", "after", "noise_floor"))
             yield f"  {label:40}" + "".join(f"{number_in_words(v):>10}" for v in values)
+
+
+def _learnt(curves: Sequence[Mapping[str, Any]]) -> list[str]:
+    if not curves:
+        return []
+    added = " and ".join(f"{curve['term']} over {curve['variable']}" for curve in curves)
+    one = "a learnt curve" if len(curves) == 1 else "learnt curves"
+    return _wrapped(f"In the errors after and in the completed model: {one}, {added}.")
 
 
 def _nearest(record: Mapping[str, Any]) -> list[str]:

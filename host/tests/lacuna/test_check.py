@@ -1,6 +1,7 @@
 """Every misuse is refused before the search, by the name of its trial and channel; what may mislead is a warning."""
 
 import math
+import re
 from dataclasses import replace
 
 import heater
@@ -10,8 +11,7 @@ import pytest
 import lacuna
 from lacuna.check import check
 from lacuna.diagnosis.diagnose import diagnose
-from lacuna.errors import MisuseError, TooLittleDataError
-from lacuna.function_system import DeclarationError
+from lacuna.errors import DeclarationError, MisuseError, TooLittleDataError
 from lacuna.records import RecordError
 from lacuna.run import with_records
 from lacuna.system import Effect, Parameter, Record, System
@@ -112,7 +112,8 @@ def test_refuses_a_channel_that_is_constant_in_every_trial():
 
 
 def test_takes_a_channel_that_rests_in_one_trial_only():
-    assert check(changed(Line(), channels={"y": np.full(101, 2.0)})) == ()
+    (said,) = check(changed(Line(), channels={"y": np.full(101, 2.0)}))
+    assert "unlike its repeats" in said
 
 
 def test_refuses_an_effect_under_another_key():
@@ -211,6 +212,43 @@ def test_refuses_names_that_theta_cannot_have(effect, parameter):
 def test_refuses_what_is_declared_of_nothing(told):
     with pytest.raises(DeclarationError, match="none of the records has; there are"):
         with_records(heater.system(**told), heater.records(1))
+
+
+def test_refuses_an_effect_in_experiments_that_are_none():
+    effects = (replace(heater.SENSOR, experiments=("rum",)), heater.OFFSET, heater.LIMITED, heater.DEAD)
+    with pytest.raises(DeclarationError, match=r"experiments of effect sensor_lag names 'rum'.*there are run"):
+        with_records(heater.system(*effects), heater.records(1))
+
+
+def test_refuses_a_lower_bound_that_is_no_parameter():
+    above = Parameter("static", "", 1.0, 0.0, 2.0, at_least="kinetic")
+    with pytest.raises(DeclarationError, match="at_least of static names 'kinetic', which is no parameter"):
+        lacuna.System(heater.simulate, [above])
+
+
+@pytest.mark.parametrize("given", [("1", 0.0, 2.0), (1.0, None, 2.0), (1.0, 0.0, "2")])
+def test_refuses_bounds_that_are_no_numbers(given):
+    with pytest.raises(lacuna.LacunaError, match=r"gain: (value|lower|upper) is .*, not a number"):
+        Parameter("gain", "", *given)
+
+
+def test_a_factor_that_cannot_be_absent_is_pointed_out():
+    factor = Effect("stretch", Parameter("factor", "", 1.1, 0.5, 2.0))
+
+    def multiplied(record, theta):
+        return {"y": theta.stretch.factor * theta.gain * record.time_s}
+
+    def added(record, theta):
+        return {"y": theta.gain * record.time_s + 0.0 * theta.stretch.factor}
+
+    records = {f"{k}": {"time_s": T, "y": T + 0.01 * DRAW.standard_normal(len(T))} for k in range(4)}
+    gain = Parameter("gain", "", 1.5, 0.0, 2.0)
+    said = "Effect stretch is absent where its factor is 0, .*absent=1"
+    with pytest.raises(MisuseError, match=said):
+        check(with_records(lacuna.System(multiplied, [gain], [factor]), records))
+    (warning,) = check(with_records(lacuna.System(added, [gain], [factor]), records))
+    assert re.match(said, warning)
+    assert not check(with_records(lacuna.System(added, [gain], [replace(factor, absent=1.0)]), records))
 
 
 def test_refuses_a_condition_where_conditions_belong():

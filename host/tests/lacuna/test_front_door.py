@@ -16,6 +16,7 @@ import pytest
 import lacuna
 from lacuna.progress import Progress, most_steps
 from lacuna.records import read
+from lacuna.report.text import screen_of
 from lacuna.run import with_records
 
 LAG = {"sensor_lag__lag_s": 3.0}
@@ -58,6 +59,18 @@ def test_the_completed_model_is_called_like_the_first(verdict):
     without = verdict.model(given, {"sensor_lag.lag_s": 0.0})["temperature_K"]
     assert np.std(without - truth) > 3 * heater.NOISE_K
     assert verdict.theta.sensor_lag.lag_s == verdict.effects[0].parameters["lag_s"]
+
+
+def test_a_record_that_lacks_an_input_is_refused_by_the_completed_model(verdict):
+    with pytest.raises(lacuna.LacunaError, match="finds no power_W: record record 1 has none"):
+        verdict.model({"time_s": heater.TIME_S})
+
+
+def test_a_curve_that_was_learnt_is_part_of_the_screen(verdict):
+    assert "learnt" not in str(verdict)
+    curve = {"term": "loss", "variable": "temperature (K)"}
+    shown = screen_of("block", verdict.record | {"learnt": [curve]}, verdict.diagnosis)
+    assert "a learnt curve, loss over temperature (K)." in shown
 
 
 def test_a_verdict_is_short_in_a_line_and_one_screen_in_print(verdict):

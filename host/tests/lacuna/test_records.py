@@ -61,6 +61,7 @@ def test_an_empty_cell_is_a_missing_sample_and_a_column_of_words_an_input(tmp_pa
         ("time_s,y\n0,1\n1,2.5.1\n", r"a\.csv, line 3, column y: '2\.5\.1' is not a number"),
         ("time_s,y\n0,1\n1\n", r"a\.csv, line 3: 1 values for 2 columns"),
         ("time_s;y\n0;1\n", "semicolons"),
+        ("time_s\ty\n0\t1\n", "tabs"),
         ('time_s,y\n0,"1,5"\n', r"a\.csv, line 2, column y: '1,5' has a decimal comma"),
         ("time_s,y,y\n0,1,2\n", "more than one column 'y'"),
         ("time_s,y\n", "no rows"),

@@ -1,0 +1,80 @@
+"""Records that cannot be compared with a prediction."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from lacuna.check.numbers import SAME, first, spread
+from lacuna.errors import MisuseError
+from lacuna.system import Record
+
+_FEWEST_SAMPLES = 8
+
+
+def check_record(trial: Record) -> None:
+    time = np.asarray(trial.time_s)
+    if time.ndim != 1 or time.dtype.kind not in "fiu" or len(time) < _FEWEST_SAMPLES:
+        raise MisuseError(f"trial {trial.name}: its times are not a sequence of at least {_FEWEST_SAMPLES} numbers.")
+    if not np.isfinite(time).all():
+        raise MisuseError(f"trial {trial.name}: time at sample {first(~np.isfinite(time))} is not a number.")
+    falls = np.diff(time) <= 0
+    if falls.any():
+        at = first(falls)
+        raise MisuseError(
+            f"trial {trial.name}: time does not increase from sample {at} ({time[at]:g} s) to the next"
+            f" ({time[at + 1]:g} s)."
+        )
+    if not trial.channels:
+        raise MisuseError(f"trial {trial.name} has no channel to compare a prediction with.")
+    for name, column in trial.channels.items():
+        where = f"trial {trial.name}, channel {name}"
+        column = np.asarray(column)
+        if column.dtype.kind not in "fiu":
+            raise MisuseError(f"{where}: measured values are {column.dtype}, not real numbers.")
+        if column.shape != time.shape:
+            raise MisuseError(f"{where}: measured with shape {column.shape}, but the times have {time.shape}.")
+        if np.isinf(column).any():
+            raise MisuseError(f"{where}: infinite at sample {first(np.isinf(column))}; mark missing samples as NaN.")
+        if np.isfinite(column).sum() < _FEWEST_SAMPLES:
+            raise MisuseError(f"{where}: fewer than {_FEWEST_SAMPLES} valid samples.")
+
+
+def check_columns(trials: Sequence[Record]) -> None:
+    """An input that has a value for each sample in one trial has one in every trial. Raises MisuseError."""
+    sampled = {n for t in trials for n, column in t.inputs.items() if np.shape(column) == t.time_s.shape}
+    for trial in trials:
+        for name, column in trial.inputs.items():
+            if name in sampled and np.ndim(column) == 1 and len(column) != len(trial.time_s):
+                raise MisuseError(
+                    f"trial {trial.name}, input {name}: {len(column)} values, but there are {len(trial.time_s)} times."
+                )
+
+
+def gaps_in_inputs(trials: Sequence[Record]) -> Iterable[str]:
+    """A missing sample of an output is left out of the comparison; without one of an input a model may not go on."""
+    for trial in trials:
+        for name, column in trial.inputs.items():
+            column = np.asarray(column)
+            if column.dtype.kind == "f" and not np.isfinite(column).all():
+                at = f" at sample {first(~np.isfinite(column))}" if column.ndim else ""
+                where = f"Trial {trial.name}, input {name}"
+                yield f"{where}: no number{at}; a model that uses it cannot predict from there on."
+
+
+def check_constant(trials: Sequence[Record]) -> None:
+    moving: dict[tuple[str, str], bool] = defaultdict(bool)
+    example: dict[tuple[str, str], str] = {}
+    for trial in trials:
+        for name, column in trial.channels.items():
+            key = trial.experiment, name
+            example.setdefault(key, trial.name)
+            moving[key] |= spread(column) > SAME * np.nanmax(np.abs(column))
+    for (experiment, channel), moves in moving.items():
+        if not moves:
+            raise MisuseError(
+                f"trial {example[experiment, channel]}, channel {channel}: constant, as in every trial of {experiment};"
+                " there is nothing to fit. Leave it out."
+            )

@@ -1,0 +1,146 @@
+"""Models that cannot be fitted: what they return, raise, ignore or remember."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from lacuna.check.numbers import SAME, differ, listed, spread
+from lacuna.errors import LacunaError, MisuseError
+from lacuna.system import Channels, Record, System, Theta
+
+_NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent
+_NEAR_ABSENT = 0.1  # of its typical size: how near the absent one an effect may come at least
+
+
+def check_model(
+    system: System, trials: Sequence[Record]
+) -> tuple[Theta, list[Record], dict[str, Channels], tuple[str, ...]]:
+    """The initial values, the trials that the model can predict with them, these predictions, and warnings. Raises
+    MisuseError."""
+    start = {p.name: p.value for p in system.parameters}
+    predictions = {t.name: predicted(system, start, (), t) for t in trials}
+    failed = [t.name for t in trials if _fails(t, predictions[t.name])]
+    if len(failed) == len(trials):
+        raise MisuseError(
+            f"trial {failed[0]}, channel {_failing(trials[0], predictions[failed[0]])}: the prediction is NaN, as in"
+            " every trial, with the parameters at their initial values. Choose values that can be simulated."
+        )
+    good = [t for t in trials if t.name not in failed]
+    _check_deterministic(system, start, good[0], predictions)
+    system.regressors(good[0], predictions[good[0].name])
+    _check_effects(system, start, good, predictions)
+    warnings = (
+        [f"With its parameters at their initial values the model cannot predict {listed(failed)}."] if failed else []
+    )
+    never_off = _never_off(system)
+    idle = _idle(system, start, good, predictions)
+    if idle and len(idle) == len(system.parameters):
+        why = " ".join(never_off) or "Does the model use any of them?"
+        raise MisuseError(
+            f"trial {good[0].name}, channel {next(iter(good[0].channels))}: no parameter changes the prediction. {why}"
+        )
+    warnings += never_off
+    if idle:
+        warnings.append(f"{listed(idle)} {'does' if len(idle) == 1 else 'do'} not affect any prediction.")
+    return start, good, predictions, tuple(warnings)
+
+
+def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
+    """A prediction, checked. Raises MisuseError."""
+    theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
+    with_effects = f" with effect {effects[0]}" if effects else ""
+    try:
+        found = system.predict(theta, effects, trial)
+    except LacunaError:
+        raise
+    except Exception as error:
+        raise MisuseError(
+            f"trial {trial.name}, channel {listed(list(trial.channels))}: the model{with_effects} raises"
+            f" {type(error).__name__}: {error}"
+        ) from error
+    if not isinstance(found, Mapping):
+        raise MisuseError(f"trial {trial.name}: the model returns {type(found).__name__}, not channels by name.")
+    for name, measured in trial.channels.items():
+        where = f"trial {trial.name}, channel {name}{with_effects}"
+        if name not in found:
+            raise MisuseError(f"{where}: not predicted; the model returns {', '.join(map(str, found)) or 'nothing'}.")
+        column = found[name]
+        if not isinstance(column, np.ndarray) or column.dtype.kind not in "fiu":
+            kind = f"array of {column.dtype}" if isinstance(column, np.ndarray) else type(column).__name__
+            raise MisuseError(f"{where}: predicted as {kind}, not as an array of real numbers.")
+        if column.shape != np.shape(measured):
+            raise MisuseError(f"{where}: predicted with shape {column.shape}, measured with {np.shape(measured)}.")
+    return {name: np.array(found[name], float) for name in trial.channels}
+
+
+def _check_deterministic(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
+    again = predicted(system, start, (), trial)
+    for name in trial.channels:
+        if differ(again[name], predictions[trial.name][name], SAME * spread(trial.channels[name])):
+            raise MisuseError(
+                f"trial {trial.name}, channel {name}: two predictions with the same parameters differ."
+                " The model must not draw random numbers or keep state between calls."
+            )
+
+
+def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:
+    """An effect at the size at which it is absent leaves the base model's prediction unchanged."""
+    firsts = {t.experiment: t for t in reversed(trials)}
+    for name, effect in system.effects.items():
+        off = {effect.full_name(p): p.value for p in effect.parameters} | dict.fromkeys(
+            effect.size_names, effect.absent
+        )
+        off |= {effect.full_name(p): p.value for p in effect.own}
+        for trial in firsts.values():
+            if effect.experiments and trial.experiment not in effect.experiments:
+                continue
+            found = predicted(system, dict(start) | off, (name,), trial)
+            for channel in trial.channels:
+                limit = _NEUTRAL * spread(trial.channels[channel])
+                if differ(found[channel], predictions[trial.name][channel], limit):
+                    raise MisuseError(
+                        f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although its size"
+                        f" is {effect.absent:g}, at which it is declared absent."
+                    )
+
+
+def _never_off(system: System) -> list[str]:
+    """Effects whose bounds keep them away from the size at which they are absent: what a factor is, if it is not said
+    that it is absent at 1."""
+    found = []
+    for effect in system.effects.values():
+        for p in effect.parameters[: effect.sizes]:
+            away = max(p.lower - effect.absent, effect.absent - p.upper)
+            if away > _NEAR_ABSENT * abs(p.value - effect.absent):
+                name = effect.full_name(p)
+                absent, *bounds = (system.told(name, value) for value in (effect.absent, p.lower, p.upper))
+                found.append(
+                    f"Effect {effect.name} is absent where its {p.name} is {absent:g}, which the bounds {min(bounds):g}"
+                    f" and {max(bounds):g} do not let it come near: is it absent elsewhere (a factor: absent=1)?"
+                )
+    return found
+
+
+def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> list[str]:
+    """Base parameters that change no trial's prediction."""
+    idle = []
+    for p in system.parameters:
+        step = p.step_scale if p.value + p.step_scale <= p.upper else -p.step_scale
+        moved = dict(start) | {p.name: min(max(p.value + step, p.lower), p.upper)}
+        touched = (t for t in trials if system.matters(p.name, t))
+        if not any(
+            differ(predicted(system, moved, (), t)[c], predictions[t.name][c], 0.0) for t in touched for c in t.channels
+        ):
+            idle.append(p.name)
+    return idle
+
+
+def _fails(trial: Record, prediction: Channels) -> bool:
+    return _failing(trial, prediction) is not None
+
+
+def _failing(trial: Record, prediction: Channels) -> str | None:
+    """The first channel whose prediction is missing where it was measured."""
+    return next((c for c, p in prediction.items() if not np.isfinite(p[np.isfinite(trial.channels[c])]).all()), None)

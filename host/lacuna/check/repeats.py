@@ -1,0 +1,161 @@
+"""Repeats that are none: their differences become the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from lacuna.check.model import predicted
+from lacuna.check.numbers import SAME, differ, spread
+from lacuna.errors import MisuseError
+from lacuna.system import Channels, Record, System, Theta, groups_of_repeats
+
+_OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
+_UNLIKE = 10.0  # times what repeats differ by as a rule, RMS: one that is as far from all others was recorded otherwise
+
+
+def check_times(trials: Sequence[Record]) -> None:
+    """Repeats are compared at equal times. Raises MisuseError."""
+    for first, *others in groups_of_repeats(trials):
+        for other in others:
+            (a, b), (c, d) = ((float(t.time_s[0]), float(t.time_s[-1])) for t in (first, other))
+            if min(b, d) - max(a, c) < 0.5 * min(b - a, d - c):
+                raise MisuseError(
+                    f"{_declared(first, other)}, but one is from {a:g} to {b:g} s and the other from {c:g} to {d:g} s:"
+                    " count the times of each from its own start."
+                )
+
+
+def check_inputs(
+    system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]
+) -> Iterator[str]:
+    """Repeats have the same inputs, as far as these change what is predicted: raises MisuseError. Warns of others."""
+    spreads = {name: _input_spread(trials, name) for name in {name for trial in trials for name in trial.inputs}}
+    ignored: dict[str, str] = {}
+    for first, *others in groups_of_repeats(trials):
+        for other in others:
+            for name in sorted(first.inputs.keys() & other.inputs.keys()):
+                one, its = first.inputs[name], other.inputs[name]
+                if _number_changed(one, its):
+                    limit, said = _OTHER, f"their {name} is {one:g} and {its:g}"
+                elif _column_changed(first, other, name, spreads[name]):
+                    its, limit, said = _at_times_of(first, other, name), SAME, f"their input {name} differs"
+                else:
+                    continue
+                there = replace(first, inputs={**first.inputs, name: its})
+                changed = _changed(predicted(system, start, (), there), predictions[first.name], first, limit)
+                if changed:
+                    raise MisuseError(
+                        f"{_declared(first, other)}, but {said}, with which {changed} is predicted differently: the"
+                        " difference would pass for noise. Give them different conditions."
+                    )
+                if limit == SAME:
+                    ignored.setdefault(name, f"{first.name} and {other.name}")
+    for name, pair in ignored.items():
+        yield (
+            f"The repeats {pair} have a different {name}, which the base model does not use: what it does to them"
+            " passes for noise."
+        )
+
+
+def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
+    """Warnings of repeats that are copies, or unlike all others."""
+    groups = [group for group in groups_of_repeats(trials) if len(group) > 1]
+    for group in groups:
+        for first, other in combinations(group, 2):
+            if _same_record(first, other):
+                yield f"Trials {first.name} and {other.name} are the same record: a copy is no repeat. Leave it out."
+    for experiment, channel in dict.fromkeys((t.experiment, c) for t in trials for c in t.channels):
+        members = [group for group in groups if group[0].experiment == experiment]
+        apart = [_apart(group, channel) for group in members]
+        for k, (group, differences) in enumerate(zip(members, apart, strict=True)):
+            yield from _unlike(group, channel, differences, [d for j, d in enumerate(apart) if j != k])
+
+
+def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, elsewhere: Iterable[np.ndarray]) -> Iterator[str]:
+    """`apart`: of a group's members, RMS, shape (n, n); `elsewhere`: the same of the experiment's other conditions."""
+    usual = [value for values in elsewhere for value in _pairs(values)]
+    if len(group) == 2 and usual and apart[0, 1] > _UNLIKE * np.median(usual) > 0.0:
+        yield (
+            f"Trials {group[0].name} and {group[1].name}, repeats of one condition, differ in {channel} by"
+            f" {apart[0, 1]:.3g} (RMS), others by {np.median(usual):.2g}: if one was recorded otherwise, leave it out."
+        )
+    for k, trial in enumerate(group if len(group) > 2 else ()):
+        others = [j for j in range(len(group)) if j != k]
+        nearest, alike = apart[k, others].min(), float(np.median(_pairs(apart[np.ix_(others, others)])))
+        if nearest > _UNLIKE * max(alike, float(np.median(usual)) if usual else 0.0) > 0.0:
+            at = _furthest(trial, group[others[0]], channel)
+            yield (
+                f"Trial {trial.name}, channel {channel}: unlike its repeats, from which it differs by {nearest:.3g}"
+                f" (RMS), they from one another by {alike:.2g}; most at {at:.4g} s. If it was recorded otherwise, leave"
+                " it out: what repeats differ by is taken for noise."
+            )
+
+
+def _pairs(apart: np.ndarray) -> np.ndarray:
+    return apart[np.triu_indices(len(apart), 1)]
+
+
+def _apart(group: Sequence[Record], channel: str) -> np.ndarray:
+    found = np.zeros((len(group), len(group)))
+    for i, j in combinations(range(len(group)), 2):
+        squares = _difference(group[i], group[j], channel)[1] ** 2
+        known = np.isfinite(squares)
+        found[i, j] = found[j, i] = np.sqrt(squares[known].mean()) if known.any() else 0.0
+    return found
+
+
+def _difference(one: Record, other: Record, channel: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times from the start of `one`, and by how much it differs there, where both were measured."""
+    at, there = one.time_s - one.time_s[0], other.time_s - other.time_s[0]
+    apart = one.channels[channel] - np.interp(at, there, other.channels[channel], right=np.nan)
+    return at, apart
+
+
+def _furthest(one: Record, other: Record, channel: str) -> float:
+    at, apart = _difference(one, other, channel)
+    return float(one.time_s[0] + at[np.nanargmax(np.abs(apart))])
+
+
+def _same_record(one: Record, other: Record) -> bool:
+    return all(np.array_equal(one.channels[c], other.channels.get(c), equal_nan=True) for c in one.channels)
+
+
+def _declared(one: Record, other: Record) -> str:
+    return f"trials {one.name} and {other.name} are declared as repeats (condition {one.condition})"
+
+
+def _changed(found: Channels, before: Channels, trial: Record, share: float) -> str | None:
+    """The first channel that is predicted differently, by more than that share of its spread."""
+    return next(
+        (c for c, measured in trial.channels.items() if differ(found[c], before[c], share * spread(measured))), None
+    )
+
+
+def _number_changed(one: object, other: object) -> bool:
+    numbers = [np.asarray(value) for value in (one, other)]
+    return all(n.ndim == 0 and n.dtype.kind in "fiu" for n in numbers) and bool(numbers[0] != numbers[1])
+
+
+def _column_changed(first: Record, other: Record, name: str, spread_of_all: float) -> bool:
+    columns = [np.asarray(trial.inputs[name]) for trial in (first, other)]
+    sampled = all(
+        np.shape(c) == t.time_s.shape and c.dtype.kind in "fiu" for c, t in zip(columns, (first, other), strict=True)
+    )
+    if not sampled or spread_of_all == 0.0:
+        return False
+    return bool(np.sqrt(np.nanmean((columns[0] - _at_times_of(first, other, name)) ** 2)) > _OTHER * spread_of_all)
+
+
+def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
+    return np.interp(first.time_s - first.time_s[0], other.time_s - other.time_s[0], other.inputs[name])
+
+
+def _input_spread(trials: Sequence[Record], name: str) -> float:
+    """Over all trials: a measured input may be all noise in one of them."""
+    columns = [np.asarray(t.inputs[name]) for t in trials if np.shape(t.inputs.get(name)) == t.time_s.shape]
+    columns = [column for column in columns if column.dtype.kind in "fiu"]
+    return spread(np.concatenate(columns)) if columns else 0.0

@@ -1,0 +1,104 @@
+"""Repeats that are none, and what is said of them before a search."""
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna.check import check
+from lacuna.errors import MisuseError
+from lacuna.run import with_records
+
+
+def said_of(records, *effects):
+    return check(with_records(heater.system(*effects), records))
+
+
+def spiked(column):
+    column[77] = 85.0
+
+
+def in_another_unit(column):
+    column *= 1e3
+
+
+def switched_off(column):
+    column[:] = 0.0
+
+
+@pytest.mark.parametrize("mistake", [spiked, in_another_unit, switched_off])
+@pytest.mark.parametrize("which", ["steps_4W_1", "steps_4W_2", "steps_4W_3"])
+def test_one_that_is_unlike_all_others_is_pointed_out(mistake, which):
+    records = heater.records(3)
+    mistake(records[which]["temperature_K"])
+    (said,) = said_of(records)
+    assert said.startswith(f"Trial {which}, channel temperature_K: unlike its repeats")
+    assert "leave it out" in said
+    if mistake is spiked:
+        assert f"most at {heater.TIME_S[77]:g} s" in said
+
+
+def test_of_two_it_is_said_that_they_differ():
+    records = heater.records(2)
+    spiked(records["steps_4W_1"]["temperature_K"])
+    (said,) = said_of(records)
+    assert said.startswith("Trials steps_4W_1 and steps_4W_2, repeats of one condition, differ in temperature_K by")
+
+
+@pytest.mark.parametrize("repeats", [2, 3, 5])
+@pytest.mark.parametrize("seed", range(5))
+def test_nothing_is_said_of_repeats_that_differ_as_repeats_do(repeats, seed):
+    assert not said_of(heater.records(repeats, seed=seed, sensor_lag__lag_s=3.0))
+
+
+def test_a_copy_is_no_repeat():
+    records = heater.records(2)
+    records["steps_4W_2"]["temperature_K"] = records["steps_4W_1"]["temperature_K"].copy()
+    (said,) = said_of(records)
+    assert said == "Trials steps_4W_1 and steps_4W_2 are the same record: a copy is no repeat. Leave it out."
+
+
+def test_an_input_may_differ_if_the_base_model_does_not_use_it():
+    draw = np.random.default_rng(0)
+    records = {n: r | {"room_C": 21.0 + 0.1 * draw.standard_normal(240)} for n, r in heater.records(3).items()}
+    (said,) = said_of(records)
+    assert "have a different room_C, which the base model does not use" in said
+
+
+def test_a_column_with_fewer_values_than_there_are_times_is_refused():
+    records = heater.records(2)
+    records["steps_4W_2"]["power_W"] = records["steps_4W_2"]["power_W"][:-20]
+    with pytest.raises(MisuseError, match="steps_4W_2, input power_W: 220 values, but there are 240 times"):
+        said_of(records)
+
+
+@pytest.mark.parametrize(("bend", "verdict"), [(4e-4, "identified"), (0.0, "none")])
+@pytest.mark.parametrize("spread", [0.2, 5.0])
+def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spread, bend, verdict):
+    """An offset of each run, up to a hundred times the noise: a floor that is taken from what repeats differ by must
+    not keep it."""
+    time_s, draw = np.arange(0.0, 10.0, 0.05), np.random.default_rng(1)
+
+    def simulate(record, theta):
+        pushed = record["level"] * time_s
+        return {"y": theta.gain * pushed + theta.offset + theta.bend.by * pushed**2}
+
+    def measured(level):
+        clean = level * time_s + bend * (level * time_s) ** 2
+        return clean + spread * draw.standard_normal() + 0.05 * draw.standard_normal(len(time_s))
+
+    records = {
+        f"{level}_{k}": {"time_s": time_s, "level": float(level), "condition": level, "y": measured(level)}
+        for level in (1, 2, 3, 4)
+        for k in range(3)
+    }
+    system = lacuna.System(
+        simulate,
+        [lacuna.Parameter("gain", "", 0.8, 0.0, 5.0)],
+        [lacuna.Effect("bend", lacuna.Parameter("by", "", 0.001, -0.1, 0.1))],
+        nuisances=[lacuna.Parameter("offset", "", 0.0, -20.0, 20.0, scale=spread)],
+    )
+    found = lacuna.diagnose(system, records, progress=False)
+    assert found.verdict == verdict
+    if verdict == "identified":
+        assert found.diagnosis.search.floor.channels["run", "y"].sd == pytest.approx(0.05, rel=0.1)
