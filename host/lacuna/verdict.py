@@ -64,7 +64,8 @@ def _one(record: Any, outputs: tuple[str, ...]) -> Record:
 class Verdict:
     """The engine's result. `verdict`: "none", "identified" or "unexplained"; `effects`: the effects named, with sizes,
     intervals and probabilities; `error`: of the model before and after and of the floor, RMS in units of the noise, on
-    records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call.
+    records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call;
+    `nuisances`: by record, what was fitted to each.
 
     `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws. `record` is all of it in plain types
     for JSON, `diagnosis` the engine's complete result.
@@ -75,6 +76,7 @@ class Verdict:
         self.verdict, self.effects, self.warnings = diagnosis.verdict, self.diagnosis.effects, diagnosis.warnings
         self.model = Model(system, diagnosis)
         self.theta = self.model.theta
+        self.nuisances = _nuisances(diagnosis)
         self.record = as_record(self.diagnosis)
         self.error = {
             "before": diagnosis.before.held_out,
@@ -107,6 +109,12 @@ class Verdict:
         from lacuna.report.overview import overview
 
         return overview(self.record, self.diagnosis)
+
+
+def _nuisances(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
+    problem, point = diagnosis.final.problem, diagnosis.final.solution.point
+    each = zip(problem.trials, problem.nuisances, point.nuisances, strict=True)
+    return {t.name: {p.name: float(v) for p, v in zip(ps, values, strict=True)} for t, ps, values in each if ps}
 
 
 def told(system: System, diagnosis: Diagnosis) -> Diagnosis:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from lacuna.check.measured import check_columns, check_constant, check_record, gaps_in_inputs
 from lacuna.check.model import check_model
 from lacuna.check.names import check_names
-from lacuna.check.repeats import check_inputs, check_times, odd_ones
+from lacuna.check.repeats import check_inputs, check_times, not_declared, odd_ones
 from lacuna.system import System
 
 
@@ -21,4 +21,4 @@ def check(system: System) -> tuple[str, ...]:
     check_times(trials)
     start, good, predictions, said = check_model(system, trials)
     ignored = check_inputs(system, start, good, predictions)
-    return (*odd_ones(trials), *gaps_in_inputs(trials), *ignored, *said)
+    return (*odd_ones(trials), *not_declared(trials), *gaps_in_inputs(trials), *ignored, *said)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -75,6 +76,20 @@ def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
             yield from _unlike(group, channel, differences, [d for j, d in enumerate(apart) if j != k])
 
 
+def not_declared(trials: Sequence[Record]) -> Iterator[str]:
+    """A warning where nothing is declared as a repeat, but inputs are the same."""
+    if any(len(group) > 1 for group in groups_of_repeats(trials)):
+        return
+    for first, other in combinations(trials, 2):
+        driven = any(np.shape(column) == first.time_s.shape for column in first.inputs.values())
+        if driven and first.experiment == other.experiment and _same_columns(first.inputs, other.inputs):
+            yield (
+                f"Trials {first.name} and {other.name} have the same inputs, and nothing is declared as a repeat. If"
+                " they are repeats, give them one condition: the noise floor comes from repeats."
+            )
+            return
+
+
 def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, elsewhere: Iterable[np.ndarray]) -> Iterator[str]:
     """`apart`: of a group's members, RMS, shape (n, n); `elsewhere`: the same of the experiment's other conditions."""
     usual = [value for values in elsewhere for value in _pairs(values)]
@@ -121,7 +136,11 @@ def _furthest(one: Record, other: Record, channel: str) -> float:
 
 
 def _same_record(one: Record, other: Record) -> bool:
-    return all(np.array_equal(one.channels[c], other.channels.get(c), equal_nan=True) for c in one.channels)
+    return _same_columns(one.channels, other.channels)
+
+
+def _same_columns(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    return one.keys() == other.keys() and all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def _declared(one: Record, other: Record) -> str:

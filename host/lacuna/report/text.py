@@ -24,6 +24,7 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
     lines += ["", *_wrapped(("What is left: " if record["verdict"] == "identified" else "") + where)]
     lines += _learnt(record["learnt"])
     lines += _nearest(record)
+    lines += _unseen(record["not_detectable_here"])
     lines += _next(record["next_experiment"])
     warnings = record["warnings"]
     lines += [line for one in warnings[:_WARNINGS] for line in _wrapped(one, "! ")]
@@ -80,6 +81,10 @@ def _nearest(record: Mapping[str, Any]) -> list[str]:
         return []
     near = [f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in record["nearest"][:_TRIED]]
     return _wrapped(f"Also tried, with what each would close: {', '.join(near)}.")
+
+
+def _unseen(effects: Sequence[str]) -> list[str]:
+    return _wrapped(f"These data would hardly show: {', '.join(effects)}.") if effects else []
 
 
 def _next(coming: Mapping[str, Any]) -> list[str]:

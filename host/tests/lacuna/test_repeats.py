@@ -58,6 +58,15 @@ def test_a_copy_is_no_repeat():
     assert said == "Trials steps_4W_1 and steps_4W_2 are the same record: a copy is no repeat. Leave it out."
 
 
+def test_repeats_that_are_not_declared_are_asked_for():
+    records = heater.records(2)
+    for name, record in records.items():
+        record["condition"] = name
+    (said,) = said_of(records)
+    assert said.startswith("Trials steps_4W_1 and steps_4W_2 have the same inputs, and nothing is declared as a repeat")
+    assert not said_of({name: record for name, record in records.items() if name.endswith("_1")})
+
+
 def test_an_input_may_differ_if_the_base_model_does_not_use_it():
     draw = np.random.default_rng(0)
     records = {n: r | {"room_C": 21.0 + 0.1 * draw.standard_normal(240)} for n, r in heater.records(3).items()}
@@ -102,3 +111,5 @@ def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spr
     assert found.verdict == verdict
     if verdict == "identified":
         assert found.diagnosis.search.floor.channels["run", "y"].sd == pytest.approx(0.05, rel=0.1)
+        assert {name for own in found.nuisances.values() for name in own} == {"offset"}
+        assert np.std([own["offset"] for own in found.nuisances.values()]) > 0.5 * spread
