@@ -16,6 +16,7 @@ from lacuna.estimation.problem import SOFT_LIMIT
 from lacuna.function_system import FunctionSystem
 
 _FRACTION = 0.05  # of what is left: still within reach of the range in which residuals count by their squares
+_WORTH = 1.25  # times the floor: raised by less, it would change no comparison
 _ROUNDS = 3
 
 Key = tuple[str, str]
@@ -31,7 +32,7 @@ def compared_at_misfit(
     left = _left(found)
     for _ in range(_ROUNDS):
         level = {key: _FRACTION * rms for key, rms in left.items() if rms > SOFT_LIMIT * was[key]}
-        level = {key: sd for key, sd in level.items() if sd > was[key]}
+        level = {key: sd for key, sd in level.items() if sd > _WORTH * was[key]}
         if not level or found.verdict == "none":
             break
         next_found = again(system.with_floor(level))

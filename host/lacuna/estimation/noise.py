@@ -104,8 +104,7 @@ def estimate_noise(
         elif correlated_s := system.noise_time_s(*key):
             channels[key] = _of_correlated(members, key[1], correlated_s, sensor, residuals)
         else:
-            sd = max(sensor, float(np.median([_fast_noise(trial.channels[key[1]]) for trial in members])))
-            channels[key] = ChannelNoise(max(sd, _smallest(members, key[1])), 0.0, 1.0, 0)
+            channels[key] = _of_fast_noise(members, key[1], sensor, residuals)
     return NoiseFloor(channels)
 
 
@@ -140,6 +139,16 @@ def _from_pairs(
         variance = sd**2 + (_shift_variance(*record, jitter_s, sd) if jitter_s else 0.0)
         scaled.append(difference / np.sqrt(variance))
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
+
+
+def _of_fast_noise(
+    members: Sequence[Record], channel: str, sensor: float, residuals: Mapping[str, Channels] | None
+) -> ChannelNoise:
+    """Without repeats, told nothing: from the fast noise of residuals (without them of the records, as an upper bound,
+    since a record may itself be fast)."""
+    known = [trial.channels if residuals is None else residuals[trial.name] for trial in members]
+    sd = float(np.median([_fast_noise(samples[channel]) for samples in known]))
+    return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, 1.0, 0)
 
 
 def _of_correlated(

@@ -20,7 +20,7 @@ def measured_rows(diagnosis: Diagnosis) -> list[Row]:
     for (experiment, channel), trials in groups.items():
         noise = diagnosis.search.floor.channels[experiment, channel]
         conditions = len({t.condition for t in trials})
-        basis = f"{noise.repeats} pairs of repeats" if noise.repeats else "the record's own fast noise"
+        basis = f"{noise.repeats} pairs of repeats" if noise.repeats else "the fast noise of the residual"
         piece = f"{noise.samples_per_piece:.3g}"
         rows.append((f"{experiment}: {channel}", f"{len(trials)} in {conditions}", f"{noise.sd:.3g}", piece, basis))
     return rows
@@ -42,8 +42,8 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
             " whatever varies as fast counts as noise here, whatever is slower as structure."
         )
     return (
-        f"Without repeats the floor of {', '.join(alone)} is the record's own fast noise: whatever varies slowly from"
-        " run to run counts as structure here, and only a repeat could show that it is none."
+        f"Without repeats the floor of {', '.join(alone)} is the fast noise of the residual: whatever varies slowly"
+        " from run to run counts as structure here, and only a repeat could show that it is none."
     )
 
 

@@ -45,7 +45,7 @@ def test_names_both_effects_by_segments_of_one_run(written, slow_K):
     )
     assert named(found) == {"sensor_lag", "saturation"}
     assert "Without repeats" in str(found)
-    assert "record's own fast noise" in str(found).replace("\n", " ")
+    assert "fast noise of the residual" in str(found).replace("\n", " ")
 
 
 def test_the_answer_is_the_same_in_either_parametrisation():
@@ -185,3 +185,37 @@ def test_near_the_floor_or_without_a_gap_nothing_is_compared_again(left, verdict
 def test_where_a_raised_floor_hides_everything_the_first_answer_stands():
     first = _found("unexplained", 1.0, 0.001)
     assert compared_at_misfit(heater.system(), first, lambda system: _found("none", 1.0, 0.05)) == (first, {})
+
+
+@pytest.mark.parametrize(("cubic", "verdict"), [(0.3, "identified"), (0.0, "none")])
+def test_a_record_that_is_itself_fast_does_not_pass_for_noise(cubic, verdict):
+    """Nine samples a period: second differences of the record say nothing of the noise."""
+    draw, time_s = np.random.default_rng(0), np.arange(0.0, 1.0, 0.002)
+
+    def simulate(record, theta):
+        return {"y": theta.gain * record["u"] + theta.cubic.gain * record["u"] ** 3}
+
+    def measured(size):
+        u = size * np.cos(2 * np.pi * 55.0 * time_s + draw.uniform(0.0, 6.0)) * (1.0 + 0.3 * np.sin(7.0 * time_s))
+        return {"time_s": time_s, "u": u, "y": u + cubic * u**3 + 1e-3 * draw.standard_normal(len(u))}
+
+    system = lacuna.System(
+        simulate,
+        [lacuna.Parameter("gain", "", 0.8, 0.0, 5.0)],
+        [lacuna.Effect("cubic", lacuna.Parameter("gain", "", 0.1, -2.0, 2.0))],
+        outputs="y",
+    )
+    found = lacuna.diagnose(system, [measured(0.2 + 0.1 * k) for k in range(8)], progress=False)
+    assert found.verdict == verdict
+    assert "Repeats share" not in str(found)
+    if verdict == "identified":
+        assert found.effects[0].parameters["gain"] == pytest.approx(cubic, rel=0.02)
+
+
+def test_a_floor_is_raised_only_by_what_changes_a_comparison():
+    near = _found("unexplained", 21.0, 1.0)
+
+    def never(system):
+        raise AssertionError("21 floors ask for a floor of 1.05")
+
+    assert compared_at_misfit(heater.system(), near, never) == (near, {})
