@@ -304,9 +304,10 @@ def windows(
         at = slice(first, min(first + size, len(time)))
         phase = round(start % period, 9) if period else place
         phase = 0.0 if period and period - phase < 0.5 * sample else phase
-        labels = {**table.labels, "condition": f"from {phase:g} s" if period else f"window {place + 1}", "order": place}
+        name = _part(table, f"window {place + 1}")
+        labels = {**table.labels, "condition": f"from {phase:g} s" if period else name, "order": place}
         columns = {n: c[at] if np.shape(c) == time.shape else c for n, c in table.columns.items()}
-        found.append(Table(f"window {place + 1}", time[at] - time[at][0], columns, labels))
+        found.append(Table(name, time[at] - time[at][0], columns, labels))
     return found
 
 
@@ -322,10 +323,16 @@ def segments(data: Any, count: int = 10) -> list[Table]:
         raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")
     found = []
     for place, (first, last) in enumerate(pairwise(ends)):
-        labels = {**table.labels, "condition": f"segment {place + 1}", "order": place, "stretch": (table, first, last)}
+        name = _part(table, f"segment {place + 1}")
+        labels = {**table.labels, "condition": name, "order": place, "stretch": (table, first, last)}
         columns = {n: c[first:last] if _along(c, table) else c for n, c in table.columns.items()}
-        found.append(Table(f"segment {place + 1}", table.time_s[first:last], columns, labels))
+        found.append(Table(name, table.time_s[first:last], columns, labels))
     return found
+
+
+def _part(table: Table, name: str) -> str:
+    """The name of a part of a record: with the record's own, if it has one, so that parts of several go together."""
+    return f"{table.labels['name']}, {name}" if "name" in table.labels else name
 
 
 def stretched(table: Table, record: Record, outputs: Sequence[str]) -> Record:

@@ -81,8 +81,9 @@ def not_declared(trials: Sequence[Record]) -> Iterator[str]:
     if any(len(group) > 1 for group in groups_of_repeats(trials)):
         return
     for first, other in combinations(trials, 2):
+        alike = np.array_equal(first.time_s, other.time_s)  # stretches of one run are not
         driven = any(np.shape(column) == first.time_s.shape for column in first.inputs.values())
-        if driven and first.experiment == other.experiment and _same_columns(first.inputs, other.inputs):
+        if alike and driven and first.experiment == other.experiment and _same_columns(first.inputs, other.inputs):
             yield (
                 f"Trials {first.name} and {other.name} have the same inputs, and nothing is declared as a repeat. If"
                 " they are repeats, give them one condition: the noise floor comes from repeats."

@@ -158,6 +158,17 @@ def _besides(case: Case, choice: Choice, found: Search) -> str:
     return ""
 
 
+def _at_odds(case: Case, choice: Choice, judged: _Judged, before: Error, explained: Error) -> list[str]:
+    """What speaks against the verdict: an effect that is supported and still not named; or, since the final trials
+    inform no choice, named effects with which these are predicted worse."""
+    named = " and ".join(choice.candidate.effects)
+    if judged.verdict == "unexplained" and _supported(case, choice):
+        return [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
+    if judged.verdict == "identified" and (explained.held_out or 0.0) > (before.held_out or 0.0):
+        return [f"With {named} the records that were not fitted are predicted worse than without: doubt the verdict."]
+    return []
+
+
 def _supported(case: Case, choice: Choice) -> bool:
     return bool(choice.probability) and min(choice.probability.values()) >= case.policy.supported
 
@@ -167,14 +178,12 @@ def _reported(
 ) -> Diagnosis:
     split, identified = case.split, judged.verdict == "identified"
     before = error_of(judged.base, split)
-    closed = 0.0
-    if identified:
-        after = error_of(judged.explained, split)
-        closed = share_of_gap(before.held_out, after.held_out, judged.floor.held_out)
+    explained = error_of(judged.explained, split)
+    closed = share_of_gap(before.held_out, explained.held_out, judged.floor.held_out) if identified else 0.0
     signature = describe(judged.explained, judged.left, judged.drifts)
     return Diagnosis(
         verdict=judged.verdict,
-        effects=describe_effects(case, found, choice) if identified else (),
+        effects=describe_effects(case, found, choice, (before, judged.floor)) if identified else (),
         base_parameters=_base_parameters(case, choice, found, judged.verdict),
         base=judged.base,
         explained=judged.explained,
@@ -186,7 +195,11 @@ def _reported(
         signature=describe(judged.base, judged.remainder, judged.drifts, besides=judged.besides),
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
-        warnings=(*said, *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ())),
+        warnings=(
+            *_at_odds(case, choice, judged, before, explained),
+            *said,
+            *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
+        ),
         learnt=tuple((case.system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
         next=_next(choice, found) if identified else NextExperiment(),
         search=found,

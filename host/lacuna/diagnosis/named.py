@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.decide import Choice
-from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
+from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search
+from lacuna.estimation.fit import Fit
 from lacuna.system import Effect
 
 _NEAREST = 5
@@ -47,12 +49,13 @@ class Rival:
     share_of_gap: float
 
 
-def describe_effects(case: Case, found: Search, choice: Choice) -> tuple[Named, ...]:
-    """Every effect of the choice, in the order of what it explains."""
+def describe_effects(case: Case, found: Search, choice: Choice, gap: tuple[Error, Floor]) -> tuple[Named, ...]:
+    """Every effect of the choice, in the order of what it explains of the gap between the base model's error and the
+    floor."""
     candidate = choice.candidate
     fitted, within = case.settled(candidate), case.intervals(candidate)
     named = []
-    for effect, share in _shares(case, found, choice):
+    for effect, share in _shares(case, found, choice, gap):
         described = fitted.structure.system.effects[effect]
         named.append(
             Named(
@@ -78,28 +81,30 @@ def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Rival, ..
     """The best other explanations tried, with what each would close."""
     chosen = choice.candidate if choice else found.base
     others = sorted((c for c in found.tried if c.effects and c is not chosen), key=lambda c: c.cost)[:_NEAREST]
-    closes = _closing(case, found)
+    closes = _closing(case, *_gap(case, found))
     return tuple(Rival(c.effects, closes(c.fitted)) for c in others)
 
 
-def _closing(case: Case, found: Search):
-    """A function that says what share of the base model's gap a fit closes on held-out trials."""
-    split = case.split
+def _gap(case: Case, found: Search) -> tuple[Error, Floor]:
     best = min(found.tried, key=lambda c: c.cost)
-    before, floor = error_of(case.on_known(found.base), split), floor_of(case.on_known(best), split)
-    return lambda fitted: share_of_gap(before.held_out, error_of(fitted, split).held_out, floor.held_out)
+    return error_of(case.on_known(found.base), case.split), floor_of(case.on_known(best), case.split)
 
 
-def _shares(case: Case, found: Search, choice: Choice) -> list[tuple[str, float]]:
+def _closing(case: Case, before: Error, floor: Floor) -> Callable[[Fit], float]:
+    """A function that says what share of a gap a fit closes on held-out trials."""
+    return lambda fitted: share_of_gap(before.held_out, error_of(fitted, case.split).held_out, floor.held_out)
+
+
+def _shares(case: Case, found: Search, choice: Choice, gap: tuple[Error, Floor]) -> list[tuple[str, float]]:
     """Each effect with the share of the gap that it closes on top of those before it, the largest first of all; what a
     form of their own closes counts with the last."""
-    closes, candidate = _closing(case, found), choice.candidate
+    closes, candidate = _closing(case, *gap), choice.candidate
     rest, chosen, closed, shares = list(candidate.effects), (), 0.0, []
     while rest:
         ahead = {}
         for effect in rest:
             if len(rest) == 1:
-                ahead[effect] = closes(case.on_known(choice.explanation))
+                ahead[effect] = closes(case.converged(choice.explanation))
                 continue
             smaller = found.with_effects((*chosen, effect))
             smaller = smaller or refitted_without(candidate, (*chosen, effect), case.split)

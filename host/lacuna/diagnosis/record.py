@@ -58,7 +58,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             {"effects": list(c.effects), "error": _number(c.rms)}
             for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]
         ],
-        "not_detectable_here": [s.effect for s in d.search.screened if not s.detectable],
+        "not_detectable_here": d.search.unseen,
         "next_experiment": {
             "separates": list(d.next.separates),
             "experiment": d.next.experiment,

@@ -81,6 +81,12 @@ class Search:
         wanted = frozenset(effects)
         return next((c for c in self.tried if frozenset(c.effects) == wanted), None)
 
+    @property
+    def unseen(self) -> list[str]:
+        """Effects that the data would hardly show: at their typical size, nor at any other that was tried."""
+        told = {c.effects for c in self.tried if self.base.cost - c.cost > _LEAST}
+        return [s.effect for s in self.screened if not s.detectable and (s.effect,) not in told]
+
     def freed_form(self, candidate: Candidate) -> Candidate | None:
         """The same effects in a form of their own, where that explains more."""
         return next((c for c in self.freed if c.effects == candidate.effects and c.cost < candidate.cost), None)

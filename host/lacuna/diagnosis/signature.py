@@ -55,8 +55,15 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
     if drifts:
         depends_on.append("order of the session")
     return Signature(
-        experiments, tuple(depends_on), tuple(dependences), _sentence(places, remainder, dependences, drifts, besides)
+        experiments,
+        tuple(depends_on),
+        tuple(dependences),
+        _sentence(places, remainder, dependences, drifts, besides, repeated=_repeated(fitted)),
     )
+
+
+def _repeated(fitted: Fit) -> bool:
+    return any(noise.repeats for noise in fitted.problem.floor.channels.values())
 
 
 _Rows = list[tuple[np.ndarray, Mapping[str, np.ndarray]]]
@@ -130,16 +137,18 @@ def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
-def _sentence(places, remainder: Remainder, dependences, drifts, besides: str) -> str:
+def _sentence(places, remainder: Remainder, dependences, drifts, besides: str, *, repeated: bool) -> str:
     if not places and not drifts and not besides:
-        return "The residual contains nothing beyond the differences between repeats."
+        known = "the differences between repeats" if repeated else "the noise"
+        return f"The residual contains nothing beyond {known}."
     parts = []
     if places:
         listed = ", ".join(
             f"{channel} in {experiment} ({np.sqrt(max(remainder.shared[experiment, channel], 0)):.1f} x the floor)"
             for experiment, channel in places[:4]
         )
-        parts.append(f"Repeats share a residual that the model does not explain: {listed}.")
+        left = "Repeats share a residual" if repeated else "A residual is left"
+        parts.append(f"{left} that the model does not explain: {listed}.")
     for d in dependences[:2]:
         parts.append(
             f"In {d.experiment}, {' and '.join(d.quantities)} explain{'s' if len(d.quantities) == 1 else ''} "

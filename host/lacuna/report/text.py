@@ -22,6 +22,7 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
     lines += _wrapped(floor_sentence(diagnosis))
     where = record["remainder"]["text"] if record["verdict"] == "identified" else record["signature"]["text"]
     lines += ["", *_wrapped(("What is left: " if record["verdict"] == "identified" else "") + where)]
+    lines += _unnamed(record["verdict"], diagnosis.final.structure.effects)
     lines += _learnt(record["learnt"])
     lines += _nearest(record)
     lines += _unseen(record["not_detectable_here"])
@@ -66,6 +67,12 @@ def _errors(error: Mapping[str, Any]) -> Iterator[str]:
         if error["before"][side] is not None:
             values = (error[column][side] for column in ("before", "after", "noise_floor"))
             yield f"  {label:40}" + "".join(f"{number_in_words(v):>10}" for v in values)
+
+
+def _unnamed(verdict: str, effects: Sequence[str]) -> list[str]:
+    if verdict != "unexplained" or not effects:
+        return []
+    return _wrapped(f"In the errors after and in the completed model, though not named: {', '.join(effects)}.")
 
 
 def _learnt(curves: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -8,12 +8,14 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import heater
 import numpy as np
 import pytest
 
 import lacuna
+from lacuna.diagnosis.search import Screened, Search
 from lacuna.progress import Progress, most_steps
 from lacuna.records import read
 from lacuna.report.text import screen_of
@@ -71,6 +73,36 @@ def test_a_curve_that_was_learnt_is_part_of_the_screen(verdict):
     curve = {"term": "loss", "variable": "temperature (K)"}
     shown = screen_of("block", verdict.record | {"learnt": [curve]}, verdict.diagnosis)
     assert "a learnt curve, loss over temperature (K)." in shown
+
+
+def test_it_is_said_if_the_final_records_speak_against_what_was_named():
+    records, without = heater.records(**LAG), heater.records()
+    final = {trial.name for trial in lacuna.diagnose(heater.system(), records, progress=False).diagnosis.split.final}
+    mixed = {name: (without if name in final else records)[name] for name in records}
+    found = lacuna.diagnose(heater.system(), mixed, progress=False)
+    assert [effect.name for effect in found.effects] == ["sensor_lag"], "they inform no choice"
+    assert found.error["after"] > found.error["before"]
+    assert found.warnings[0].startswith("With sensor_lag the records that were not fitted are predicted worse")
+
+
+def test_it_is_said_of_what_is_supported_that_it_explains_too_little(monkeypatch):
+    monkeypatch.setattr("lacuna.diagnosis.case.Case.closed", lambda *asked: 0.4)
+    found = lacuna.diagnose(heater.system(), heater.records(**LAG), progress=False)
+    assert found.verdict == "unexplained"
+    assert found.warnings[0].startswith("sensor_lag: a better prediction beyond doubt, but too little")
+    assert "though not named: sensor_lag" in str(found)
+
+
+def test_an_effect_closes_what_the_verdict_says_that_it_does(verdict):
+    (effect,) = verdict.record["effects"]
+    assert effect["share_of_gap"] == pytest.approx(1.0 - verdict.record["remainder"]["share_of_gap"], abs=1e-4)
+
+
+def test_what_the_data_would_hardly_show_was_not_seen_at_any_size():
+    screened = [Screened(name, 0.0, True, 0.0) for name in ("threshold", "ghost")]
+    tried = [SimpleNamespace(effects=(), cost=100.0), SimpleNamespace(effects=("threshold",), cost=20.0)]
+    tried.append(SimpleNamespace(effects=("ghost",), cost=99.9))
+    assert Search(tried[0], None, tuple(tried), tuple(screened)).unseen == ["ghost"]
 
 
 def test_a_verdict_is_short_in_a_line_and_one_screen_in_print(verdict):

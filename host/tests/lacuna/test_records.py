@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lacuna.records import RecordError, Table, read, segments
+from lacuna.records import RecordError, Table, read, segments, windows
 
 ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
 
@@ -92,3 +92,13 @@ def test_a_place_in_the_day_is_a_whole_number(tmp_path):
     (one,) = read(write(tmp_path, "a.csv", "time_s,y,order\n0,1,first\n1,2,first\n"))
     with pytest.raises(RecordError, match=r"record a: its order is .*first"):
         one.record(["y"])
+
+
+def test_parts_of_several_runs_go_together_by_the_runs_names():
+    runs = [{"name": name, "time_s": np.arange(100.0), "y": np.arange(100.0)} for name in ("monday", "friday")]
+    parts = [part for run in runs for part in segments(run, 3)]
+    assert len({part.name for part in parts}) == len({part.labels["condition"] for part in parts}) == 6
+    assert parts[0].name == "monday, segment 1"
+    cut = [part for run in runs for part in windows(run, 25.0, period=50.0)]
+    assert len({part.name for part in cut}) == 8
+    assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, on whatever day"

@@ -67,6 +67,11 @@ def test_repeats_that_are_not_declared_are_asked_for():
     assert not said_of({name: record for name, record in records.items() if name.endswith("_1")})
 
 
+def test_segments_of_one_run_are_not_taken_for_repeats():
+    run = heater.records(1)["steps_4W_1"] | {"power_W": np.ones(240)}
+    assert not any("same inputs" in said for said in said_of(lacuna.segments(run, 4)))
+
+
 def test_an_input_may_differ_if_the_base_model_does_not_use_it():
     draw = np.random.default_rng(0)
     records = {n: r | {"room_C": 21.0 + 0.1 * draw.standard_normal(240)} for n, r in heater.records(3).items()}
