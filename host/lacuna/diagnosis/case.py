@@ -74,8 +74,12 @@ class Case:
 
     def sharply(self, candidate: Candidate) -> Candidate:
         """The same against the floor that its own residuals show, for as long as that falls and the explanation
-        suffices. What differs from run to run by more than the noise (a nuisance) is in the first floor, and holds the
-        nuisances where they are expected, so that the next floor still has some of it: nothing would stand out."""
+        suffices. What each run begins with (a nuisance) may differ by more than the noise: it is in the first floor,
+        which holds the nuisances where they are expected, so that the next floor still has some of it, and nothing
+        would stand out. Not where factors of parameters are among them: such a system's own scatter stays in the floor,
+        since a run has to be foreseen without knowing it (`foreseen`)."""
+        if any(p.factor_of for parameters in candidate.fitted.problem.nuisances for p in parameters):
+            return candidate
         for _ in range(_SHARPENED):
             floor = candidate.fitted.problem.floor
             lower = sharpened_floor(candidate, self.split, floor)
