@@ -85,7 +85,7 @@ def _diagnosed(folder: Path) -> _Stages:
     measured = read_dataset(folder)
     stages.begin("fitting the stiffness curves")
     system = prepare(measured)
-    words = _LIBRARY_WORDS | set(system.effects)
+    words = _LIBRARY_WORDS | set(system.effects) | set(system.correction_sites)
     diagnose(system, progress=lambda what: stages.begin(_without(what, words)))
     stages.begin("")
     return stages

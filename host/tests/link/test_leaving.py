@@ -35,6 +35,20 @@ class Line:
         return self.board.read(timeout_s)
 
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+
+
+@pytest.fixture(autouse=True)
+def in_a_terminal():
+    """Signals as they are there: a shell ignores some on behalf of what it starts in the background."""
+    before = [(number, signal.getsignal(number)) for number in SIGNALS]
+    for number in SIGNALS:
+        signal.signal(number, signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL)
+    yield
+    for number, handler in before:
+        signal.signal(number, handler)
+
+
 @pytest.fixture
 def board() -> Board:
     return Board()
@@ -113,10 +127,9 @@ def test_ctrl_c_while_the_robot_is_being_stopped_is_not_lost(board):
 
 
 def test_signals_mean_afterwards_what_they_meant_before(board):
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
-    before = [signal.getsignal(number) for number in numbers]
+    before = [signal.getsignal(number) for number in SIGNALS]
     talk(board)
-    assert [signal.getsignal(number) for number in numbers] == before
+    assert [signal.getsignal(number) for number in SIGNALS] == before
 
 
 def test_ctrl_c_that_python_drops_comes_again(board):
