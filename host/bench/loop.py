@@ -77,8 +77,8 @@ def gain(effect: str, seed: int, summary: dict) -> Gain:
 
 
 HEADING = (
-    f"{'':36}{'gait from the base model':>32}   {'gait from the completed model':>32}\n"
-    f"{'effect, seed':23}{'named':13}" + "   ".join([f"{'predicted':>11}{'measured':>11}{'walking':>10}"] * 2)
+    f"{'':38}{'gait from the base model':>32}   {'gait from the completed model':>32}\n"
+    f"{'effect, seed':25}{'named':13}" + "   ".join([f"{'predicted':>11}{'measured':>11}{'walking':>10}"] * 2)
 )
 
 
@@ -87,7 +87,7 @@ def row(one: Gain) -> str:
     alone = "yes" if one.named == (one.effect,) else "and others" if one.effect in one.named else "no"
     each = zip(one.predicted_mm_s, one.measured_mm_s, one.walking, strict=True)
     columns = "   ".join(f"{p:11.2f}{m:11.2f}{walking:10.2f}" for p, m, walking in each)
-    return f"{f'{one.effect}, {one.seed}':23}{alone:13}{columns}"
+    return f"{f'{one.effect}, {one.seed}':25}{alone:13}{columns}"
 
 
 def summed_up(gains: Sequence[Gain]) -> dict[str, float]:
