@@ -113,8 +113,8 @@ class Verdict:
 
 def _nuisances(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
     problem, point = diagnosis.final.problem, diagnosis.final.solution.point
-    each = zip(problem.trials, problem.nuisances, point.nuisances, strict=True)
-    return {t.name: {p.name: float(v) for p, v in zip(ps, values, strict=True)} for t, ps, values in each if ps}
+    found = {t.name: problem.named(i, point.nuisances[i]) for i, t in enumerate(problem.trials)}
+    return {name: nuisances for name, nuisances in found.items() if nuisances}
 
 
 def told(system: System, diagnosis: Diagnosis) -> Diagnosis:

@@ -78,15 +78,11 @@ def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:
 def joined(first: Dataset, second: Dataset, prefix: str) -> Dataset:
     """Both data sets' trials as one day: the second's come later, under names of their own."""
     last = max((t.session_order or 0 for t in first.trials), default=0)
-    before = {condition: 0 for condition in (t.condition for t in second.trials)}
-    for trial in first.trials:
-        if trial.condition in before:
-            before[trial.condition] = max(before[trial.condition], trial.repeat)
     later = tuple(
         replace(
             trial,
             file=prefix + trial.file,
-            repeat=trial.repeat + before[trial.condition],
+            repeat=trial.repeat + first.last_repeat(trial.condition),
             session_order=last + (trial.session_order or 1),
         )
         for trial in second.trials

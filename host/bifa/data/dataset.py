@@ -98,6 +98,10 @@ class Dataset:
             trial for trial in self.trials if trial.experiment == experiment and actuator in (None, trial.actuator)
         )
 
+    def last_repeat(self, condition: Hashable) -> int:
+        """The highest number of a repeat of a condition; 0 where there is none."""
+        return max((trial.repeat for trial in self.trials if trial.condition == condition), default=0)
+
     def to_pandas(self):
         """All trials below one another, by file and time. Needs pandas."""
         return tables.stacked(self.trials)

@@ -59,11 +59,13 @@ def import_trial(
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
     columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
+    if recorded is not None:
+        planned = _next_repeat(recorded, planned)
     trial = planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S})
     if recorded is None:
         name = f"{planned.experiment} from {instrument.name}"
         return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
-    trial = _next_repeat(recorded, planned, trial, instrument)
+    _refuse_copy(recorded, trial, instrument)
     return read_dataset(add_trial(recorded, trial).path), clock
 
 
@@ -75,16 +77,18 @@ def _added_to(folder: Path, known: Mapping[str, float] | None) -> Dataset:
     return recorded
 
 
-def _next_repeat(recorded: Dataset, planned: PlannedTrial, trial: Trial, instrument: Path) -> Trial:
-    """`trial` under the first number and file name that are free."""
+def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
+    """`planned` under the next number of its condition."""
+    planned = replace(planned, repeat=1 + recorded.last_repeat(planned.as_trial().condition))
+    if (recorded.path / planned.file).exists():
+        raise InstrumentFileError(f"{recorded.path / planned.file} is in the way: it is not listed in {TABLE_FILE}")
+    return planned
+
+
+def _refuse_copy(recorded: Dataset, trial: Trial, instrument: Path) -> None:
     for old in recorded.trials:
         if all(np.array_equal(old.columns.get(name), values) for name, values in trial.columns.items()):
             raise InstrumentFileError(f"{instrument} is in {recorded.path} already, as {old.file}")
-    alike = [old.repeat for old in recorded.trials if old.condition == trial.condition]
-    planned = replace(planned, repeat=1 + max(alike, default=0))
-    if (recorded.path / planned.file).exists():
-        raise InstrumentFileError(f"{recorded.path / planned.file} is in the way: it is not listed in {TABLE_FILE}")
-    return replace(trial, file=planned.file, repeat=planned.repeat)
 
 
 def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np.ndarray], np.ndarray]:

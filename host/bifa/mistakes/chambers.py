@@ -10,7 +10,7 @@ from bifa.data.check import Finding
 from bifa.robot.cpg import CHAMBERS
 
 from .schedule import contradicted, seen_gait
-from .steps import AGAINST
+from .steps import AGAINST, PORTS
 from .swing import follow, swing
 
 # Of a pressure's range. In cycles of 3 s and more it follows its own command over 0.62 to 0.98 of it, even where valves
@@ -72,10 +72,8 @@ def turned(trial: Trial, shares: np.ndarray) -> Iterator[Finding]:
             -swing(trial.columns[f"command_{chamber}"], trial.columns[name], trial.time_s)
             for chamber, name in zip(chambers, names, strict=True)
         ]
-        text = (
-            f"falls by {', '.join(f'{psi:.2f}' for psi in falls)} psi while the chamber's command is positive, where "
-            "it should rise: are the sensor's two ports exchanged? Turn the sign"
-        )
+        listed = ", ".join(f"{psi:.2f}" for psi in falls)
+        text = f"falls by {listed} psi while the chamber's command is positive, {PORTS}"
         yield Finding("sign", text, trial.file, column=", ".join(names))
 
 

@@ -9,6 +9,7 @@ from .swing import follow, swing
 
 # Of the range, the other way round. Healthy: 0.92 and more of a pressure, 0.53 and more of a displacement.
 AGAINST = -0.5
+PORTS = "where it should rise: are the sensor's two ports exchanged? Turn the sign"
 _MOVES_MM = 5.0  # the other way; small actuators have a stroke of 30 mm
 
 
@@ -28,10 +29,7 @@ def check_step_response(trial: Trial) -> Iterator[Finding]:
         yield Finding("sign", text, trial.file, column="command")
     elif falls:
         psi = -swing(command, trial.columns["pressure_psi"], time_s)
-        text = (
-            f"falls by {psi:.2f} psi while the command is positive, where it should rise: are the sensor's two ports "
-            "exchanged? Turn the sign"
-        )
+        text = f"falls by {psi:.2f} psi while the command is positive, {PORTS}"
         yield Finding("sign", text, trial.file, column="pressure_psi")
     elif shrinks:
         text = (

@@ -19,6 +19,6 @@ def check(system: System) -> tuple[str, ...]:
     check_columns(trials)
     check_constant(trials)
     check_times(trials)
-    start, good, predictions, said = check_model(system, trials)
-    ignored = check_inputs(system, start, good, predictions)
+    predictions, said = check_model(system, trials)
+    ignored = check_inputs(system, trials, predictions)
     return (*odd_ones(trials), *not_declared(trials), *gaps_in_inputs(trials), *ignored, *said)

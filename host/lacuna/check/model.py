@@ -14,12 +14,15 @@ _NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at th
 _NEAR_ABSENT = 0.1  # of its typical size: how near the absent one an effect may come at least
 
 
-def check_model(
-    system: System, trials: Sequence[Record]
-) -> tuple[Theta, list[Record], dict[str, Channels], tuple[str, ...]]:
-    """The initial values, the trials that the model can predict with them, these predictions, and warnings. Raises
-    MisuseError."""
-    start = {p.name: p.value for p in system.parameters}
+def initial(system: System) -> Theta:
+    """The base model's initial values."""
+    return {p.name: p.value for p in system.parameters}
+
+
+def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Channels], tuple[str, ...]]:
+    """What the model predicts with its initial values, by the names of the trials that it can predict, and warnings.
+    Raises MisuseError."""
+    start = initial(system)
     predictions = {t.name: predicted(system, start, (), t) for t in trials}
     failed = [t.name for t in trials if _fails(t, predictions[t.name])]
     if len(failed) == len(trials):
@@ -44,7 +47,7 @@ def check_model(
     warnings += never_off
     if idle:
         warnings.append(f"{listed(idle)} {'does' if len(idle) == 1 else 'do'} not affect any prediction.")
-    return start, good, predictions, tuple(warnings)
+    return {t.name: predictions[t.name] for t in good}, tuple(warnings)
 
 
 def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 
-from lacuna.check.model import predicted
+from lacuna.check.model import initial, predicted
 from lacuna.check.numbers import SAME, differ, spread
 from lacuna.errors import MisuseError
-from lacuna.system import Channels, Record, System, Theta, groups_of_repeats
+from lacuna.system import Channels, Record, System, groups_of_repeats
 
 _OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
 _UNLIKE = 10.0  # times what repeats differ by as a rule, RMS: one that is as far from all others was recorded otherwise
@@ -30,31 +30,23 @@ def check_times(trials: Sequence[Record]) -> None:
                 )
 
 
-def check_inputs(
-    system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]
-) -> Iterator[str]:
-    """Repeats have the same inputs, as far as these change what is predicted: raises MisuseError. Warns of others."""
-    spreads = {name: _input_spread(trials, name) for name in {name for trial in trials for name in trial.inputs}}
+def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> Iterator[str]:
+    """Repeats have the same inputs, as far as these change what is predicted: raises MisuseError. Warns of columns that
+    do not. `predictions`: with the initial values, of the trials that can be predicted."""
     ignored: dict[str, str] = {}
-    for first, *others in groups_of_repeats(trials):
-        for other in others:
-            for name in sorted(first.inputs.keys() & other.inputs.keys()):
-                one, its = first.inputs[name], other.inputs[name]
-                if _number_changed(one, its):
-                    limit, said = _OTHER, f"their {name} is {one:g} and {its:g}"
-                elif _column_changed(first, other, name, spreads[name]):
-                    its, limit, said = _at_times_of(first, other, name), SAME, f"their input {name} differs"
-                else:
-                    continue
-                there = replace(first, inputs={**first.inputs, name: its})
-                changed = _changed(predicted(system, start, (), there), predictions[first.name], first, limit)
-                if changed:
-                    raise MisuseError(
-                        f"{_declared(first, other)}, but {said}, with which {changed} is predicted differently: the"
-                        " difference would pass for noise. Give them different conditions."
-                    )
-                if limit == SAME:
-                    ignored.setdefault(name, f"{first.name} and {other.name}")
+    for first, other, name, its, said in _differences([t for t in trials if t.name in predictions]):
+        there = replace(first, inputs={**first.inputs, name: its})
+        of_column = np.ndim(its) > 0
+        changed = _changed(
+            predicted(system, initial(system), (), there), predictions[first.name], first, SAME if of_column else _OTHER
+        )
+        if changed:
+            raise MisuseError(
+                f"{_declared(first, other)}, but {said}, with which {changed} is predicted differently: the difference"
+                " would pass for noise. Give them different conditions."
+            )
+        if of_column:
+            ignored.setdefault(name, f"{first.name} and {other.name}")
     for name, pair in ignored.items():
         yield (
             f"The repeats {pair} have a different {name}, which the base model does not use: what it does to them"
@@ -62,18 +54,33 @@ def check_inputs(
         )
 
 
+def _differences(trials: Sequence[Record]) -> Iterator[tuple[Record, Record, str, Any, str]]:
+    """Two repeats, the name of an input that differs, what the first would have as the second's, and this in words."""
+    spreads = {name: _input_spread(trials, name) for name in {name for trial in trials for name in trial.inputs}}
+    for first, *others in groups_of_repeats(trials):
+        for other, name in product(others, sorted(first.inputs)):
+            if name not in other.inputs:
+                continue
+            one, its = first.inputs[name], other.inputs[name]
+            if _number_changed(one, its):
+                yield first, other, name, its, f"their {name} is {one:g} and {its:g}"
+            elif _column_changed(first, other, name, spreads[name]):
+                yield first, other, name, _at_times_of(first, other, name), f"their input {name} differs"
+
+
 def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
     """Warnings of repeats that are copies, or unlike all others."""
     groups = [group for group in groups_of_repeats(trials) if len(group) > 1]
     for group in groups:
         for first, other in combinations(group, 2):
-            if _same_record(first, other):
+            if _same_columns(first.channels, other.channels):
                 yield f"Trials {first.name} and {other.name} are the same record: a copy is no repeat. Leave it out."
     for experiment, channel in dict.fromkeys((t.experiment, c) for t in trials for c in t.channels):
         members = [group for group in groups if group[0].experiment == experiment]
         apart = [_apart(group, channel) for group in members]
         for k, (group, differences) in enumerate(zip(members, apart, strict=True)):
-            yield from _unlike(group, channel, differences, [d for j, d in enumerate(apart) if j != k])
+            elsewhere = [value for j, d in enumerate(apart) if j != k for value in _pairs(d)]
+            yield from _unlike(group, channel, differences, float(np.median(elsewhere)) if elsewhere else 0.0)
 
 
 def not_declared(trials: Sequence[Record]) -> Iterator[str]:
@@ -91,18 +98,20 @@ def not_declared(trials: Sequence[Record]) -> Iterator[str]:
             return
 
 
-def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, elsewhere: Iterable[np.ndarray]) -> Iterator[str]:
-    """`apart`: of a group's members, RMS, shape (n, n); `elsewhere`: the same of the experiment's other conditions."""
-    usual = [value for values in elsewhere for value in _pairs(values)]
-    if len(group) == 2 and usual and apart[0, 1] > _UNLIKE * np.median(usual) > 0.0:
-        yield (
-            f"Trials {group[0].name} and {group[1].name}, repeats of one condition, differ in {channel} by"
-            f" {apart[0, 1]:.3g} (RMS), others by {np.median(usual):.2g}: if one was recorded otherwise, leave it out."
-        )
-    for k, trial in enumerate(group if len(group) > 2 else ()):
+def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, usual: float) -> Iterator[str]:
+    """`apart`: of a group's members, RMS, shape (n, n); `usual`: the same as a rule in the experiment's other
+    conditions; 0 without any."""
+    if len(group) == 2:
+        if apart[0, 1] > _UNLIKE * usual > 0.0:
+            yield (
+                f"Trials {group[0].name} and {group[1].name}, repeats of one condition, differ in {channel} by"
+                f" {apart[0, 1]:.3g} (RMS), others by {usual:.2g}: if one was recorded otherwise, leave it out."
+            )
+        return
+    for k, trial in enumerate(group):
         others = [j for j in range(len(group)) if j != k]
         nearest, alike = apart[k, others].min(), float(np.median(_pairs(apart[np.ix_(others, others)])))
-        if nearest > _UNLIKE * max(alike, float(np.median(usual)) if usual else 0.0) > 0.0:
+        if nearest > _UNLIKE * max(alike, usual) > 0.0:
             at = _furthest(trial, group[others[0]], channel)
             yield (
                 f"Trial {trial.name}, channel {channel}: unlike its repeats, from which it differs by {nearest:.3g}"
@@ -134,10 +143,6 @@ def _difference(one: Record, other: Record, channel: str) -> tuple[np.ndarray, n
 def _furthest(one: Record, other: Record, channel: str) -> float:
     at, apart = _difference(one, other, channel)
     return float(one.time_s[0] + at[np.nanargmax(np.abs(apart))])
-
-
-def _same_record(one: Record, other: Record) -> bool:
-    return _same_columns(one.channels, other.channels)
 
 
 def _same_columns(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

@@ -178,7 +178,7 @@ def _reported(
 ) -> Diagnosis:
     split, identified = case.split, judged.verdict == "identified"
     before = error_of(judged.base, split)
-    explained = error_of(judged.explained, split)
+    explained = error_of(judged.explained, split) if identified else before
     closed = share_of_gap(before.held_out, explained.held_out, judged.floor.held_out) if identified else 0.0
     signature = describe(judged.explained, judged.left, judged.drifts)
     return Diagnosis(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lacuna.check.numbers import listed
 from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
@@ -22,7 +23,7 @@ def _failed(fits: list[Fit]) -> list[str]:
     names = [name for fit in fits for name in failed(fit.problem.trials, fit.scaled_residuals())]
     if not names:
         return []
-    return [f"The model could not predict {_listed(names)}: these trials count as badly predicted."]
+    return [f"The model could not predict {listed(names)}: these trials count as badly predicted."]
 
 
 def _parameters(fitted: Fit) -> list[str]:
@@ -40,7 +41,7 @@ def _parameters(fitted: Fit) -> list[str]:
     ]
     # between its data a learnt curve is what its prior makes of it, in any number of directions
     own = [[name for name in direction if not is_learnt(name)] for direction in known.undetermined]
-    found += [f"The data do not determine a combination of {_listed(names)}." for names in own if names]
+    found += [f"The data do not determine a combination of {listed(names)}." for names in own if names]
     return list(dict.fromkeys(found))
 
 
@@ -54,15 +55,9 @@ def _strayed(fits: list[Fit]) -> list[str]:
                 if "." not in parameter.name and abs(value - parameter.value) > _NEAR_LIMIT * parameter.step_scale:
                     far.setdefault(parameter.name, []).append(trial.name)
     return [
-        f"{name} is at its limit in {_listed(trials)}: it probably absorbs model error." for name, trials in far.items()
+        f"{name} is at its limit in {listed(trials)}: it probably absorbs model error." for name, trials in far.items()
     ]
 
 
 def _quantity(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}".rstrip()
-
-
-def _listed(names: list[str], most: int = 4) -> str:
-    shown = names[:most]
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(shown) + more

@@ -295,12 +295,13 @@ class Problem:
     def _simulate_trials(self, point: Point, members: Sequence[int], *, coarse: bool) -> list[Channels]:
         theta = self.structure.theta(point.values)
         corrections = [self.structure.corrections(theta)] * len(members)
-        thetas = [theta | self._named(i, point.nuisances[i]) for i in members]
+        thetas = [theta | self.named(i, point.nuisances[i]) for i in members]
         trials = [self.trials[i] for i in members]
         how = {"coarse": coarse, "corrections": corrections}
         return self.structure.system.predict_trials(thetas, self.structure.effects, trials, **how)
 
-    def _named(self, index: int, nuisances: np.ndarray) -> dict[str, float]:
+    def named(self, index: int, nuisances: np.ndarray) -> dict[str, float]:
+        """The nuisances of a trial by their names."""
         return {p.name: float(v) for p, v in zip(self.nuisances[index], nuisances, strict=True)}
 
     def _simulate(
@@ -310,7 +311,7 @@ class Problem:
         thetas = [self.structure.theta(values) for values, _ in places]
         corrections = [self.structure.corrections(theta) for theta in thetas]
         for theta, (_, nuisances) in zip(thetas, places, strict=True):
-            theta |= self._named(index, nuisances)
+            theta |= self.named(index, nuisances)
         how = {"coarse": coarse, "corrections": corrections, "alike": alike}
         return self.structure.system.predict_many(thetas, self.structure.effects, self.trials[index], **how)
 

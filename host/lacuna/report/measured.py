@@ -20,7 +20,7 @@ def measured_rows(diagnosis: Diagnosis) -> list[Row]:
     for (experiment, channel), trials in groups.items():
         noise = diagnosis.search.floor.channels[experiment, channel]
         conditions = len({t.condition for t in trials})
-        basis = f"{noise.repeats} pairs of repeats" if noise.repeats else "the fast noise of the residual"
+        basis = _pairs(noise.repeats) if noise.repeats else "the fast noise of the residual"
         piece = f"{noise.samples_per_piece:.3g}"
         rows.append((f"{experiment}: {channel}", f"{len(trials)} in {conditions}", f"{noise.sd:.3g}", piece, basis))
     return rows
@@ -32,8 +32,7 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
     repeats = sum(noise.repeats for noise in channels.values())
     alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
     if not alone:
-        pairs = "one pair" if repeats == 1 else f"{repeats} pairs"
-        return f"The floor comes from the differences between {pairs} of repeats."
+        return f"The floor comes from the differences between {_pairs(repeats)}."
     told = {c: noise_time for c in alone if (noise_time := _noise_time(diagnosis, c))}
     if len(told) == len(alone):
         listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())
@@ -45,6 +44,10 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
         f"Without repeats the floor of {', '.join(alone)} is the fast noise of the residual: whatever varies slowly"
         " from run to run counts as structure here, and only a repeat could show that it is none."
     )
+
+
+def _pairs(count: int) -> str:
+    return "one pair of repeats" if count == 1 else f"{count} pairs of repeats"
 
 
 def _noise_time(diagnosis: Diagnosis, channel: str) -> float:
