@@ -6,6 +6,9 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.residual_error import share_of_gap
+
 CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # floors that the error after may be, by truth
 BASELINES = ("best single", "BIC", "greedy", "sparse regression")
 KINDS = ("single", "none", "outside", "pair")
@@ -163,10 +166,10 @@ def _plain(record: dict) -> bool:
 
 def _gap(record: dict) -> bool:
     """Whether the base model misses the trials that informed nothing, or conditions that were never fitted, by more
-    than a tenth of the floor's variance: what it misses by less is `none` by contract."""
+    than a tenth of the floor: what it misses by less is `none` by contract."""
     error = record["error"]
     sides = [(error["before"][side], error["noise_floor"][side]) for side in ("held_out", "held_out_conditions")]
-    return any(before**2 - floor**2 > 0.1 * floor**2 for before, floor in sides if before and floor)
+    return any(before**2 - floor**2 > POLICY.relevance * floor**2 for before, floor in sides if before and floor)
 
 
 def _ratio(record: dict, which: str = "held_out") -> float:
@@ -191,6 +194,6 @@ def _base_covered(record: dict) -> list[bool]:
 
 
 def _closed(record: dict) -> float:
-    error = record["error"]
-    floor, before = error["noise_floor"]["held_out"], error["before"]["held_out"]
-    return (before - error["after"]["held_out"]) / max(before - floor, 1e-9)
+    """The share of the gap; where there is none, nothing."""
+    before, after, floor = (record["error"][which]["held_out"] for which in ("before", "after", "noise_floor"))
+    return share_of_gap(before, after, floor) if before > floor else 0.0

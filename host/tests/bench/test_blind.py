@@ -50,13 +50,20 @@ def test_rates_count_what_was_named_and_what_was_not(capsys):
 
 
 def test_what_the_base_model_hardly_misses_is_told_apart():
-    small = {"held_out": 1.04, "held_out_conditions": 0.99}
+    small = {"held_out": 1.09, "held_out_conditions": 0.99}
     outside = [record(k, kind="outside", truth="pipe_joint") for k in range(3)]
     outside[1]["error"]["before"] |= small
-    outside[2]["error"]["before"] |= small | {"held_out_conditions": 1.06}
+    outside[2]["error"]["before"] |= small | {"held_out_conditions": 1.11}
     rates = {name.split(":")[1].strip(): hits for name, hits in blind_figures.rates(outside, "foreign").items() if hits}
     assert rates["never plainly explained"] == [False] * 3
     assert rates["never plainly explained, where there is a gap"] == [False] * 2
+
+
+def test_where_there_is_no_gap_nothing_is_closed():
+    outside = record(1, kind="outside", truth="pipe_joint")
+    outside["error"]["before"]["held_out"] = 0.99 * outside["error"]["noise_floor"]["held_out"]
+    outside["error"]["after"]["held_out"] = 0.98 * outside["error"]["noise_floor"]["held_out"]
+    assert blind_figures.rates([outside], "foreign")["outside: half the gap closed by what is learnt"] == [False]
 
 
 def test_a_table_has_the_rates_of_all_truths_beside_what_is_required():
