@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import norm
 
 from lacuna.diagnosis.policy import POLICY, Policy
-from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.noise import NoiseFloor, at_times
 from lacuna.estimation.problem import FAILED, SOFT_LIMIT
 from lacuna.system import Channels, Record, System
 
@@ -129,7 +129,7 @@ def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
         first, channels = members[0]
         for channel in channels:
             rows = [
-                _compressed(np.interp(first.time_s, t.time_s, _with_failures(c[channel], t.channels[channel])))
+                _compressed(at_times(first.time_s, t.time_s, _with_failures(c[channel], t.channels[channel])))
                 for t, c in members
                 if channel in c
             ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
-from lacuna.estimation.noise import repeat_pairs
+from lacuna.estimation.noise import at_times, repeat_pairs
 from lacuna.system import Channels, Record
 
 
@@ -130,7 +130,7 @@ def _on(fitted: Fit, trials: Sequence[Record]) -> dict[str, Channels]:
 
 def _difference(first: Record, second: Record, residuals: Mapping[str, Channels]) -> Channels:
     return {
-        c: (r - np.interp(first.time_s, second.time_s, residuals[second.name][c])) / np.sqrt(2)
+        c: (r - at_times(first.time_s, second.time_s, residuals[second.name][c])) / np.sqrt(2)
         for c, r in residuals[first.name].items()
         if c in residuals[second.name]
     }

@@ -180,8 +180,12 @@ def _difference(first: Record, second: Record, channel: str, residuals: Mapping[
     known = np.isfinite(b)
     if known.sum() < 2:
         return np.full(a.shape, np.nan)
-    common = np.interp(first.time_s, second.time_s[known], b[known], left=np.nan, right=np.nan)
-    return (a - common) / np.sqrt(2)
+    return (a - at_times(first.time_s, second.time_s[known], b[known])) / np.sqrt(2)
+
+
+def at_times(time_s: np.ndarray, measured_s: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    """A repeat's samples at another's times; NaN before it begins and after it ends."""
+    return np.interp(time_s, measured_s, samples, left=np.nan, right=np.nan)
 
 
 def _moves(trial: Record, channel: str) -> np.ndarray:

@@ -3,6 +3,7 @@ prediction fails, and without noise."""
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from lacuna.diagnosis.remainder import find_remainder
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
@@ -70,3 +71,17 @@ def test_missing_samples_do_not_dilute_structure(every):
     assert sparse.matters
     assert not remainder({"a": noise(3, 6)}, missing=missing).matters
     assert not remainder({k: noise(1, 20 + k) for k in range(4)}, missing=missing).matters, "without repeats"
+
+
+def test_noise_is_seldom_structure_where_repeats_end_early():
+    """A repeat has nothing to say of the time after its end: not its last residual for ever."""
+    found = 0
+    for seed in range(40):
+        draw = np.random.default_rng(seed)
+        trials, scaled = [], []
+        for k, length in enumerate((1000, 500, 500)):
+            z = lfilter([np.sqrt(1 - 0.9**2)], [1.0, -0.9], draw.standard_normal(length + 200))[200:]
+            trials.append(Record(f"{k}", KEY[0], "a", TIME_S[:length], {KEY[1]: TIME_S[:length]}))
+            scaled.append({KEY[1]: z})
+        found += bool(find_remainder(Plain(), trials, scaled, NoiseFloor({KEY: ChannelNoise(0.2, 0.0, 19.0, 3)})).found)
+    assert found <= 1, "binomial, 40 draws at 0.005: two or more happen once in 60"
