@@ -69,6 +69,11 @@ def read(data: Any) -> list[Record | Table]:
     if _is_table(data):
         return [_table(part, name) for name, part in _parts(data)]
     if isinstance(data, Mapping):
+        if data and all(isinstance(column, np.ndarray) for column in data.values()):
+            raise RecordError(
+                f"a record of {', '.join(map(str, data))} has no times: give a column time_s, in seconds (of static"
+                " data the number of the row)."
+            )
         return [_table(one, str(name)) for name, one in data.items()]
     if isinstance(data, Iterable):
         return [found for place, one in enumerate(data) for found in _one_of_many(one, place)]
@@ -287,6 +292,7 @@ def windows(
     RecordError.
     """
     (table,) = _tables(data)
+    _increases(table)
     time = table.time_s - table.time_s[0]
     sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     every = seconds if every is None else every
@@ -318,6 +324,7 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     (table,) = _tables(data)
     if not isinstance(count, int) or count < 3:
         raise RecordError(f"record {table.name}: {count!r} segments; a diagnosis needs a whole number, 3 or more.")
+    _increases(table)
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)
     if len(table.time_s) < count * _FEWEST:
         raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")
@@ -328,6 +335,17 @@ def segments(data: Any, count: int = 10) -> list[Table]:
         columns = {n: c[first:last] if _along(c, table) else c for n, c in table.columns.items()}
         found.append(Table(name, table.time_s[first:last], columns, labels))
     return found
+
+
+def _increases(table: Table) -> None:
+    """Windows and segments are cut by time. Raises RecordError."""
+    back = np.flatnonzero(~(np.diff(table.time_s) > 0.0))
+    if len(back):
+        at, (before, after) = int(back[0]), table.time_s[back[0] : back[0] + 2]
+        raise RecordError(
+            f"record {table.name}: time does not increase from sample {at} ({before:g} s) to the next ({after:g} s):"
+            " sort it by time, or give its parts one by one."
+        )
 
 
 def _part(table: Table, name: str) -> str:

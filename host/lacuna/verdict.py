@@ -11,6 +11,8 @@ from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.named import Estimated
 from lacuna.diagnosis.record import as_record
 from lacuna.errors import MisuseError
+from lacuna.estimation.fit import Fit, evaluate_on, refit_on
+from lacuna.estimation.solve import one_thread
 from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
 from lacuna.records import read, stretched
@@ -26,12 +28,11 @@ class Model:
     otherwise. Returns what `simulate` returns, of a window or a segment its own samples.
     """
 
-    def __init__(self, system: System, diagnosis: Diagnosis):
-        final = diagnosis.final
-        self._system, self._theta, self._effects = system, final.theta, final.structure.effects
-        self._corrections = final.structure.corrections(final.theta)
-        names = [p.name for p in final.structure.parameters if not is_learnt(p.name)]
-        self.theta = Values({name: system.told(name, final.theta[name]) for name in names})
+    def __init__(self, system: System, fitted: Fit):
+        self._system, self._theta, self._effects = system, fitted.theta, fitted.structure.effects
+        self._corrections = fitted.structure.corrections(fitted.theta)
+        names = [p.name for p in fitted.structure.parameters if not is_learnt(p.name)]
+        self.theta = Values({name: system.told(name, fitted.theta[name]) for name in names})
 
     def __call__(self, record: Any, theta: Mapping[str, float] | None = None) -> Any:
         if not isinstance(self._system, FunctionSystem):
@@ -65,7 +66,7 @@ class Verdict:
     """The engine's result. `verdict`: "none", "identified" or "unexplained"; `effects`: the effects named, with sizes,
     intervals and probabilities; `error`: of the model before and after and of the floor, RMS in units of the noise, on
     records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call;
-    `nuisances`: by record, what was fitted to each.
+    `nuisances`: by record, what was fitted to each. These three are fitted to every record, once the errors are known.
 
     `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws. `record` is all of it in plain types
     for JSON, `diagnosis` the engine's complete result.
@@ -74,9 +75,10 @@ class Verdict:
     def __init__(self, system: System, diagnosis: Diagnosis):
         self.system, self.diagnosis = system, told(system, diagnosis)
         self.verdict, self.effects, self.warnings = diagnosis.verdict, self.diagnosis.effects, diagnosis.warnings
-        self.model = Model(system, diagnosis)
+        fitted = _to_all(diagnosis) if isinstance(system, FunctionSystem) else diagnosis.final
+        self.model = Model(system, fitted)
         self.theta = self.model.theta
-        self.nuisances = _nuisances(diagnosis)
+        self.nuisances = _nuisances(fitted)
         self.record = as_record(self.diagnosis)
         self.error = {
             "before": diagnosis.before.held_out,
@@ -111,8 +113,18 @@ class Verdict:
         return overview(self.record, self.diagnosis)
 
 
-def _nuisances(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
-    problem, point = diagnosis.final.problem, diagnosis.final.solution.point
+@one_thread
+def _to_all(diagnosis: Diagnosis) -> Fit:
+    """The completed model fitted to every record: those that judged it have done so, and know something, too."""
+    final, held_out = diagnosis.final, diagnosis.split.held_out
+    if not held_out:
+        return final
+    near = (final, evaluate_on(final, held_out))
+    return refit_on(final, (*final.problem.trials, *held_out), near=near)
+
+
+def _nuisances(fitted: Fit) -> dict[str, dict[str, float]]:
+    problem, point = fitted.problem, fitted.solution.point
     found = {t.name: problem.named(i, point.nuisances[i]) for i, t in enumerate(problem.trials)}
     return {name: nuisances for name, nuisances in found.items() if nuisances}
 

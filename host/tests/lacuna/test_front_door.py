@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import heater
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import lacuna
 from lacuna.diagnosis.search import Screened, Search
@@ -20,6 +21,7 @@ from lacuna.progress import Progress, most_steps
 from lacuna.records import read
 from lacuna.report.text import screen_of
 from lacuna.run import with_records
+from lacuna.values import Values
 
 LAG = {"sensor_lag__lag_s": 3.0}
 LIMIT = {"saturation__limit_W": 6.0}
@@ -60,7 +62,23 @@ def test_the_completed_model_is_called_like_the_first(verdict):
     assert np.std(predicted - truth) < 1.5 * heater.NOISE_K
     without = verdict.model(given, {"sensor_lag.lag_s": 0.0})["temperature_K"]
     assert np.std(without - truth) > 3 * heater.NOISE_K
-    assert verdict.theta.sensor_lag.lag_s == verdict.effects[0].parameters["lag_s"]
+    lower, upper = verdict.effects[0].interval["lag_s"]
+    assert lower < verdict.theta.sensor_lag.lag_s < upper
+
+
+def test_the_completed_model_knows_every_record(verdict):
+    """Those too that judged it: as SciPy fits the same parameters to all of them."""
+    records = heater.records(seed=1, **LAG)
+    names = ["gain_K_W", "tau_s", "sensor_lag.lag_s"]
+
+    def residuals(values):
+        theta = Values(heater.system().values({}) | dict(zip(names, values, strict=True)))
+        return np.concatenate(
+            [r["temperature_K"] - heater.simulate(r, theta)["temperature_K"] for r in records.values()]
+        )
+
+    fitted = least_squares(residuals, [verdict.theta[name] for name in names], x_scale=[0.1, 1.0, 0.1]).x
+    assert [verdict.theta[name] for name in names] == pytest.approx(fitted, rel=2e-4)
 
 
 def test_a_record_that_lacks_an_input_is_refused_by_the_completed_model(verdict):

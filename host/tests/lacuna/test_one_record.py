@@ -66,13 +66,12 @@ def test_error_is_no_worse_than_scipys_with_twenty_starts_on_the_same_structure(
     records = lacuna.segments(record(5, slow_K=0.1, **BOTH))
     found = lacuna.diagnose(system, records, progress=False)
     assert named(found) == {"sensor_lag", "saturation"}
-    fitted = found.diagnosis.split.known
     bound = with_records(system, records)
     names = ["gain_K_W", "tau_s", "sensor_lag.lag_s", "saturation.limit_W"]
 
     def residual(values):
         theta = Values(system.values({}) | dict(zip(names, values, strict=True)))
-        return np.concatenate([bound.run(t, theta)["temperature_K"] - t["temperature_K"] for t in fitted])
+        return np.concatenate([bound.run(t, theta)["temperature_K"] - t["temperature_K"] for t in bound.trials])
 
     lower, upper = [0.1, 1.0, 0.0, 1.0], [5.0, 100.0, 20.0, 100.0]
     draw = np.random.default_rng(0)
@@ -120,6 +119,13 @@ def test_slow_noise_hides_no_effect_that_is_larger():
     one = lacuna.segments(record(4, slow_K=0.3, **LIMIT))
     found = lacuna.diagnose(heater.system(noise_time_s="estimated"), one, progress=False)
     assert named(found) == {"saturation"}
+
+
+@pytest.mark.parametrize("cut", [lacuna.windows, lacuna.segments])
+def test_a_clock_that_restarts_is_not_cut(cut):
+    time_s = np.r_[np.arange(200), np.arange(200)] * 0.1
+    with pytest.raises(RecordError, match=r"time does not increase from sample 199 \(19.9 s\) to the next \(0 s\)"):
+        cut({"time_s": time_s, "power_W": time_s, "temperature_K": time_s}, 5)
 
 
 def test_a_period_makes_windows_repeats():

@@ -102,3 +102,8 @@ def test_parts_of_several_runs_go_together_by_the_runs_names():
     cut = [part for run in runs for part in windows(run, 25.0, period=50.0)]
     assert len({part.name for part in cut}) == 8
     assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, on whatever day"
+
+
+def test_arrays_without_times_are_one_record_without_times():
+    with pytest.raises(RecordError, match="a record of y, u has no times: give a column time_s"):
+        read({"y": np.zeros(9), "u": np.zeros(9)})
