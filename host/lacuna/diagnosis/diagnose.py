@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from lacuna.check import check
+from lacuna.check.numbers import listed
 from lacuna.diagnosis.candidate import finished_afresh
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
@@ -29,6 +30,8 @@ from lacuna.errors import TooLittleDataError
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
+
+_HARMFUL = 0.01  # of the gap: a share below zero by less is rounding
 
 
 @dataclass(frozen=True)
@@ -158,15 +161,33 @@ def _besides(case: Case, choice: Choice, found: Search) -> str:
     return ""
 
 
-def _at_odds(case: Case, choice: Choice, judged: _Judged, before: Error, explained: Error) -> list[str]:
-    """What speaks against the verdict: an effect that is supported and still not named; or, since the final trials
-    inform no choice, named effects with which these are predicted worse."""
-    named = " and ".join(choice.candidate.effects)
-    if judged.verdict == "unexplained" and _supported(case, choice):
-        return [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
-    if judged.verdict == "identified" and (explained.held_out or 0.0) > (before.held_out or 0.0):
-        return [f"With {named} the records that were not fitted are predicted worse than without: doubt the verdict."]
-    return []
+def _at_odds(
+    case: Case, choice: Choice, effects: tuple[Named, ...], before: Error, explained: Error, floor: Floor
+) -> list[str]:
+    """What speaks against a verdict that names `effects`, or none: an explanation that is more probable, or supported,
+    and still not named; or, since the final trials inform no choice, effects with which these are predicted worse."""
+    named, said = " and ".join(choice.candidate.effects), []
+    if not effects:
+        if _supported(case, choice):
+            said = [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
+        return said
+    worse = [e.name for e in effects if e.share_of_gap < -_HARMFUL]
+    if explained.held_out > before.held_out:
+        said = [f"With {named} the records that were not fitted are predicted worse than without: doubt the verdict."]
+    elif before.held_out > floor.held_out and worse:
+        said = [f"With {listed(worse)} the records that were not fitted are predicted worse than without: doubt it."]
+    likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
+    if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
+        besides = [effect for effect in likeliest if effect not in choice.candidate.effects]
+        said.append(
+            f"With {listed(besides)}, too, the explanation would be more probable ({weight:.2f}), but that closes too"
+            " little of what is left to be named, or helps too little where nothing was fitted."
+        )
+    if len(case.split.held_out) == 1:
+        said.append(
+            f"One record alone was not fitted, {case.split.held_out[0].name}: the shares of the gap rest on it."
+        )
+    return said
 
 
 def _supported(case: Case, choice: Choice) -> bool:
@@ -181,9 +202,10 @@ def _reported(
     explained = error_of(judged.explained, split) if identified else before
     closed = share_of_gap(before.held_out, explained.held_out, judged.floor.held_out) if identified else 0.0
     signature = describe(judged.explained, judged.left, judged.drifts)
+    effects = describe_effects(case, found, choice, (before, judged.floor)) if identified else ()
     return Diagnosis(
         verdict=judged.verdict,
-        effects=describe_effects(case, found, choice, (before, judged.floor)) if identified else (),
+        effects=effects,
         base_parameters=_base_parameters(case, choice, found, judged.verdict),
         base=judged.base,
         explained=judged.explained,
@@ -196,7 +218,7 @@ def _reported(
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
-            *_at_odds(case, choice, judged, before, explained),
+            *(_at_odds(case, choice, effects, before, explained, judged.floor) if judged.verdict != "none" else ()),
             *said,
             *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
         ),

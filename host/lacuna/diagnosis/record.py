@@ -58,7 +58,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             {"effects": list(c.effects), "error": _number(c.rms)}
             for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]
         ],
-        "not_detectable_here": d.search.unseen,
+        "not_detectable_here": [name for name in d.search.unseen if name not in {e.name for e in d.effects}],
         "next_experiment": {
             "separates": list(d.next.separates),
             "experiment": d.next.experiment,

@@ -43,10 +43,10 @@ class Signature:
 def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, besides: str = "") -> Signature:
     """The signature of the residual of `fitted`, given its test for structure, the drifts over the session, and whether
     repeats differ by what is no noise."""
-    top = remainder.largest
+    top, found = remainder.largest, set(remainder.found)
     places = sorted(
-        (key for key, z in remainder.z.items() if z > _VISIBLE and remainder.shared[key] > _SHARE_OF_LARGEST * top),
-        key=lambda key: -remainder.shared[key],
+        (key for key in found | _visible(remainder) if remainder.shared[key] > _SHARE_OF_LARGEST * top),
+        key=lambda key: (-remainder.shared[key], key),
     )
     experiments = tuple(dict.fromkeys(experiment for experiment, _ in places))
     data = _gather(fitted)
@@ -60,6 +60,10 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
         tuple(dependences),
         _sentence(places, remainder, dependences, drifts, besides, repeated=_repeated(fitted)),
     )
+
+
+def _visible(remainder: Remainder) -> set[tuple[str, str]]:
+    return {key for key, z in remainder.z.items() if z > _VISIBLE}
 
 
 def _repeated(fitted: Fit) -> bool:

@@ -23,14 +23,17 @@ def _failed(fits: list[Fit]) -> list[str]:
     names = [name for fit in fits for name in failed(fit.problem.trials, fit.scaled_residuals())]
     if not names:
         return []
-    return [f"The model could not predict {listed(names)}: these trials count as badly predicted."]
+    return [
+        f"The model could not predict {listed(names)}: counted as badly predicted where explanations are compared, left"
+        " out of the errors."
+    ]
 
 
 def _parameters(fitted: Fit) -> list[str]:
     known = uncertainty(fitted)
     told = fitted.structure.system.told
     found = [
-        f"{e.name} is at its bound ({_quantity(told(e.name, e.value), e.unit)}): the data call for a value beyond it."
+        f"{e.name} is at its bound ({_quantity(told(e.name, e.value), e.unit)}): widen it if it is no physical limit."
         for e in known.estimates
         if e.at_bound
     ]
@@ -41,7 +44,7 @@ def _parameters(fitted: Fit) -> list[str]:
     ]
     # between its data a learnt curve is what its prior makes of it, in any number of directions
     own = [[name for name in direction if not is_learnt(name)] for direction in known.undetermined]
-    found += [f"The data do not determine a combination of {listed(names)}." for names in own if names]
+    found += [f"The data hardly determine {_combined(names)}." for names in own if names]
     return list(dict.fromkeys(found))
 
 
@@ -55,8 +58,14 @@ def _strayed(fits: list[Fit]) -> list[str]:
                 if "." not in parameter.name and abs(value - parameter.value) > _NEAR_LIMIT * parameter.step_scale:
                     far.setdefault(parameter.name, []).append(trial.name)
     return [
-        f"{name} is at its limit in {listed(trials)}: it probably absorbs model error." for name, trials in far.items()
+        f"{name} is more than {_NEAR_LIMIT:g} standard deviations from what is expected in {listed(trials)}: it"
+        " probably absorbs model error."
+        for name, trials in far.items()
     ]
+
+
+def _combined(names: list[str]) -> str:
+    return listed(names) if len(names) == 1 else f"a combination of {listed(names)}"
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -123,5 +123,8 @@ def _measured(found: Diagnosis) -> Section:
 
 
 def _sized(effect: Mapping[str, Any]) -> str:
-    ends = effect["interval_90"]
-    return ", ".join(f"{k} = {v:g} ({ends[k][0]:g} to {ends[k][1]:g})" for k, v in effect["parameters"].items())
+    said = []
+    for name, value in effect["parameters"].items():
+        size, lower, upper = (number_in_words(v, "g") for v in (value, *effect["interval_90"][name]))
+        said.append(f"{name} = {size} ({lower} to {upper})")
+    return ", ".join(said)

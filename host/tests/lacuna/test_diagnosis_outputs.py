@@ -2,13 +2,20 @@
 
 import subprocess
 import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 from toy import hide
 
-from lacuna.diagnosis.diagnose import diagnose
+from lacuna.diagnosis.diagnose import _at_odds, diagnose
+from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.record import as_record
+from lacuna.diagnosis.remainder import Remainder
+from lacuna.diagnosis.signature import describe
 from lacuna.report.diagnosis import diagnosis_page
 from lacuna.report.page import render
+
+KEY = ("sweep", "position_mm")
 
 
 def test_page_says_the_effect_and_loads_nothing():
@@ -24,6 +31,41 @@ def test_page_shows_what_was_learnt_where_no_effect_explains_the_data():
     (curve,) = record["learnt"]
     assert curve["term"] in render(diagnosis_page("toy", record))
     assert curve["rows"][""][-1] * curve["rows"][""][0] < 0.0
+
+
+def test_page_has_an_interval_without_an_end():
+    record = as_record(diagnose(hide({"delay.delay_s": 0.02}, seed=30)))
+    (effect,) = record["effects"]
+    effect["interval_90"]["delay_s"][1] = None
+    assert "to -)" in render(diagnosis_page("toy", record))
+
+
+def test_what_is_named_is_not_what_the_data_would_hardly_show():
+    found = diagnose(hide({"delay.delay_s": 0.02}, seed=30))
+    blind = [replace(s, visible=0.0) for s in found.search.screened]
+    found = replace(found, search=replace(found.search, screened=tuple(blind), tried=found.search.tried[:1]))
+    hidden = as_record(found)["not_detectable_here"]
+    assert hidden
+    assert "delay" not in hidden
+
+
+def test_where_something_matters_it_is_told_where():
+    """By the test that decides, however many standard deviations that is."""
+    found = diagnose(hide({}, seed=31))
+    small = Remainder({KEY: 0.5}, {KEY: 2.9}, {KEY: 0.004}, {KEY: 0.0}, POLICY)
+    assert small.matters
+    assert "position_mm in sweep (0.7 x the floor)" in describe(found.base, small).text
+
+
+def test_an_effect_that_does_harm_and_a_likelier_set_speak_against_a_verdict():
+    found = diagnose(hide({"delay.delay_s": 0.02}, seed=30))
+    case, before, floor = SimpleNamespace(split=found.split), found.before, found.floor
+    assert _at_odds(case, found.choice, found.effects, before, found.after, floor) == []
+    harmful = (replace(found.effects[0], share_of_gap=-0.3),)
+    likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
+    harm, odds = _at_odds(case, likelier, harmful, before, found.after, floor)
+    assert "With delay the records that were not fitted are predicted worse" in harm
+    assert "With stiction, too," in odds
 
 
 def test_unusable_input_ends_with_status_2(tmp_path):
