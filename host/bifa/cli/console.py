@@ -24,12 +24,18 @@ def console(
 
     With piped input it sends the lines one by one, prints the answers, and exits with status 1 if any was an error.
     """
+    from bifa.errors import BifaError
+
+    if sys.stdin is None:
+        raise BifaError("nothing can be typed, as the standard input is closed (<&-); pipe lines into the command")
+
     from bifa.link import Uno
     from bifa.link.terminal import settle
+    from bifa.live.output import writable
     from bifa.rig import open_rig
     from bifa.screen import Console
 
-    with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
+    with writable(), open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
         with Console(stderr=True).status("waiting for the Uno"):
             uno.connect()
             settle(uno, rig.clock)

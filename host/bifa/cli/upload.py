@@ -33,21 +33,23 @@ def upload(
     Opening the port restarts an Uno: it stops walking, and comes back with its start preset. At the end of --run all
     valves are off.
     """
+    if seconds is not None and not run:
+        raise typer.BadParameter("--seconds is for --run")
+
     from bifa.rig import check_port
 
     check_port(port)
 
     from bifa.link import Uno
+    from bifa.live.output import writable
     from bifa.live.walk import walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
     from bifa.screen import Console
 
-    if seconds is not None and not run:
-        raise typer.BadParameter("--seconds is for --run")
     parameters = read_gait_file(gait).parameters
     console = Console()
-    with open_rig(port) as rig:
+    with writable(), open_rig(port) as rig:
         try:
             with console.status("waiting for the Uno"), Uno(rig.transport, rig.clock) as uno:
                 hello = uno.connect()

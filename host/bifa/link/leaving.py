@@ -4,11 +4,14 @@ Whoever talks to an Uno does so inside `with Uno(...)`, and that is all: its end
 until the Uno says that no valve is on, and raises StillMovingError if it does not say so. Ctrl-C, Ctrl-\\, `kill` and a
 closed terminal end what is inside like any exception, wherever it is; their stop leaves before anything else is tidied
 up, and once a robot is being stopped nothing interrupts that. Ctrl-Z stops the robot before it suspends the program,
-which ends when it is resumed.
+which ends when it is resumed. On Linux the end of the program that started this one, which by itself sends no signal
+(SIGKILL of a script, for instance), ends it as well, but for `nohup`, which asks for the opposite.
 """
 
 import contextlib
+import ctypes
 import functools
+import os
 import signal
 import sys
 import threading
@@ -37,8 +40,11 @@ _earlier_handlers: dict[int, Any] = {}
 _earlier_hook: list[Callable] = []
 _held: list[int] = []
 _again: list[threading.Timer] = []
+_parents: list[int] = []  # who started this program, while their death ends it
 _whole: set = set()  # code of the functions that nothing interrupts
 AGAIN_AFTER_S = 0.01
+_SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
+_DEATH = getattr(signal, "SIGUSR2", None)  # a signal of its own: it also comes when the parent's thread alone ends
 
 
 def enter(robot: Robot) -> None:
@@ -55,6 +61,7 @@ def enter(robot: Robot) -> None:
                 _earlier_handlers[number] = signal.signal(number, act)
         _earlier_hook.append(sys.unraisablehook)
         sys.unraisablehook = _end_again
+        _watch_parent()
     _inside.append(robot)
 
 
@@ -62,11 +69,12 @@ def leave(robot: Robot) -> None:
     """`robot` has been stopped; signals mean again what they meant before."""
     _inside.remove(robot)
     if not _inside and threading.current_thread() is threading.main_thread():
+        _watch_parent_no_more()
         while _earlier_handlers:
             signal.signal(*_earlier_handlers.popitem())
         sys.unraisablehook = _earlier_hook.pop()
-        while _again:
-            _again.pop().cancel()
+        if _again:
+            _cancel_again()
             _held.append(signal.SIGINT)
 
 
@@ -99,7 +107,7 @@ def _end(number: int, frame) -> None:
             return
         frame = frame.f_back
     _held.clear()
-    _again.clear()
+    _cancel_again()
     # First of all: what lies between here and the end of the command may take long, or write to a pipe that is full.
     _stop_all()
     raise KeyboardInterrupt
@@ -118,6 +126,46 @@ def _stop_all() -> None:
 
 
 _ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGTSTP": _suspend}
+
+
+def _orphaned(number: int, frame) -> None:
+    if os.getppid() != _parents[-1]:  # else only the thread that started this program has ended
+        _end(number, frame)
+
+
+def _watch_parent() -> None:
+    if sys.platform != "linux" or signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        return
+    if _death_signal() != 0 or signal.getsignal(_DEATH) is not signal.SIG_DFL:
+        return
+    _parents.append(os.getppid())
+    signal.signal(_DEATH, _orphaned)
+    _prctl(_SET_DEATH_SIGNAL, int(_DEATH))
+
+
+def _watch_parent_no_more() -> None:
+    if _parents:
+        _prctl(_SET_DEATH_SIGNAL, 0)
+        signal.signal(_DEATH, signal.SIG_DFL)
+        _parents.pop()
+
+
+def _death_signal() -> int | None:
+    """What the parent's death sends to this process now, 0: nothing; None where that cannot be chosen."""
+    now = ctypes.c_int()
+    return now.value if _prctl(_GET_DEATH_SIGNAL, ctypes.byref(now)) == 0 else None
+
+
+def _prctl(option: int, value) -> int:
+    try:
+        return ctypes.CDLL(None).prctl(option, value)
+    except (OSError, AttributeError):  # a C library without it
+        return -1
+
+
+def _cancel_again() -> None:
+    while _again:
+        _again.pop().cancel()
 
 
 def _end_again(lost) -> None:

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from prompt_toolkit import PromptSession
-from prompt_toolkit.history import FileHistory
+from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 from prompt_toolkit.key_binding import KeyBindings
 from prompt_toolkit.patch_stdout import patch_stdout
 
@@ -32,25 +32,47 @@ def status_lines(conversation: Conversation) -> list[tuple[str, str]]:
     ]
 
 
-def _history() -> FileHistory:
-    folder = Path(os.environ.get("XDG_STATE_HOME", Path.home() / ".local/state")) / "bifa"
-    folder.mkdir(parents=True, exist_ok=True)
-    return FileHistory(str(folder / "console-history"))
+def _history() -> History:
+    """That of earlier consoles; where no file can be kept, of this one alone."""
+    try:
+        folder = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "bifa"
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / "console-history").open("a+b"):
+            return FileHistory(str(folder / "console-history"))
+    except (OSError, RuntimeError) as error:  # RuntimeError: nobody's home
+        print(f"history is not kept: {error}")
+        return InMemoryHistory()
 
 
-def _prompt(conversation: Conversation) -> PromptSession:
+def _keys(conversation: Conversation) -> KeyBindings:
+    """The prompt reads the terminal raw: keys that send signals elsewhere are only keys here, and mean the same."""
     keys = KeyBindings()
 
     @keys.add("!")
     def _(event) -> None:
         conversation.stop()
 
+    @keys.add("c-z")
+    def _(event) -> None:
+        conversation.stop()
+        event.app.suspend_to_background()  # by the signal, so that what is resumed ends
+
+    @keys.add("c-c")  # while the history is searched as well
+    @keys.add("c-\\")
+    def _(event) -> None:
+        conversation.stop()
+        event.app.exit(exception=KeyboardInterrupt(), style="class:aborting")
+
+    return keys
+
+
+def _prompt(conversation: Conversation) -> PromptSession:
     session = PromptSession(
         "uno> ",
         history=_history(),
         completer=LineCompleter(conversation.known),
         complete_while_typing=True,
-        key_bindings=keys,
+        key_bindings=_keys(conversation),
         bottom_toolbar=lambda: status_lines(conversation),
         refresh_interval=0.2,
     )
@@ -64,9 +86,20 @@ def _prompt(conversation: Conversation) -> PromptSession:
 
 
 def converse(uno: Uno, rig) -> None:
-    """Prompt until Ctrl-D or Ctrl-C; raises what ended the link, if something did."""
+    """Prompt until Ctrl-D, Ctrl-C, Ctrl-Z or Ctrl-\\; raises what ended the link, if something did."""
     print("type help; Tab completes; ! stops at once; Ctrl-D leaves, all valves off")
     conversation = Conversation(uno, rig)
+    try:
+        _talk(conversation)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        conversation.abandon()
+    if conversation.error is not None:
+        raise conversation.error
+
+
+def _talk(conversation: Conversation) -> None:
     session = _prompt(conversation)
     with patch_stdout():
         try:
@@ -74,9 +107,3 @@ def converse(uno: Uno, rig) -> None:
                 conversation.type(session.prompt())
         except EOFError:
             conversation.leave()
-        except KeyboardInterrupt:
-            pass
-        finally:
-            conversation.abandon()
-    if conversation.error is not None:
-        raise conversation.error

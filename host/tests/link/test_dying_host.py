@@ -1,9 +1,12 @@
 """The host dies while the robot walks: with `host_timeout_s` the robot vents in time, every time."""
 
 import contextlib
+import os
 import random
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -73,3 +76,81 @@ def test_sigkill(kills, figure):
         uno.unplug()
     if kills > 2:
         figure(f"{kills} SIGKILLs: vented at most {longest_s * 1000:.0f} ms after the last byte; time-out 300 ms")
+
+
+WALKS = """
+import os, sys
+from bifa.link import Uno
+from bifa.rig import SerialRig
+with SerialRig(sys.argv[1]) as rig, Uno(rig.transport, rig.clock) as uno:
+    uno.connect()
+    uno.run()
+    print(os.getpid(), flush=True)
+    while True:
+        uno.samples(0.02)
+"""
+# Starts what walks, from its main thread or from another that ends; argv: port, program, what SIGHUP does, which.
+STARTS = """
+import signal, subprocess, sys, threading, time
+signal.signal(signal.SIGHUP, getattr(signal, sys.argv[3]))
+start = lambda: subprocess.Popen([sys.executable, "-c", sys.argv[2], sys.argv[1]])
+if sys.argv[4] == "thread":
+    thread = threading.Thread(target=lambda: (start(), time.sleep(2)))
+    thread.start()
+    thread.join()
+else:
+    start()
+print("ended", file=sys.stderr, flush=True)
+time.sleep(60)
+"""
+
+
+@contextlib.contextmanager
+def started_by_another(uno: PtyUno, hang_up: str, where: str):
+    """The program between, once what it started walks and the thread that started it has come to its end."""
+    command = [sys.executable, "-c", STARTS, uno.device, WALKS, hang_up, where]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as between:
+        walking = int(between.stdout.readline())
+        assert between.stderr.readline() == "ended\n"
+        try:
+            assert uno.board.state == "running"
+            yield between
+        finally:
+            between.kill()
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(walking, signal.SIGKILL)
+
+
+def is_stopped(uno: PtyUno, within_s: float) -> bool:
+    deadline = time.monotonic() + within_s
+    while uno.board.state == "running" and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return (uno.board.valves, uno.board.state) == (0, "stopped")
+
+
+@pytest.fixture
+def uno():
+    uno = PtyUno()
+    yield uno
+    uno.unplug()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
+def test_sigkill_of_whoever_started_it_stops_the_robot(uno):
+    with started_by_another(uno, "SIG_DFL", "main") as between:
+        between.kill()
+        assert is_stopped(uno, 20)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
+def test_under_nohup_it_walks_on_without_an_owner(uno):
+    with started_by_another(uno, "SIG_IGN", "main") as between:
+        between.kill()
+        assert not is_stopped(uno, 1.0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
+def test_the_end_of_a_thread_of_whoever_started_it_stops_nothing(uno):
+    with started_by_another(uno, "SIG_DFL", "thread"):
+        assert not is_stopped(uno, 1.0)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from bifa.cli import app
+from bifa.files import TargetError
 from bifa.link import MismatchError, NoAnswerError, PortGoneError, Uno, UnoParameterError
 from bifa.link.clock_relation import ClockRelation
 from bifa.link.frames import Report
@@ -164,3 +165,27 @@ def test_a_recording_is_a_data_set(tmp_path):
     assert "lost 0" in done.output
     (trial,) = read_dataset(tmp_path / "walks").trials
     assert trial.experiment == "locomotion"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["monitor", "--model", "{here}", "--port", "nowhere"], "are for --web"),
+        (["monitor", "--web-port", "0", "--port", "nowhere"], "are for --web"),
+        (["monitor", "--web", "--model", "{missing}", "--port", "nowhere"], "does not exist"),
+        (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds is for --run"),
+        (["compare", "{here}"], "two campaigns or more"),
+    ],
+    ids=" ".join,
+)
+def test_options_that_do_nothing_are_refused_before_anything_else(tmp_path, arguments, words):
+    (tmp_path / "here").write_text(GAIT)
+    places = {"here": tmp_path / "here", "missing": tmp_path / "missing"}
+    result = CliRunner().invoke(app, [argument.format(**places) for argument in arguments], env={"COLUMNS": "300"})
+    assert result.exit_code == 2
+    assert words in result.output
+
+
+def test_compare_looks_first_where_it_shall_write(tmp_path):
+    result = CliRunner().invoke(app, ["compare", "one", "two", "--report", str(tmp_path / "missing" / "x.html")])
+    assert isinstance(result.exception, TargetError)

@@ -3,6 +3,7 @@
 import math
 import signal
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -16,6 +17,7 @@ from harness.terminal import Terminal
 pytestmark = pytest.mark.real_time
 
 UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
+CTRL_R, CTRL_Z, CTRL_BACKSLASH = "\x12", "\x1a", "\x1c"
 PERIOD = "s (0.5 to 60 s, default 5.7 s)"
 KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})
 
@@ -126,10 +128,12 @@ def close_window(console: Terminal) -> None:
         lambda console: console.presses(CTRL_C),
         lambda console: console.presses(CTRL_D),
         lambda console: console.presses("a line begun" + CTRL_C),
+        lambda console: console.presses(CTRL_R + "ru" + CTRL_C),
+        lambda console: console.presses(CTRL_BACKSLASH),
         lambda console: console.program.kill(signal.SIGTERM),
         lambda console: close_window(console),
     ],
-    ids=["ctrl-c", "ctrl-d", "ctrl-c in a line", "kill", "window closed"],
+    ids=["ctrl-c", "ctrl-d", "ctrl-c in a line", "ctrl-c in a search", "ctrl-backslash", "kill", "window closed"],
 )
 def test_leaving_turns_the_valves_off(console, uno, leave):
     enters(console, "run", "ok")
@@ -138,6 +142,32 @@ def test_leaving_turns_the_valves_off(console, uno, leave):
     if not console.program.closed:
         assert console.exit_status() == 0
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
+
+
+def is_suspended(console: Terminal) -> bool:
+    stat = Path(f"/proc/{console.program.pid}/stat").read_text()
+    return stat.rpartition(")")[2].split()[0] == "T"
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc here")
+def test_ctrl_z_stops_the_robot_then_suspends_and_what_is_resumed_ends(console, uno):
+    enters(console, "run", "ok")
+    console.until(lambda: uno.board.valves != 0)
+    console.presses(CTRL_Z)
+    console.until(lambda: is_suspended(console))
+    assert (uno.board.valves, uno.board.state) == (0, "stopped")
+    console.program.kill(signal.SIGCONT)
+    assert console.exit_status() == 0
+    assert (uno.board.valves, uno.board.state) == (0, "stopped")
+
+
+def test_a_history_that_cannot_be_kept_keeps_nobody_from_talking(uno, tmp_path):
+    (tmp_path / "bifa").write_text("a file where the folder would be")
+    with Terminal(tmp_path, "console", "--port", uno.device) as console:
+        console.sees("history is not kept:", "uno>", "idle")
+        enters(console, "set period_s 4", "[period_s 5.700 -> 4.000 s", "ok")
+        console.presses(CTRL_D)
+        assert console.exit_status() == 0
 
 
 def test_unplugged_is_said_at_once(console, uno):

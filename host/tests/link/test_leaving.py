@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from bifa.link import PortGoneError, RefusedError, StillMovingError, Uno
+from bifa.link import PortGoneError, RefusedError, StillMovingError, Uno, leaving
 from bifa.link.frames import STOP
 from bifa.link.terminal import type_line
 from harness.board import Board
@@ -35,7 +35,7 @@ class Line:
         return self.board.read(timeout_s)
 
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGUSR2)
 
 
 @pytest.fixture(autouse=True)
@@ -130,6 +130,7 @@ def test_signals_mean_afterwards_what_they_meant_before(board):
     before = [signal.getsignal(number) for number in SIGNALS]
     talk(board)
     assert [signal.getsignal(number) for number in SIGNALS] == before
+    assert leaving._death_signal() in (0, None)
 
 
 def test_ctrl_c_that_python_drops_comes_again(board):
@@ -146,6 +147,24 @@ def test_ctrl_c_that_python_drops_comes_again(board):
     with pytest.raises(KeyboardInterrupt):
         interrupted()
     assert (board.valves, board.state) == (0, "stopped")
+
+
+def test_ctrl_c_that_waits_to_come_again_does_not_come_after_another(board, monkeypatch):
+    monkeypatch.setattr(leaving, "AGAIN_AFTER_S", 0.3)
+
+    class Dying:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGINT)
+
+    def interrupted() -> None:
+        with Uno(board, board) as uno:
+            walk(uno, board)
+            Dying()
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    time.sleep(0.4)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGQUIT])

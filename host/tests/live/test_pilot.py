@@ -2,7 +2,7 @@
 
 import pytest
 
-from bifa.link import Uno
+from bifa.link import PortGoneError, Uno
 from bifa.live.web.pilot import NobodyThereError, Pilot
 from harness.board import Board
 
@@ -54,6 +54,26 @@ def test_a_stop_comes_before_what_was_asked_and_is_confirmed():
     assert stop.result(0) is None
     assert reports[-1]["state"] == "stopped"
     assert board.valves == 0
+
+
+def test_a_stop_that_finds_the_port_gone_leaves_nobody_waiting():
+    board, asked = Board(), []
+    uno = Uno(board, board)
+    pilot = Pilot(uno, board)
+
+    def gone() -> None:
+        raise PortGoneError("/dev/robot is gone")
+
+    def during(report):
+        if not asked:
+            asked.append(pilot.ask(lambda uno: uno.run()))
+            uno.send_stop = gone
+            with pytest.raises(PortGoneError):
+                pilot.stop()
+            del uno.send_stop
+
+    pilot.fly(during, 0.5)
+    assert asked[0].cancelled()
 
 
 def test_what_the_uno_refuses_is_said_and_the_flight_goes_on():

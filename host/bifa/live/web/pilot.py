@@ -48,9 +48,11 @@ class Pilot:
         with self._lock:
             dropped = [future for _, future in self._asked]
             self._asked.clear()
-        self._uno.send_stop()
-        for future in dropped:
-            future.cancel()
+        try:
+            self._uno.send_stop()
+        finally:
+            for future in dropped:
+                future.cancel()
         return self._queue(lambda uno: uno.stop(), first=True)
 
     def _queue(self, what: Callable[[Uno], Any], first: bool) -> Future:

@@ -28,7 +28,7 @@ from bifa.errors import BifaError
 from bifa.live.web.pilot import NobodyThereError, Pilot, wall_clock
 from bifa.ranges import RANGES
 from bifa.robot import Model
-from bifa.robot.gait import Gait
+from bifa.robot.gait import GAIT_NAMES, Gait
 from bifa.simulate import speed
 
 HOST = "127.0.0.1"
@@ -37,11 +37,13 @@ _BACK_WITHIN_S = 3.0  # a page that is loaded anew has not been closed
 _HANDED_OVER_S = 0.05
 _WAITING = 64  # reports that a slow page may be behind
 
-GAIT_NAMES = tuple(Gait.__dataclass_fields__)
-
 
 class ServerError(BifaError):
     """The page cannot be served there."""
+
+
+class AskedWrongError(ServerError):
+    """A request that the page would not send."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class LivePage:
         """Wait until every page has been told everything, or `timeout_s`."""
         until_s = time.monotonic() + timeout_s
         time.sleep(_HANDED_OVER_S)
-        while any(not queue.empty() for queue in self._watchers) and time.monotonic() < until_s:
+        while any(not queue.empty() for queue in list(self._watchers)) and time.monotonic() < until_s:
             time.sleep(_HANDED_OVER_S)
 
     def _pass_on(self, report: dict[str, Any]) -> None:
@@ -108,7 +110,7 @@ class LivePage:
                 Route("/", self._show),
                 Route("/setup", self._setup),
                 WebSocketRoute("/live", self._live),
-                *(Route(f"/{name}", self._for_the_owner(act), methods=["POST"]) for name, act in doing.items()),
+                *(Route(f"/{name}", self._for_the_owner(name, act), methods=["POST"]) for name, act in doing.items()),
             ],
             # a page elsewhere that has got hold of this address by a name of its own is not answered
             middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
@@ -171,15 +173,17 @@ class LivePage:
 
     # -- writing ----------------------------------------------------------------------------------------------
 
-    def _for_the_owner(self, act: Callable[[Mapping[str, Any]], dict[str, Any]]):
+    def _for_the_owner(self, name: str, act: Callable[[Mapping[str, Any]], dict[str, Any]]):
         async def handle(request: Request) -> Response:
             given = request.headers.get("authorization", "").removeprefix("Bearer ")
             if not secrets.compare_digest(given.encode(), self.token.encode()):
                 return JSONResponse({"error": "open the page by the address that bifa monitor printed"}, 403)
-            try:
-                asked = await request.json() if await request.body() else {}
-            except ValueError:
+            try:  # a stop is one whatever comes with it
+                asked = await request.json() if name != "stop" and await request.body() else {}
+            except (ValueError, RecursionError):
                 return JSONResponse({"error": "that is no JSON"}, 400)
+            if not isinstance(asked, dict):
+                return JSONResponse({"error": "send a JSON object, such as {}"}, 400)
             status, answer = await run_in_threadpool(_answered, lambda: act(asked))
             return JSONResponse(answer, status)
 
@@ -212,7 +216,10 @@ class LivePage:
         return {"said": f"stopped at {wall_clock()}: the Uno confirms that all valves are off"}
 
     def _closing(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        self.stops_when_closed = bool(asked.get("stop", True))
+        stop = asked.get("stop", True)
+        if not isinstance(stop, bool):
+            raise AskedWrongError("stop is true or false")
+        self.stops_when_closed = stop
         return {"said": f"when this page closes, the robot {'stops' if self.stops_when_closed else 'goes on'}"}
 
 
@@ -225,7 +232,7 @@ async def _left(socket: WebSocket) -> None:
 def _gait(asked: Mapping[str, Any]) -> Gait:
     given = asked.get("gait")
     if not isinstance(given, Mapping) or set(given) != set(GAIT_NAMES):
-        raise ServerError(f"a gait has {', '.join(GAIT_NAMES)}")
+        raise AskedWrongError(f"a gait has {', '.join(GAIT_NAMES)}")
     return Gait(**given)
 
 
@@ -233,6 +240,8 @@ def _answered(act: Callable[[], dict[str, Any]]) -> tuple[int, dict[str, Any]]:
     """What came of it, with its HTTP status."""
     try:
         return 200, act()
+    except AskedWrongError as error:
+        return 400, {"error": str(error)}
     except NobodyThereError as error:
         return 503, {"error": str(error)}
     except BifaError as error:

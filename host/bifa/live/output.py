@@ -1,0 +1,39 @@
+"""Output that cannot be written, as on a full disk, ends a command with a sentence that says so."""
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from bifa.errors import BifaError
+
+_FULL = tuple(getattr(errno, name) for name in ("ENOSPC", "EFBIG", "EDQUOT") if hasattr(errno, name))
+
+
+class OutputError(BifaError):
+    """What a command prints cannot be written; the text says why."""
+
+
+@contextmanager
+def writable() -> Iterator[None]:
+    """Around all that a command does: an error of a full disk becomes an OutputError. A robot inside stands by then."""
+    try:
+        yield
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        _drop_the_rest()
+        reason = os.strerror(error.errno)
+        raise OutputError(f"the output cannot be written ({reason}); make room, or print to somewhere else") from None
+
+
+def _drop_the_rest() -> None:
+    """What waits to be written would fail once more as Python ends."""
+    with contextlib.suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
