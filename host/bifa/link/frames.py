@@ -140,7 +140,8 @@ class Splitter:
     def feed(self, data: bytes) -> list[tuple[str, bytes]]:
         """("line", text without its end) and ("frame", bytes between the delimiters), in order of arrival.
 
-        An overlong frame comes out as ("frame", what there was): it will not decode, and so is counted.
+        An overlong line comes out in pieces. An overlong frame comes out as ("frame", what there was): it will not
+        decode, and so is counted.
         """
         parts: list[tuple[str, bytes]] = []
         for byte in data:
@@ -148,12 +149,18 @@ class Splitter:
                 self._in_frame_byte(byte, parts)
             elif byte == 0:
                 self._in_frame = True
-            elif byte == ord("\n") or len(self._line) >= self.LONGEST_LINE:
-                parts.append(("line", bytes(self._line).rstrip(b"\r")))
-                self._line.clear()
+            elif byte == ord("\n"):
+                parts.append(self._taken_line())
             else:
+                if len(self._line) >= self.LONGEST_LINE:
+                    parts.append(self._taken_line())
                 self._line.append(byte)
         return parts
+
+    def _taken_line(self) -> tuple[str, bytes]:
+        line = bytes(self._line).rstrip(b"\r")
+        self._line.clear()
+        return "line", line
 
     def _in_frame_byte(self, byte: int, parts: list[tuple[str, bytes]]) -> None:
         if byte != 0:

@@ -7,9 +7,11 @@ changed. So everything with an on-disk cache lives in files whose very name chan
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import importlib.util
 import os
+import stat
 import sys
 import tempfile
 import time
@@ -28,19 +30,36 @@ def digest(*texts: str) -> str:
 
 
 def folder() -> Path:
-    """Where generated code lives: BIFA_CACHE_DIR, else the user's cache, else a temporary folder."""
+    """Where generated code lives: BIFA_CACHE_DIR, else the user's cache, else a temporary one, the user's alone."""
     chosen = os.environ.get("BIFA_CACHE_DIR")
     if chosen is None:
         chosen = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "bifa"
-    for candidate in (
-        Path(chosen),
-        Path(tempfile.gettempdir()) / f"bifa-{os.getuid() if hasattr(os, 'getuid') else 0}",
-    ):
-        with contextlib.suppress(OSError):
-            candidate.mkdir(parents=True, exist_ok=True)
-            if os.access(candidate, os.W_OK):
-                return candidate
-    raise OSError("no folder can be written for compiled code; set BIFA_CACHE_DIR")
+    with contextlib.suppress(OSError):
+        Path(chosen).mkdir(parents=True, exist_ok=True)
+        if os.access(chosen, os.W_OK):
+            return Path(chosen)
+    try:
+        return _temporary_folder()
+    except OSError as error:
+        raise OSError("no folder can be written for compiled code; set BIFA_CACHE_DIR") from error
+
+
+@functools.cache
+def _temporary_folder() -> Path:
+    """One for every process if only this user can write there, since its code is executed; else this process's own."""
+    candidate = Path(tempfile.gettempdir()) / f"bifa-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    with contextlib.suppress(OSError):
+        candidate.mkdir(mode=0o700, exist_ok=True)
+        if _is_ours_alone(candidate):
+            return candidate
+    return Path(tempfile.mkdtemp(prefix="bifa-"))
+
+
+def _is_ours_alone(there: Path) -> bool:
+    if not hasattr(os, "getuid"):
+        return there.is_dir()  # Windows' temporary folder is the user's own
+    found = there.lstat()  # a link may be led elsewhere later
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
 
 
 def load(stem: str, source: str) -> ModuleType:
@@ -55,7 +74,11 @@ def load(stem: str, source: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
     return module
 
 

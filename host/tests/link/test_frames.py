@@ -114,6 +114,14 @@ def test_text_and_frames_are_told_apart_however_they_are_cut(pieces, step):
     assert got == expected
 
 
+def test_an_overlong_line_loses_nothing_where_it_is_cut():
+    text = bytes(97 + at % 26 for at in range(2 * frames.Splitter.LONGEST_LINE + 3))
+    parts = frames.Splitter().feed(text + b"\n")
+    assert {kind for kind, _ in parts} == {"line"}
+    assert b"".join(line for _, line in parts) == text
+    assert max(len(line) for _, line in parts) == frames.Splitter.LONGEST_LINE
+
+
 def damaged_once(data: bytes) -> Iterator[bytes]:
     """`data` with one byte replaced, dropped, doubled or invented: every place, every value."""
     for at in range(len(data)):

@@ -2,6 +2,10 @@
 
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
+
+import pytest
 
 from bifa.simulate import entries, generated
 
@@ -38,3 +42,52 @@ def test_the_entries_name_depends_on_every_compiled_source():
     for told in ("def march(", "def step(", "def pressure_after(", "Dahl's equation", "def static_record("):
         assert told in sources
     assert entries.entries.__name__.endswith(generated.digest(entries._entry_source()))
+
+
+@pytest.fixture
+def no_cache(tmp_path, monkeypatch) -> Path:
+    """Where temporary files go, on a computer whose cache cannot be written."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "tmp").mkdir()
+    monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    generated._temporary_folder.cache_clear()
+    yield tmp_path / "tmp"
+    generated._temporary_folder.cache_clear()
+
+
+def _privately(folder: Path) -> bool:
+    return folder.is_dir() and folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_without_a_cache_code_lives_in_a_private_temporary_folder(no_cache):
+    folder = generated.folder()
+    assert folder.parent == no_cache
+    assert _privately(folder)
+    generated._temporary_folder.cache_clear()
+    assert generated.folder() == folder, "another process finds what was compiled"
+
+
+def test_code_is_not_taken_from_a_temporary_folder_that_others_may_write(no_cache):
+    planted = generated.folder()
+    planted.chmod(0o777)
+    generated._temporary_folder.cache_clear()
+    assert generated.folder() != planted
+    assert _privately(generated.folder())
+    assert generated.folder() == generated.folder()
+
+
+def test_nor_through_a_link_that_others_may_lead_elsewhere(no_cache, tmp_path):
+    (tmp_path / "private").mkdir(mode=0o700)
+    generated.folder().rmdir()
+    planted = no_cache / f"bifa-{generated.os.getuid()}"
+    planted.symlink_to(tmp_path / "private")
+    generated._temporary_folder.cache_clear()
+    assert generated.folder() != planted
+
+
+def test_what_fails_as_it_is_loaded_is_not_taken_for_loaded(tmp_path, monkeypatch):
+    monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path))
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            generated.load("broken", "value = 1 / 0\n")
