@@ -1,4 +1,5 @@
-// The two 16-bit checks of frames; together they miss one random error in 2^32, and each is a few instructions.
+// The two 16-bit checks of frames, each a few instructions; together they miss one random error in 2^31, not in 2^32:
+// their polynomials share the factor x + 1 (docs/protocol.md).
 #pragma once
 
 #include <stdint.h>

@@ -23,9 +23,10 @@ def fit(
     report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with all of it.")] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
-    """Identify the model as the paper does (section IV): static loading, step responses, anchor pulls, then everything
-    together. Reports each parameter with its 90 % interval, what the data do not determine, and the error in units of
-    the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's Figs. 4 to 6.
+    """Identify the model (the paper's section IV): what static loadings, rests and sensors say by themselves, then
+    everything together. Reports each parameter with its 90 % interval, what the data do not determine, and the error
+    in units of the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's
+    Figs. 4 to 6.
     """
     from bifa.files import check_targets, written_into
 

@@ -11,7 +11,7 @@ from bifa.pipe_robot.switches import step_timeline
 
 _SETTLED_MM_S = 0.5  # slower than this an actuator is at rest
 _SAMPLES = 20
-_READING_SD_PSI = 0.05  # of a mean reading: a count is 0.037 psi
+PRESSURE_SD_PSI = 0.05  # of a mean reading: a count is 0.037 psi
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,6 @@ def reach_m(dataset: Dataset, actuator: str) -> tuple[float, float] | None:
         return None
     limits = [np.percentile(trial.columns["displacement_mm"], (0.5, 99.5)) for trial in trials]
     return float(min(low for low, _ in limits)) * 1e-3, float(max(high for _, high in limits)) * 1e-3
-
-
-def pressure_sd_psi() -> float:
-    """How well the mean reading tells the pressure."""
-    return _READING_SD_PSI
 
 
 def _rests_of(trial: Trial) -> list[Rest]:

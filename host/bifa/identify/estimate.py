@@ -18,9 +18,6 @@ class IntervalEstimate:
     upper: float
     confidence: float = 0.9
 
-    def covers(self, truth: float) -> bool:
-        return self.lower <= truth <= self.upper
-
 
 def weighted_mean(
     values: np.ndarray, weights: np.ndarray, common_sd: float = 0.0, confidence: float = 0.9

@@ -1,9 +1,10 @@
-"""The whole identification of section IV: the stages, the joint refinement, and what is known afterwards."""
+"""The whole identification of section IV: where it begins, the joint fit, and what is known afterwards."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from lacuna.estimation.solve import solve
 from lacuna.estimation.uncertainty import Uncertainty, profile_interval, uncertainty
 
 CONFIDENCE = 0.9
-_NORMAL_HALF = 1.6449  # of a 90 % interval
+_NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # standard deviations on either side
 # mu_s shows in one sample of a pull, its threshold: there the cost is no parabola.
 _PROFILED = ("mu_s",)
 _PULL_PARAMETERS = ("wall_offset_m", "mu_s", "mu_k")
@@ -86,7 +87,8 @@ def identify(
     *,
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Identification:
-    """Identify the robot of `dataset` from `model` (the nominal one) on: the paper's stages, then all together.
+    """Identify the robot of `dataset` from `model` (the nominal one) on: what static loadings, rests and sensors say by
+    themselves, then all experiments together.
 
     Raises UndeterminedError where nothing at all can be fitted. Deterministic.
     """

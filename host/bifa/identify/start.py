@@ -13,7 +13,7 @@ import numpy as np
 
 from bifa import robot
 from bifa.data import Dataset
-from bifa.identify.equilibria import pressure_sd_psi, reach_m, rests
+from bifa.identify.equilibria import PRESSURE_SD_PSI, reach_m, rests
 from bifa.identify.static import StaticFit, fit_static
 from bifa.pipe_robot.curves import FittedCurve
 from bifa.pipe_robot.errors import UndeterminedError
@@ -66,7 +66,7 @@ def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model:
     moves = bool(seen or dataset.of("locomotion"))
     if not seen:
         return FittedCurve(prefix, fit.stiffness, moves)
-    sd = np.full(len(seen), area * pressure_sd_psi())
+    sd = np.full(len(seen), area * PRESSURE_SD_PSI)
     pinned = fit.stiffness.with_equilibria(
         [rest.displacement_m for rest in seen], [area * rest.pressure_psi for rest in seen], sd
     )

@@ -14,7 +14,8 @@ from bifa.robot.gait import BASELINE, Gait
 from bifa.simulate import of_gait
 
 _STROKE_MM = {"large": 53.8, "small": 30.0}
-_STEP_S, _STEP_UP_S, _STEP_END_S = 0.5, 5.0, 11.0
+# Not quite the step that is recorded (`bifa.measure.experiments`): the second switch is on the grid, the end sooner.
+_UP_S, _DOWN_S, _END_S = 0.5, 5.0, 11.0
 _WALK_CYCLES = 4
 SLOW = Gait(9.0, 270.0, 90.0, 0.5, 0.5, 0.5)
 
@@ -48,8 +49,8 @@ def _static(dataset: Dataset, actuator: str, rate: float, pressure: float) -> tu
 
 
 def _step(actuator: str, pressure: float) -> tuple[Mapping[str, Any], Trial]:
-    time_s = np.arange(0.0, _STEP_END_S, 0.01)
-    command = ((time_s >= _STEP_S) & (time_s < _STEP_UP_S)).astype(float)
+    time_s = np.arange(0.0, _END_S, 0.01)
+    command = ((time_s >= _UP_S) & (time_s < _DOWN_S)).astype(float)
     planned = PlannedTrial("step_response", actuator, pressure)
     columns = {"time_s": time_s, "command": command, **_unknown(time_s, "displacement_mm")}
     return {"actuator": actuator, "pressure_psi": pressure}, planned.as_trial(columns)

@@ -63,19 +63,10 @@ class StiffnessFit:
         """Of the coefficients [N^2], shape (16, 16)."""
         return np.linalg.pinv(self.information, hermitian=True)
 
-    def force_sd(self, x: np.ndarray) -> np.ndarray:
-        """Standard deviation of K(x) [N]."""
-        rows = self._rows(x)
-        return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, self.covariance, rows), 0.0))
-
     def mean_force_sd(self, x: np.ndarray) -> float:
         """Standard deviation of the mean of K over the points x [N]."""
         row = self._rows(x).mean(axis=0)
         return float(np.sqrt(max(row @ self.covariance @ row, 0.0)))
-
-    def monomial(self) -> np.ndarray:
-        """Coefficients of 1, z, z^2 ... [N], shape (16,): the form that a model file holds."""
-        return chebyshev.cheb2poly(self.coefficients)
 
     def unstable_m(self) -> float:
         """The unstable equilibrium, eq. (3)'s threshold: where K falls through 0 between the stable states."""

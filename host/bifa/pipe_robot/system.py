@@ -62,9 +62,7 @@ _SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
     (STEP, "large"): frozenset({*_LARGE, "supply_negative_psi"}),
     (STEP, "small"): frozenset({*_SMALL, "small_mass_kg", "supply_negative_psi"}),
     (ANCHOR, None): frozenset({"small_area_N_psi", "head_segment_mass_kg", "wall_stiffness_N_m", *_PIPE}),
-    (WALK, None): frozenset(
-        {*_LARGE, *_SMALL, *_PIPE, *_SUPPLIES, *_MASSES, "wall_stiffness_N_m", "wall_damping_Ns_m"}
-    ),
+    (WALK, None): frozenset({*_LARGE, *_SMALL, *_PIPE, *_SUPPLIES, *_MASSES, *_WALL}),
 }
 
 

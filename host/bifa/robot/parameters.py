@@ -1,7 +1,7 @@
 """The model's named values: unit, bounds and source of each (paper, sections III and IV).
 
 The paper prints no table of identified parameters. Where the source says "found to reproduce", the value was
-searched so that everything the paper does report in numbers comes out (docs/model.md, `bifa paper`).
+searched so that everything the paper does report in numbers comes out (docs/model.md, `bifa simulate --paper`).
 """
 
 from __future__ import annotations

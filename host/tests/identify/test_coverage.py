@@ -76,7 +76,7 @@ class Coverage:
     def add(self, found: Identification, truth: dict[str, float]) -> None:
         for name, interval in found.intervals.items():
             self.scores.setdefault(name, []).append((interval.value - truth[name]) / interval.sd)
-            self.hits.setdefault(name, []).append(interval.covers(truth[name]))
+            self.hits.setdefault(name, []).append(interval.lower <= truth[name] <= interval.upper)
         self.errors.append(max(found.error.values()))
 
     def __str__(self) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 
 from virtual_robot.instruments.noise import coloured
 
-ADC_COUNTS = 1023
 PSI_SPAN = 30.0
 _COUNTS_PER_PSI = 0.8 * 1024 / PSI_SPAN  # ABP: 10-90 % of the supply over +-15 psi; the ADC's step is Vcc / 1024
 
