@@ -18,6 +18,13 @@ def compare(
     report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with all of it.")] = None,
 ) -> None:
     """Compare the models, verdicts and gaits of several campaigns."""
+    if len(runs) < 2:
+        raise typer.BadParameter("compare takes two campaigns or more: bifa compare out/monday out/tuesday")
+
+    from bifa.files import check_targets
+
+    check_targets(report)
+
     from bifa.campaign.side_by_side import (
         compare_page,
         error_table,

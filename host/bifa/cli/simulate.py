@@ -7,6 +7,8 @@ import typer
 
 from bifa.cli._options import PICTURES, Obstacle, file_option
 
+_CYCLES, _BUCKLING_N = 10, 27.0
+
 EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk   |
 bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml   |
 bifa simulate --paper"""
@@ -20,14 +22,14 @@ def register(app: typer.Typer) -> None:
 def simulate(
     model: Annotated[Path | None, file_option("Model file; the nominal model if left out.")] = None,
     gait: Annotated[Path | None, file_option("Gait file; the paper's baseline if left out.")] = None,
-    cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = 10,
-    inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.")] = 0.0,
+    cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = _CYCLES,
+    inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.", min=-90, max=90)] = 0.0,
     payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
     obstacle: Annotated[
         Obstacle | None,
         typer.Option(help="One of the paper's, 10 cm ahead.", show_default=False),
     ] = None,
-    buckling: Annotated[float, typer.Option(help="Force that buckles a ring of supports, N (assumed).")] = 27.0,
+    buckling: Annotated[float, typer.Option(help="Force that buckles a ring of supports, N (assumed).")] = _BUCKLING_N,
     pictures: Annotated[Path | None, PICTURES] = None,
     out: Annotated[Path | None, typer.Option(help="CSV of all channels at 100 Hz, as a data set's locomotion.")] = None,
     paper: Annotated[
@@ -42,6 +44,9 @@ def simulate(
 
     The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
     """
+    if paper and _walks_otherwise(cycles, inclination, payload, obstacle, buckling, pictures, out):
+        raise typer.BadParameter("--paper has walks of its own; only --model and --gait go with it")
+
     from bifa.files import check_targets, written_into
 
     check_targets(out, folders=(pictures,), inputs=(model, gait))
@@ -69,6 +74,11 @@ def simulate(
         with written_into(pictures) as aside:
             draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
         console.print(f"picture: {pictures / 'walk.png'}", highlight=False)
+
+
+def _walks_otherwise(cycles, inclination, payload, obstacle, buckling, pictures, out) -> bool:
+    asked = (cycles, inclination, payload, obstacle, buckling, pictures, out)
+    return asked != (_CYCLES, 0.0, 0.0, None, _BUCKLING_N, None, None)
 
 
 def _walk(console, model, gait, cycles, inclination, obstacle, buckling):

@@ -97,10 +97,35 @@ def test_an_obstacle_that_does_not_exist_is_refused_with_those_that_do():
     [
         (["--buckling", "-1"], "outside its range 0 to 1000 N"),
         (["--payload", "4"], "tail_mass_kg = 4.175 is outside its range 0.02 to 1 kg"),
-        (["--inclination", "91"], "outside its range -90 to 90"),
     ],
 )
 def test_bad_places_are_refused_with_the_range(arguments, words):
     result = _run(*arguments)
     assert isinstance(result.exception, BifaError)
     assert words in str(result.exception)
+
+
+@pytest.mark.parametrize("degrees", ["91", "-90.5"])
+def test_a_pipe_steeper_than_vertical_is_refused_with_the_range(degrees):
+    result = _run("--inclination", degrees)
+    assert result.exit_code == 2
+    assert "than or equal to " + ("90" if degrees == "91" else "-90") in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize(
+    "ignored",
+    [
+        ["--inclination", "10"],
+        ["--payload", "0.1"],
+        ["--obstacle", "arcs"],
+        ["--pictures", "x"],
+        ["--out", "x.csv"],
+        ["--cycles", "4"],
+        ["--buckling", "20"],
+    ],
+    ids=" ".join,
+)
+def test_what_the_papers_table_would_ignore_is_refused(ignored):
+    result = _run("--paper", *ignored)
+    assert result.exit_code == 2
+    assert "--paper has walks of its own" in result.output
