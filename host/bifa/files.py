@@ -20,9 +20,10 @@ def check_targets(
     """Raise TargetError unless each of `files` can be written, and each of `folders` written into or made.
 
     None is skipped, so that a command hands over its options as they are. A data set's files, and `inputs`, which the
-    same command reads, are not replaced.
+    same command reads, are not replaced, and no two targets are the same place.
     """
     read = {path.resolve() for path in inputs if path is not None}
+    _refuse_same(files, folders)
     for path in files:
         if path is None:
             continue
@@ -44,6 +45,17 @@ def check_targets(
         if not there.is_dir():
             raise TargetError(f"{there} is a file, so that {path} cannot be a folder; choose another name")
         _check_writable(there, path)
+
+
+def _refuse_same(files: tuple[Path | None, ...], folders: tuple[Path | None, ...]) -> None:
+    taken: set[Path] = set()
+    for path in (path.resolve() for path in files if path is not None):
+        if path in taken:
+            raise TargetError(f"{path} is named for two different files; give each a name of its own")
+        taken.add(path)
+    for path in folders:
+        if path is not None and path.resolve() in taken:
+            raise TargetError(f"{path} is named for a file and for a folder; give each a name of its own")
 
 
 def _check_writable(there: Path, asked: Path) -> None:

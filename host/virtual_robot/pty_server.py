@@ -33,6 +33,8 @@ def serve(
 ) -> None:
     """Serve until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path, `on_status` a dict four times a
     second; `link` is a symbolic link kept to the pty meanwhile."""
+    if link is not None:
+        _check_link(link)
     master, slave = os.openpty()
     tty.setraw(slave)
     path = os.ttyname(slave)
@@ -49,9 +51,17 @@ def serve(
             link.unlink()
 
 
-def _point(link: Path, path: str) -> None:
+def _check_link(link: Path) -> None:
     if link.exists() and not link.is_symlink():
         raise VirtualRobotError(f"{link} exists and is no symbolic link; choose another name for the link")
+    folder = link.absolute().parent
+    if not folder.is_dir():
+        raise VirtualRobotError(f"the folder of the link {link} does not exist; create it first")
+    if not os.access(folder, os.W_OK):
+        raise VirtualRobotError(f"the link {link} cannot be made (no permission); choose another place")
+
+
+def _point(link: Path, path: str) -> None:
     temporary = link.with_name(f".{link.name}.{os.getpid()}")
     temporary.symlink_to(path)
     os.replace(temporary, link)

@@ -9,6 +9,7 @@ import typer
 
 from bifa import cluster
 from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
+from bifa.files import named
 
 EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
 bifa optimize --out fast.toml --nominal --method cma   |
@@ -56,7 +57,7 @@ def optimize(
     """
     from bifa.files import check_targets
 
-    folder = pictures or out.with_suffix("")
+    folder = pictures or _beside(out)
     check_targets(out, folders=() if no_pictures else (folder,), inputs=(model,))
 
     from bifa.gait import Settings, paper_space, simulations
@@ -77,6 +78,14 @@ def optimize(
         console.print(f"gait: {out}", highlight=False)
         if not no_pictures:
             _explain(console, robot, pool, best, folder)
+
+
+def _beside(out: Path) -> Path:
+    """The folder for the pictures: named as the gait file, unless that is the file itself or a data set."""
+    out = named(out)
+    folder = out.with_suffix("")
+    taken = folder == out or (folder / "dataset.toml").exists()
+    return out.with_name(f"{folder.name}-pictures") if taken else folder
 
 
 def _best(console, robot, pool, settings):

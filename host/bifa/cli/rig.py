@@ -51,11 +51,13 @@ def register(app: typer.Typer) -> None:
         """
         import signal
 
+        from bifa.files import check_targets
         from bifa.rig import open_rig
         from bifa.screen import Console
 
         for ending in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C
+        check_targets(eeprom)
         console = Console()
         effects = dict(_effect(text) for text in effect or [])
         options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}

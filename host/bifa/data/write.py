@@ -1,6 +1,7 @@
 """Writing a data set: whole or trial by trial, never over another, never half."""
 
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Mapping
@@ -19,6 +20,7 @@ from .read import read_dataset
 
 PARTIAL_SUFFIX = ".partial"
 _PROBE = ".probe."  # where a trial is written and read again before it counts
+_STRAY = re.compile(r"\..+\.[0-9a-f]{8}(\.[^.]+)?")  # what a crash leaves of it, and of files that were being written
 
 
 def write_dataset(folder: str | os.PathLike[str], dataset: Dataset) -> Path:
@@ -107,11 +109,18 @@ class DatasetWriter:
     def finish(self) -> Dataset:
         """Give the data set its name; returns it as read back from disk."""
         refuse_existing(self.folder)
-        for stray in self.partial.glob(f"{_PROBE}*"):
-            shutil.rmtree(stray)
+        _remove_strays(self.partial)
         read_dataset(self.partial)
         _publish(self.partial, self.folder)
         return read_dataset(self.folder)
+
+
+def _remove_strays(folder: Path) -> None:
+    for stray in [path for path in folder.rglob(".*") if _STRAY.fullmatch(path.name)]:
+        if stray.is_dir() and not stray.is_symlink():
+            shutil.rmtree(stray)
+        else:
+            stray.unlink(missing_ok=True)  # gone already with the folder it was in
 
 
 def add_trial(dataset: Dataset, trial: Trial) -> Dataset:

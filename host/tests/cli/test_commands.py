@@ -10,7 +10,9 @@ import typer
 from typer.testing import CliRunner
 
 import bifa
+from bifa.campaign.stages import StageError
 from bifa.cli import app
+from bifa.cli.optimize import _beside
 from bifa.files import TargetError
 
 COMMANDS = sorted(typer.main.get_command(app).commands)
@@ -48,6 +50,11 @@ def test_every_command_has_both_helps_and_the_same_names_for_the_same_things(com
         ["record", "--out", "{file}/run", "--port", "nowhere"],
         ["gaits", "--make", "--out", "{file}/gaits", "--model", "{file}"],
         ["experiment", "all", "--out", "{file}/bench", "--port", "nowhere"],
+        ["fit", "{day}", "--out", "x.toml", "--report", "./x.toml"],
+        ["diagnose", "{day}", "--json", "a.x", "--out", "a.x"],
+        ["optimize", "--model", "{file}", "--out", "x", "--pictures", "x"],
+        ["demo", "--quick", "--out", "{file}/run"],
+        ["rig", "--eeprom", "{missing}/uno.bin"],
     ],
     ids=" ".join,
 )
@@ -58,6 +65,22 @@ def test_where_it_cannot_write_a_command_says_so_before_it_does_anything(tmp_pat
     places["file"].write_text("")
     result = invoke(*(argument.format(**places) for argument in arguments))
     assert isinstance(result.exception, TargetError), result.output
+
+
+@pytest.mark.parametrize("command", [["campaign", "--port", "virtual"], ["demo"], ["demo", "--quick"]], ids=" ".join)
+def test_a_campaign_is_not_run_in_a_data_set(tmp_path, command):
+    (tmp_path / "dataset.toml").write_text("mine")
+    result = invoke(*command, "--out", tmp_path)
+    assert isinstance(result.exception, StageError), result.output
+    assert [path.name for path in tmp_path.iterdir()] == ["dataset.toml"]
+
+
+def test_pictures_go_neither_into_the_gait_file_nor_into_a_data_set(tmp_path):
+    (tmp_path / "bench").mkdir()
+    (tmp_path / "bench" / "dataset.toml").write_text("mine")
+    assert _beside(tmp_path / "gait.toml") == tmp_path / "gait"
+    assert _beside(tmp_path / "gait") == tmp_path / "gait-pictures"
+    assert _beside(tmp_path / "bench.toml") == tmp_path / "bench-pictures"
 
 
 USAGE = [

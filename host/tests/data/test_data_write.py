@@ -168,3 +168,18 @@ def test_settings_stay_keys_of_the_trial(tmp_path):
     (back,) = read_dataset(folder).trials
     assert back.extra == trial.extra
     assert back.condition != make_trial("anchor_pull").condition
+
+
+def test_what_a_crash_left_hidden_does_not_get_into_the_finished_data_set(tmp_path):
+    writer = DatasetWriter(tmp_path / "day", "crashed")
+    writer.add(make_trial())
+    mine, (raw, probe) = {".note", ".2026.csv"}, (writer.partial / "raw", writer.partial / ".probe.01234567")
+    raw.mkdir()
+    (writer.partial / "..probe.01234567.89abcdef").mkdir()
+    probe.mkdir()
+    for file in (writer.partial / ".dataset.01234567.toml", raw / ".walk_1.89abcdef.csv", probe / ".a.89abcdef.csv"):
+        file.write_text("half")
+    for name in mine:
+        (raw / name).write_text("mine")
+    writer.finish()
+    assert {path.name for path in (tmp_path / "day").rglob(".*")} == mine

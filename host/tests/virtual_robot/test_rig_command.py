@@ -40,6 +40,9 @@ def test_serve_and_stop(image, tmp_path, ending):
         (["--effect", "leak:much"], "NAME:PARAMETER=VALUE"),
         (["--profile", "perfect"], "'perfect' is not one of"),
         (["--link", __file__], "no symbolic link"),
+        (["--link", "/nowhere/uno"], "does not exist; create it first"),
+        (["--eeprom", "/nowhere/uno.bin"], "does not exist; create it first"),
+        (["--eeprom", __file__], "is no EEPROM file"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_line(arguments, message, image):

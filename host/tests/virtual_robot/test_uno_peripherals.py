@@ -4,6 +4,7 @@ import itertools
 
 import pytest
 
+from virtual_robot.errors import VirtualRobotError
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -204,3 +205,14 @@ int main(void) { if (MCUSR & 1) { MCUSR = 0; eeprom_write_byte((uint8_t *)3, 7);
     uno.reset("external")
     uno.run_for(0.004)
     assert uno.eeprom[3] == 7
+
+
+@pytest.mark.parametrize("size", [0, 12, 1023, 1025])
+def test_a_file_that_is_no_eeprom_is_refused_and_stays(board, tmp_path, size):
+    file = tmp_path / "thesis.tex"
+    file.write_bytes(b"x" * size)
+    with pytest.raises(VirtualRobotError, match="is no EEPROM file, which has 1024 bytes"):
+        board(EEPROM, eeprom=file)
+    with pytest.raises(VirtualRobotError, match="create it first"):
+        board(EEPROM, eeprom=tmp_path / "no" / "eeprom.bin")
+    assert file.read_bytes() == b"x" * size

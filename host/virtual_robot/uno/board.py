@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from virtual_robot.errors import EventsGoneError, FirmwareError, NotBuiltError
+from virtual_robot.errors import EventsGoneError, FirmwareError, NotBuiltError, VirtualRobotError
 from virtual_robot.uno import elf
 
 try:
@@ -36,12 +36,26 @@ class Event:
     value: int
 
 
+def _check_eeprom(file: Path) -> None:
+    """Before the board is made: the file is written when it closes, over what is there."""
+    if not file.absolute().parent.is_dir():
+        raise VirtualRobotError(f"the folder of the EEPROM file {file} does not exist; create it first")
+    if not os.access(file.absolute().parent, os.W_OK):
+        raise VirtualRobotError(f"the EEPROM file {file} cannot be written (no permission); choose another place")
+    if file.exists() and not (file.is_file() and file.stat().st_size == EEPROM_SIZE):
+        raise VirtualRobotError(
+            f"{file} is no EEPROM file, which has {EEPROM_SIZE} bytes, and would be overwritten; choose another name"
+        )
+
+
 class Uno:
     """One board. `eeprom` names a file that keeps the EEPROM between boards (written on `close`)."""
 
     def __init__(self, firmware: Path, *, eeprom: Path | None = None, keep_events: bool = True) -> None:
         if lib is None:
             raise NotBuiltError("uno")
+        if eeprom is not None:
+            _check_eeprom(Path(eeprom))
         self.firmware = Path(firmware)
         if not self.firmware.is_file():
             raise FirmwareError(self.firmware)
