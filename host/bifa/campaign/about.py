@@ -9,13 +9,15 @@ Pairs = list[tuple[str, str]]
 
 def about(bench: Bench, effort) -> tuple[str, Pairs]:
     """The robot in words, and how the campaign was made; the same for the same settings."""
-    words = ["bifa", "campaign", "--port", bench.port or "auto"]
+    words = ["bifa", "campaign", "--port", bench.port]
     if bench.is_virtual:
         words += ["--seed", str(bench.seed)]
+    if "profile" in bench.options:
+        words += ["--profile", str(bench.options["profile"])]
     if effort.quick:
         words.append("--quick")
     for name, value in bench.known.items():
-        words += ["--known", f"{name}={value:g}"]
+        words += ["--known", f"{name}={value!r}"]
     robot = f"virtual robot {bench.seed}" if bench.is_virtual else f"robot on {bench.port}"
     made = [("robot", robot), ("command", shlex.join(words))]
     if bench.is_virtual:

@@ -15,7 +15,7 @@ class Bench:
     `hands`: on a serial port, whose rig has no instruments, the person who works the lab's own.
     """
 
-    port: str | None = "virtual"
+    port: str = "virtual"
     seed: int = 0
     options: Mapping[str, object] = field(default_factory=dict)
     known: Mapping[str, float] = field(default_factory=dict)
@@ -30,6 +30,11 @@ class Bench:
     def is_virtual(self) -> bool:
         """Whether the bench is simulated, so that it has seeds and a seal."""
         return self.port == "virtual"
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the robot is real: nothing is measured again unasked, and what was is kept beside the new."""
+        return not self.is_virtual
 
     def open(self, stage: int):
         """The rig for stage number `stage`."""

@@ -53,7 +53,7 @@ def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
     what it cannot tell apart, and the person decides.
     """
     stages = [
-        *([_measure_by_hand(bench, effort), _declare(bench)] if bench.is_by_hand else [_measure(bench, effort, part)]),
+        *([_measure_once(bench, effort, part), _declare(bench)] if bench.is_kept else [_measure(bench, effort, part)]),
         _fit(bench, part),
         _optimise("optimise-base", "gait from the base model", "model-base.toml", "gait-base.toml", bench, part),
         _walk("walk-base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
@@ -79,6 +79,8 @@ def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
     trials = plan.session(quick=effort.quick)
 
     def run(inputs: Path, outputs: Path) -> None:
+        if (outputs / "bench").exists():
+            return  # interrupted after its last trial
         with bench.open(0) as rig:
             run_session(
                 rig,
@@ -94,13 +96,24 @@ def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
     return Stage("measure", "characterise the robot on its bench", (), ("bench",), run, settings, resumes=True)
 
 
-def _measure_by_hand(bench: Bench, effort: Effort) -> Stage:
-    """Without the known values: to correct one is no reason to measure again."""
+def _measure_once(bench: Bench, effort: Effort, part: Part) -> Stage:
+    """A real robot, without the known values that the person gives: to correct one is no reason to measure again."""
     trials = plan.session(quick=effort.quick)
+    told = _told(bench, part)
 
     def run(inputs: Path, outputs: Path) -> None:
+        if (outputs / "measured").exists():
+            return  # interrupted after its last trial
         with bench.open(0) as rig:
-            run_session(rig, outputs / "measured", trials, name="campaign", known={}, provenance=bench.settings(0))
+            run_session(
+                rig,
+                outputs / "measured",
+                trials,
+                name="campaign",
+                known=known_of(rig, {}),
+                provenance=bench.settings(0),
+                on_event=lambda e: told(e.planned.title, (e.number - 1 + e.share) / e.total),
+            )
 
     title = f"characterise the robot: {len(trials)} trials"
     settings = bench.settings(0) | {"effort": asdict(effort)}
@@ -108,9 +121,12 @@ def _measure_by_hand(bench: Bench, effort: Effort) -> Stage:
 
 
 def _declare(bench: Bench) -> Stage:
+    """What the person knows goes before what the rig declares."""
+
     def run(inputs: Path, outputs: Path) -> None:
         measured = read_dataset(inputs / "measured")
-        write_dataset(outputs / "bench", replace(measured, name="campaign: characterisation", known=dict(bench.known)))
+        known = {**measured.known, **bench.known}
+        write_dataset(outputs / "bench", replace(measured, name="campaign: characterisation", known=known))
 
     return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(bench.known)})
 
@@ -143,14 +159,16 @@ def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, ef
     walks = f"walks-{name.removeprefix('walk-')}"
 
     def run(inputs: Path, outputs: Path) -> None:
+        if (outputs / walks).exists():
+            return  # interrupted after its last walk
         loaded = {key: load_gait(inputs / file) if file else BASELINE for key, file in gaits.items()}
         with bench.open(number) as rig:
             measure_walks(rig, outputs / walks, loaded, effort.cycles, effort.repeats, _told(bench, part))
 
     needs = tuple(file for file in gaits.values() if file)
     settings = bench.settings(number) | {"effort": asdict(effort)}
-    title, hands = f"walk: {' and '.join(gaits)}", bench.is_by_hand
-    return Stage(name, title, needs, (walks,), run, settings, resumes=hands, by_hand=hands)
+    title, kept = f"walk: {' and '.join(gaits)}", bench.is_kept
+    return Stage(name, title, needs, (walks,), run, settings, resumes=kept, by_hand=kept)
 
 
 def _diagnosed(dataset: Dataset, bench: Bench, part: Part) -> Diagnosis:
@@ -179,7 +197,8 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
     settings = bench.settings(_SEPARATING)
-    return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings)
+    measures = bench.is_kept and not bench.is_by_hand  # the separating experiments, on a rig that needs nobody
+    return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
 
 
 def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
@@ -204,8 +223,8 @@ def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
     needs += ("model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
     settings = bench.settings(_FURTHER) | {"effort": asdict(effort)}
-    hands = bench.is_by_hand
-    return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=hands, by_hand=hands)
+    kept = bench.is_kept
+    return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
 
 
 def _told(bench: Bench, part: Part) -> Part:

@@ -2,9 +2,10 @@
 
 A stage works in a scratch folder; only when it has succeeded are its artefacts moved to their names.
 `provenance.json` says of every artefact which stage, settings, inputs and version made it; a stage whose
-record still holds is not run again.
+record still holds is not run again, and what is not on record is never replaced.
 """
 
+import glob
 import hashlib
 import json
 import os
@@ -19,6 +20,7 @@ from bifa.files import write_text
 
 PROVENANCE = "provenance.json"
 _SCRATCH = ".scratch"
+_ASKED = "asked.json"  # in the scratch: what the stage was begun with, and what it made once it has ended
 
 
 class StageError(BifaError):
@@ -34,8 +36,8 @@ class Stage:
     run(inputs, outputs): `inputs` is the campaign's folder, `outputs` the scratch folder to write `makes` into.
     settings: whatever else decides the result (seed, gait, port); plain JSON.
     resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept.
-    by_hand: somebody measured for hours to make it. It is not run again for another version of bifa, with other
-    settings only on request, and what it made before is kept beside the new.
+    by_hand: a real robot was measured for hours to make it. It is not run again for another version of bifa, with
+    other settings only on request, and what it made before is kept beside the new.
     """
 
     name: str
@@ -61,6 +63,12 @@ def digest(path: Path) -> str:
     return total.hexdigest()
 
 
+def check_folder(folder: Path) -> None:
+    """Raise StageError where `folder` is a data set, among whose files a campaign has no place."""
+    if (folder / "dataset.toml").exists():
+        raise StageError(f"{folder} is a data set: name another folder for the campaign")
+
+
 def run_stages(
     folder: Path,
     stages: Sequence[Stage],
@@ -72,26 +80,41 @@ def run_stages(
     """Bring every stage's artefacts up to date, in the order given.
 
     A stage runs where it is named in `rerun`, or its artefacts, inputs, settings or bifa's version are not
-    those on record. on_end(stage, ran) says whether it ran. Raises StageError; an error inside a stage leaves
-    the artefacts of earlier runs as they were.
+    those on record. on_end(stage, ran) says whether it ran. Raises StageError, before any stage runs where
+    something that a stage would replace is not on record; an error inside a stage leaves the artefacts of earlier
+    runs as they were.
     """
     unknown = set(rerun) - {stage.name for stage in stages}
     if unknown:
         raise StageError(
             f"no stage is called {', '.join(sorted(unknown))}; there are {', '.join(s.name for s in stages)}"
         )
+    check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
     records = _read_records(folder)
+    names = {stage.name for stage in stages}
+    for stage in stages:  # another campaign's stages, as those of `bifa demo --quick`, may have made the same
+        theirs = {name: record for name, record in records.items() if name == stage.name or name not in names}
+        _refuse_unrecorded(folder, stage, theirs)
+    shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
     for stage in stages:
         on_start(stage)
         asked = _asked(folder, stage)
         ran = stage.name in rerun or not _holds(folder, stage, asked, records.get(stage.name))
         if ran:
-            _run(folder, stage)
-            records[stage.name] = asked | {"artefacts": {name: digest(folder / name) for name in stage.makes}}
-            _write_json(folder / PROVENANCE, {"bifa": bifa.__version__, "stages": records})
+            _run(folder, stage, asked, records)
         on_end(stage, ran)
+
+
+def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict]) -> None:
+    """StageError where the stage would replace what none of these records say was made by a stage."""
+    made = {name for record in records.values() for name in record.get("artefacts", {})}
+    for path in (folder / name for name in stage.makes if name not in made):
+        if path.exists() or path.is_symlink():
+            raise StageError(
+                f"{path} was not made by the stage {stage.name}, which would replace it: choose another folder for "
+                "the campaign, or move it away"
+            )
 
 
 def _asked(folder: Path, stage: Stage) -> dict:
@@ -131,31 +154,91 @@ def _differing(old: Mapping, new: Mapping) -> list[str]:
     return sorted(found)
 
 
-def _run(folder: Path, stage: Stage) -> None:
+def _run(folder: Path, stage: Stage, asked: dict, records: dict) -> None:
+    """Run the stage and move what it makes to its place. On record first: an interruption between the two then leaves
+    nothing in the folder that is not on record, and the digests say that it is not yet what they promise."""
     scratch = folder / (f".{stage.name}-unfinished" if stage.resumes else _SCRATCH)
+    begun = _resumed(scratch, stage, asked)
     scratch.mkdir(exist_ok=stage.resumes)
     done = False
     try:
-        stage.run(folder, scratch)
-        missing = [name for name in stage.makes if not (scratch / name).exists()]
-        if missing:
-            raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
+        made = _made_before(folder, scratch, stage, begun) or _made(folder, scratch, stage, asked)
+        _refuse_unrecorded(folder, stage, records)
+        records[stage.name] = asked | {"artefacts": made}
+        _write_json(folder / PROVENANCE, {"bifa": bifa.__version__, "stages": records})
         for name in stage.makes:
-            _replace(scratch / name, folder / name, keep=stage.by_hand)
+            if (scratch / name).exists():
+                _replace(scratch / name, folder / name, keep=stage.by_hand)
         done = True
     finally:
         if done or not stage.resumes:
             shutil.rmtree(scratch, ignore_errors=True)
 
 
+def _resumed(scratch: Path, stage: Stage, asked: dict) -> dict:
+    """What the scratch to go on with was begun with, empty for a new one. Begun with something else it is deleted, as
+    is what is left after all was moved; StageError where it was begun by hand with something else."""
+    if not stage.resumes or not scratch.exists():
+        return {}
+    begun = _read_asked(scratch / _ASKED)
+    moved = "artefacts" in begun and not any((scratch / name).exists() for name in stage.makes)
+    if moved or not (stage.by_hand or {key: begun.get(key) for key in asked} == asked):
+        shutil.rmtree(scratch)
+        return {}
+    differing = _differing(begun.get("settings", {}), asked["settings"])
+    differing += [f"another {name}" for name in _other_inputs(begun, asked)]
+    if differing:
+        raise StageError(
+            f"{scratch} was begun with {', '.join(differing)}: run with the same to go on there, or delete that "
+            f"folder to begin the stage {stage.name} anew"
+        )
+    return begun
+
+
+def _other_inputs(begun: Mapping, asked: Mapping) -> list[str]:
+    old = begun.get("inputs", {})
+    return [name for name, now in asked["inputs"].items() if name in old and old[name] != now]
+
+
+def _read_asked(path: Path) -> dict:
+    """Empty where an earlier version of bifa, or an interruption at the very beginning, left none."""
+    return dict(json.loads(path.read_text())) if path.exists() else {}
+
+
+def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping) -> dict[str, str]:
+    """What an earlier run made and did not come to move, or not all; empty where there is none."""
+    made = begun.get("artefacts", {})
+    here = all((scratch / name).exists() or (folder / name).exists() for name in stage.makes)
+    return made if here and set(stage.makes) == set(made) else {}
+
+
+def _made(folder: Path, scratch: Path, stage: Stage, asked: dict) -> dict[str, str]:
+    """Run the stage; the digests of what it made."""
+    _write_json(scratch / _ASKED, asked)
+    stage.run(folder, scratch)
+    missing = [name for name in stage.makes if not (scratch / name).exists()]
+    if missing:
+        raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
+    made = {name: digest(scratch / name) for name in stage.makes}
+    _write_json(scratch / _ASKED, asked | {"artefacts": made})
+    return made
+
+
 def _replace(new: Path, target: Path, keep: bool) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     if keep and target.exists():
-        earlier = len(list(target.parent.glob(f"{target.name}.earlier-*")))
-        os.replace(target, target.with_name(f"{target.name}.earlier-{earlier + 1}"))
+        os.replace(target, _earlier(target))
     if target.is_dir():
         shutil.rmtree(target)
     os.replace(new, target)
+
+
+def _earlier(target: Path) -> Path:
+    """The name that `target` is kept under: numbered one more than the last, though some before may be gone."""
+    there = target.parent.glob(f"{glob.escape(target.name)}.earlier-*")
+    numbers = [path.name.rpartition("-")[2] for path in there]
+    last = max((int(number) for number in numbers if number.isdecimal()), default=0)
+    return target.with_name(f"{target.name}.earlier-{last + 1}")
 
 
 def _read_records(folder: Path) -> dict:
@@ -164,7 +247,9 @@ def _read_records(folder: Path) -> dict:
     except FileNotFoundError:
         return {}
     except (ValueError, KeyError, TypeError) as error:
-        raise StageError(f"{folder / PROVENANCE} is damaged ({error}): delete it to start the campaign over") from None
+        raise StageError(
+            f"{folder / PROVENANCE} is damaged ({error}): put it right, or name another folder to start over"
+        ) from None
 
 
 def _write_json(path: Path, content: dict) -> None:

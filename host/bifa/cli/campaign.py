@@ -109,10 +109,12 @@ def run_campaign(
 
 
 def _check(out: Path, port: str) -> None:
+    from bifa.campaign.stages import check_folder
     from bifa.files import check_targets
     from bifa.rig import check_port
 
     check_targets(folders=(out,))
+    check_folder(out)
     check_port(port)
 
 
@@ -151,7 +153,7 @@ def _kept(out: Path) -> str:
         done = list(json.loads((out / PROVENANCE).read_text())["stages"])
     except (OSError, ValueError, KeyError):
         done = []
-    trials = sum(len(list(folder.glob("*.csv"))) for folder in out.glob(f".*-unfinished/*{PARTIAL_SUFFIX}"))
+    trials = sum(len(list(folder.glob("*.csv"))) for folder in out.glob(f".*-unfinished/**/*{PARTIAL_SUFFIX}"))
     under_way = f"{trials} trial{'' if trials == 1 else 's'} of the stage under way" if trials else ""
     kept = " and ".join(part for part in (f"the stages {', '.join(done)}" if done else "", under_way) if part)
     return f"{out} keeps {kept}" if kept else "nothing has been finished yet"

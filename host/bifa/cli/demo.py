@@ -42,6 +42,10 @@ def _walk_two_gaits(out: Path, seed: int, rerun: list[str]) -> None:
 
     from rich.table import Table
 
+    from bifa.files import check_targets
+
+    check_targets(folders=(out,))
+
     from bifa.campaign.progress import stage_progress
     from bifa.campaign.stages import run_stages
     from bifa.campaign.walks import walks_stage

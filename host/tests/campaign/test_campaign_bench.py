@@ -1,10 +1,15 @@
 """A campaign at a bench of one's own: what is known is asked once, and only measuring needs the robot."""
 
+from dataclasses import replace
+
 import pytest
 
+import bifa.campaign.bench
+from bifa.campaign.about import about
 from bifa.campaign.bench import Bench
 from bifa.campaign.loop import Effort, campaign
-from bifa.campaign.stages import run_stages
+from bifa.campaign.stages import StageError, run_stages
+from bifa.cli.campaign import _kept
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench
 from bifa.measure.plan import PlannedTrial
@@ -78,3 +83,64 @@ def test_by_hand_only_measuring_stages_are_measured_by_hand():
     stages = campaign(Bench("/dev/ttyACM0"), Effort(), lambda what, share: None)
     assert [stage.name for stage in stages if stage.by_hand] == ["measure", "walk-base", "walk-completed", "again"]
     assert not any(stage.by_hand for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None))
+
+
+@pytest.fixture
+def own_driver(monkeypatch):
+    """A rig of one's own, by its name; what it records is written by `recording`."""
+    monkeypatch.setattr(bifa.campaign.bench, "is_offered", lambda port: port in ("virtual", "my-lab"))
+    return "my-lab"
+
+
+def recording(stage, known):
+    planned = PlannedTrial("static_loading", "large", 0.0, 2.0)
+    columns = {"time_s": [0.0, 0.02], "displacement_mm": [0.0, 1.0], "force_N": [0.0, 1.0], "pressure_psi": [0.0, 0.0]}
+
+    def run(inputs, outputs):
+        write_dataset(outputs / "measured", Dataset(None, "campaign", known, (planned.as_trial(columns),)))
+
+    return replace(stage, run=run)
+
+
+def test_what_an_own_driver_measured_is_not_measured_again_unasked(own_driver, tmp_path, monkeypatch):
+    def stages(given, quick=False):
+        bench = Bench(own_driver, known=given)
+        measure, declare, *_ = campaign(bench, Effort(quick), lambda what, share: None)
+        return [measure, declare]
+
+    measure, declare = stages({"head_mass_kg": 0.18})
+    run_stages(tmp_path, [recording(measure, {"head_mass_kg": 0.2, "tail_mass_kg": 0.1}), declare])
+    assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.18, "tail_mass_kg": 0.1}
+    monkeypatch.setattr("bifa.__version__", "9.9")
+    run_stages(tmp_path, stages({"head_mass_kg": 0.19}))  # would open the rig, which is not there
+    assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.19, "tail_mass_kg": 0.1}
+    with pytest.raises(StageError, match=r"quick = False, not True.*--rerun measure"):
+        run_stages(tmp_path, stages({}, quick=True))
+    run_stages(tmp_path, [recording(measure, {})], rerun=["measure"])
+    assert read_dataset(tmp_path / "measured.earlier-1").known
+
+
+def test_every_stage_that_measures_with_an_own_driver_keeps_what_it_measured(own_driver):
+    stages = campaign(Bench(own_driver), Effort(), lambda what, share: None)
+    kept = [stage.name for stage in stages if stage.by_hand]
+    assert kept == ["measure", "walk-base", "diagnose", "walk-completed", "again"]
+
+
+def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path):
+    (tmp_path / "measured").mkdir()
+    measure, *_ = campaign(Bench("/dev/nowhere"), Effort(), lambda what, share: None)
+    measure.run(tmp_path, tmp_path)  # no such port: nothing is opened
+
+
+def test_what_to_type_for_the_same_campaign_again_has_all_that_decides_it():
+    bench = Bench("virtual", 3, {"sealed": 3, "profile": "worn"}, {"head_mass_kg": 0.18234567})
+    _, made = about(bench, Effort(quick=True))
+    expected = "bifa campaign --port virtual --seed 3 --profile worn --quick --known head_mass_kg=0.18234567"
+    assert dict(made)["command"] == expected
+
+
+def test_walks_of_a_round_under_way_are_counted_as_kept(tmp_path):
+    folder = tmp_path / ".again-unfinished" / "rounds" / "walks-2.partial"
+    folder.mkdir(parents=True)
+    (folder / "round-2_1.csv").write_text("")
+    assert "keeps 1 trial of the stage under way" in _kept(tmp_path)

@@ -1,9 +1,11 @@
 """A campaign's stages: made once, resumed, rerun alone, never half-written."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from bifa.campaign import stages
 from bifa.campaign.stages import PROVENANCE, Stage, StageError, run_stages
 
 
@@ -87,7 +89,7 @@ def test_folders_are_artefacts_too_and_provenance_is_the_same_for_the_same_setti
 
 def test_a_damaged_provenance_is_refused_with_advice(tmp_path):
     (tmp_path / PROVENANCE).write_text("{")
-    with pytest.raises(StageError, match="delete it"):
+    with pytest.raises(StageError, match="name another folder"):
         run_stages(tmp_path, [])
 
 
@@ -123,3 +125,138 @@ def test_what_somebody_measured_is_measured_again_only_on_request_and_kept_besid
     run_stages(tmp_path, [by_hand("tuesday", {"effort": {"quick": True}})], rerun=["measure"])
     assert (tmp_path / "data").read_text() == "tuesday"
     assert (tmp_path / "data.earlier-1").read_text() == "monday"
+
+
+def folder_maker(makes="data", text="made", **options):
+    def run(inputs, outputs):
+        (outputs / makes).mkdir()
+        (outputs / makes / "one.csv").write_text(text)
+
+    return Stage("measure", "m", (), (makes,), run, **options)
+
+
+def test_what_the_campaign_did_not_make_is_refused_before_any_stage_runs(tmp_path):
+    log = []
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "dataset.toml").write_text("mine")
+    with pytest.raises(StageError, match=r"data was not made by .*choose another folder"):
+        run_stages(tmp_path, [copier("a", [], "a.txt", log), folder_maker()], rerun=["measure"])
+    assert log == []
+    assert (tmp_path / "data" / "dataset.toml").read_text() == "mine"
+
+
+def test_a_campaign_does_not_run_inside_a_data_set(tmp_path):
+    (tmp_path / "dataset.toml").write_text("mine")
+    with pytest.raises(StageError, match="is a data set: name another folder"):
+        run_stages(tmp_path, [folder_maker()])
+
+
+def test_what_appears_while_a_stage_runs_is_not_replaced(tmp_path):
+    def run(inputs, outputs):
+        (outputs / "data").write_text("made")
+        (inputs / "data").write_text("mine")
+
+    with pytest.raises(StageError, match="was not made by"):
+        run_stages(tmp_path, [Stage("measure", "m", (), ("data",), run)])
+    assert (tmp_path / "data").read_text() == "mine"
+
+
+def test_another_campaigns_artefact_is_replaced_but_not_what_another_kind_of_bench_measured(tmp_path):
+    run_stages(tmp_path, [folder_maker("bench")])
+    declare = Stage("declare", "d", (), ("bench",), folder_maker("bench", "declared").run)
+    with pytest.raises(StageError, match="bench was not made by the stage declare"):
+        run_stages(tmp_path, [folder_maker("measured"), declare])
+    run_stages(tmp_path, [declare])
+    assert (tmp_path / "bench" / "one.csv").read_text() == "declared"
+
+
+@pytest.mark.parametrize("options", [{}, {"resumes": True}, {"resumes": True, "by_hand": True}], ids=str)
+@pytest.mark.parametrize("moved", [0, 1, 2])
+def test_an_interruption_while_artefacts_are_moved_locks_nobody_out(tmp_path, monkeypatch, options, moved):
+    log = []
+
+    def run(inputs, outputs):
+        log.append("ran")
+        for name in "ab":
+            (outputs / name).write_text(str(len(log)))
+
+    stage = Stage("measure", "m", (), ("a", "b"), run, **options)
+    move, moves = stages._replace, []
+
+    def interrupted(new, target, keep):
+        if len(moves) == moved:
+            raise KeyboardInterrupt
+        moves.append(target)
+        move(new, target, keep)
+
+    monkeypatch.setattr(stages, "_replace", interrupted)
+    if moved < 2:
+        with pytest.raises(KeyboardInterrupt):
+            run_stages(tmp_path, [stage])
+    else:  # all moved, but the scratch not yet removed
+        with monkeypatch.context() as patch:
+            patch.setattr(stages.shutil, "rmtree", lambda *_, **__: None)
+            run_stages(tmp_path, [stage])
+    monkeypatch.setattr(stages, "_replace", move)
+    run_stages(tmp_path, [stage])
+    assert (tmp_path / "a").read_text() == (tmp_path / "b").read_text()
+    assert log == ["ran"] if options or moved == 2 else ["ran"] * 2
+    before = len(log)
+    run_stages(tmp_path, [stage], rerun=["measure"])
+    assert len(log) == before + 1
+    assert not list(tmp_path.glob(".*"))
+
+
+def stopping(log, settings, **options):
+    """A stage that is interrupted the first time, and says what it found in its scratch the next."""
+
+    def run(inputs, outputs):
+        log.append(sorted(path.name for path in outputs.glob("trial_*")))
+        if len(log) == 1:
+            (outputs / "trial_1").write_text("recorded")
+            raise KeyboardInterrupt
+        (outputs / "data").write_text("whole")
+
+    return Stage("measure", "m", (), ("data",), run, settings, resumes=True, **options)
+
+
+@pytest.mark.parametrize(("seed", "found"), [(1, ["trial_1"]), (2, [])])
+def test_a_stage_goes_on_only_with_what_was_begun_alike(tmp_path, seed, found):
+    log = []
+    with pytest.raises(KeyboardInterrupt):
+        run_stages(tmp_path, [stopping(log, {"seed": 1})])
+    run_stages(tmp_path, [stopping(log, {"seed": seed})])
+    assert log == [[], found]
+
+
+def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, monkeypatch):
+    log = []
+    with pytest.raises(KeyboardInterrupt):
+        run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
+    with pytest.raises(StageError, match=r"\.measure-unfinished was begun with quick = True, not False.*or delete"):
+        run_stages(tmp_path, [stopping(log, {"quick": False}, by_hand=True)])
+    monkeypatch.setattr("bifa.__version__", "9.9")
+    run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
+    assert log == [[], ["trial_1"]]
+
+
+def test_another_input_of_what_was_begun_by_hand_is_named(tmp_path):
+    log = []
+    gait = copier("gait", [], "gait.toml", [])
+    walk = replace(stopping(log, {}, by_hand=True), needs=("gait.toml",))
+    with pytest.raises(KeyboardInterrupt):
+        run_stages(tmp_path, [gait, walk])
+    with pytest.raises(StageError, match=r"was begun with another gait\.toml"):
+        run_stages(tmp_path, [copier("gait", [], "gait.toml", [], "y", {"seed": 2}), walk])
+
+
+def test_what_was_kept_before_is_never_replaced_though_some_of_it_is_gone(tmp_path):
+    for text in ("1", "2", "3"):
+        run_stages(tmp_path, [by_hand(text)], rerun=["measure"])
+    (tmp_path / "data.earlier-1").unlink()
+    run_stages(tmp_path, [by_hand("4")], rerun=["measure"])
+    assert {p.name: p.read_text() for p in tmp_path.glob("data*")} == {
+        "data": "4",
+        "data.earlier-2": "2",
+        "data.earlier-3": "3",
+    }
