@@ -25,7 +25,7 @@ from bifa.report.page import write_page
 from bifa.report.picture import draw_chart
 from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model, load_model
-from bifa.robot.gait import Gait
+from bifa.robot.gait import BASELINE, Gait
 from bifa.simulate import gait_rows
 
 TITLES = {
@@ -39,7 +39,8 @@ PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3}
 
 @dataclass(frozen=True)
 class GaitResult:
-    """Speeds in mm/s over the settled cycles; `spread` is that of the repeats."""
+    """Speeds in mm/s over the settled cycles; `spread` is that of the repeats. `stand_in`: the baseline, since no gait
+    walks on the model."""
 
     gait: str
     base_model: float
@@ -47,6 +48,7 @@ class GaitResult:
     measured: float
     spread: float
     paper: float
+    stand_in: bool = False
 
 
 def compare(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
@@ -80,6 +82,7 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
                     float(np.mean(means)),
                     float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
                     PAPER_MM_S[gait],
+                    gait != "baseline" and trial.gait == BASELINE.as_dict(),
                 )
             )
     diagnosis = json.loads((inputs / "diagnosis.json").read_text())

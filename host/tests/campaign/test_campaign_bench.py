@@ -5,14 +5,18 @@ from dataclasses import replace
 import pytest
 
 import bifa.campaign.bench
+from bifa.campaign import loop
 from bifa.campaign.about import about
 from bifa.campaign.bench import Bench
 from bifa.campaign.loop import Effort, campaign
 from bifa.campaign.stages import StageError, run_stages
 from bifa.cli.campaign import _kept
 from bifa.data import Dataset, read_dataset, write_dataset
+from bifa.gait import SearchError
 from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench
 from bifa.measure.plan import PlannedTrial
+from bifa.robot import nominal, save_model
+from bifa.robot.gait import BASELINE, load_gait
 
 
 class Answering:
@@ -130,6 +134,23 @@ def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path)
     (tmp_path / "measured").mkdir()
     measure, *_ = campaign(Bench("/dev/nowhere"), Effort(), lambda what, share: None)
     measure.run(tmp_path, tmp_path)  # no such port: nothing is opened
+
+
+def test_a_base_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch):
+    """What it lacks is what the campaign is for; without a gait of the completed model there is none."""
+
+    def nothing_walks(*_):
+        raise SearchError("none walks")
+
+    monkeypatch.setattr(loop, "_robust_gait", nothing_walks)
+    stages = {stage.name: stage for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None)}
+    for model in ("base", "completed"):
+        save_model(tmp_path / f"model-{model}.toml", nominal())
+    stages["optimise-base"].run(tmp_path, tmp_path)
+    assert load_gait(tmp_path / "gait-base.toml") == BASELINE
+    assert "none walks" in (tmp_path / "gait-base.toml").read_text()
+    with pytest.raises(SearchError):
+        stages["optimise-completed"].run(tmp_path, tmp_path)
 
 
 def test_what_to_type_for_the_same_campaign_again_has_all_that_decides_it():

@@ -207,6 +207,14 @@ def test_the_terminal_says_a_diagnosis_in_words_within_80_columns():
     assert max(map(len, text.getvalue().splitlines())) <= 80
 
 
+def test_a_baseline_in_the_place_of_a_gait_is_called_so():
+    gait = {**sample.summary()["gaits"][0], "gait": "base"}
+    assert [speed_table([gait | {"stand_in": there}]).rows[0][0] for there in (False, True)] == [
+        "found with the base model",
+        "baseline: base model has none",
+    ]
+
+
 @pytest.mark.parametrize(
     ("experiment", "settings", "words"),
     [
