@@ -10,7 +10,7 @@ from bifa.campaign.stages import Stage
 from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.link import Uno
-from bifa.measure.locomotion import record_walk
+from bifa.measure.experiments import record_columns
 from bifa.measure.plan import PlannedTrial
 from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of
 from bifa.report.walks import MEASURED, Walk, draw_walks
@@ -56,8 +56,8 @@ def measure_walks(
 
 def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress, **_) -> Trial:
     """The `Recorder` of walks on a rig that needs nobody."""
-    walk = record_walk(rig, uno, planned.gait, planned.cycles, on_progress)
-    return planned.as_trial(walk.columns, extra=walk.extra)
+    columns, extra = record_columns(rig, uno, planned, on_progress)
+    return planned.as_trial(columns, extra=extra)
 
 
 def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:

@@ -2,10 +2,13 @@
 
 import csv
 import math
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TextIO
 
 from rich.progress import Progress
 
@@ -40,7 +43,8 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
     """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
     from bifa.data import DatasetWriter, Trial
     from bifa.data.lag import misfit_of_last
-    from bifa.measure.locomotion import record_walk
+    from bifa.measure.experiments import record_columns
+    from bifa.measure.plan import PlannedTrial
 
     steps = read_gait_file(gait_file) if gait_file else GaitFile(BASELINE)
     gait = steps.gait
@@ -56,8 +60,11 @@ def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: i
             if writer.has(trial):
                 continue
             task = progress.add_task(f"walk {repeat} of {repeats}", total=1.0)
-            walk = record_walk(rig, uno, gait, cycles, lambda share, task=task: progress.update(task, completed=share))
-            writer.add(replace(trial, columns=walk.columns, session_order=repeat, extra=walk.extra))
+            planned = PlannedTrial("locomotion", gait=gait, cycles=cycles, repeat=repeat)
+            columns, extra = record_columns(
+                rig, uno, planned, lambda share, task=task: progress.update(task, completed=share)
+            )
+            writer.add(replace(trial, columns=columns, session_order=repeat, extra=extra))
             if wrong := misfit_of_last(writer.trials):
                 progress.console.print(f"[yellow]warning[/yellow] {wrong}", highlight=False)
             progress.console.print(f"walk {repeat}: {uno.counters.text()}")
@@ -98,7 +105,7 @@ def record_telemetry(
     is_told = False
     try:
         while time.monotonic() < end_s:
-            path = out / f"telemetry_{1 + len(list(out.glob('telemetry_*.csv')))}.csv"
+            path = _next_file(out)
             try:
                 _record_until_gone(open_rig, path, parameters, end_s, console)
             except GONE as error:
@@ -126,11 +133,11 @@ def _record_until_gone(
                     uno.upload(parameters)
                 uno.stream(True)
                 marked = uno.mark_strobe()
-                if parameters:
-                    uno.run()
-                with path.open("x", newline="") as file:
+                with _telemetry_file(path) as file:
                     writer = csv.writer(file)
                     writer.writerow(HEADER)
+                    if parameters:
+                        uno.run()
                     try:
                         while time.monotonic() < end_s:
                             writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
@@ -141,6 +148,32 @@ def _record_until_gone(
     finally:
         if path.exists():
             console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
+
+
+def _next_file(out: Path) -> Path:
+    """After the last one, whatever is missing before it."""
+    numbers = [path.stem.removeprefix("telemetry_") for path in out.glob("telemetry_*.csv")]
+    return out / f"telemetry_{1 + max((int(n) for n in numbers if n.isdecimal()), default=0)}.csv"
+
+
+@contextmanager
+def _telemetry_file(path: Path) -> Iterator[TextIO]:
+    """A new file; on a full disk it ends with its last whole line, and RecordError says so."""
+    file = None
+    try:
+        with path.open("x", newline="") as file:
+            yield file
+    except GONE:  # the port, of which the file knows nothing
+        raise
+    except OSError as error:
+        if file is None:
+            raise RecordError(f"{path} cannot be written ({error.strerror or error}); nothing was kept") from None
+        whole = path.read_bytes()
+        os.truncate(path, whole.rfind(b"\n") + 1)
+        raise RecordError(
+            f"{path} cannot be written any further ({error.strerror or error}); the {max(whole.count(10) - 1, 0)} "
+            "samples so far are kept in it: make room, and record again"
+        ) from None
 
 
 def _row(uno: Uno, sample: Sample, marked: int) -> list:

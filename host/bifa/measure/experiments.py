@@ -40,6 +40,16 @@ def record_trial(
     (`set_point_psi`) and, of a step, when the valves switched.
     Raises BifaError where telemetry keeps getting lost or the clocks do not line up.
     """
+    columns, extra = record_columns(rig, uno, planned, on_progress, attempts)
+    if (commanded_psi := _commanded_psi(uno, planned)) >= 0.0:  # below: the vacuum, which nothing regulates
+        extra["set_point_psi"] = round(set_point_psi(commanded_psi), 4)
+    return planned.as_trial(columns, extra=extra)
+
+
+def record_columns(
+    rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """As `record_trial`: the columns and what is noted, without asking the Uno for anything more."""
     instruments_of(rig)
     why = ""
     for _ in range(attempts):
@@ -48,10 +58,8 @@ def record_trial(
         except AlignmentError as error:
             why = str(error)
             continue
-        if (commanded_psi := _commanded_psi(uno, planned)) >= 0.0:  # below: the vacuum, which nothing regulates
-            extra["set_point_psi"] = round(set_point_psi(commanded_psi), 4)
         if not lost:
-            return planned.as_trial(columns, extra=extra)
+            return columns, extra
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
     raise BifaError(f"{planned.title}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
 

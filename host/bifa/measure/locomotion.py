@@ -48,7 +48,8 @@ def record_walk(
     rig: has `instruments` with a motion capture; settings go to its `mount` (e.g. inclination_deg).
     on_progress(share) is told the share done, 0 to 1. The valves are off afterwards, whatever happens.
 
-    Raises BifaError where the rig has no motion capture, samples are lost, or the clocks do not line up.
+    Lost samples are counted, and no error: see experiments.record_columns.
+    Raises BifaError where the rig has no motion capture or the clocks do not line up.
     """
     tape = Recording(rig, uno, on_progress)
     uno.halt()
