@@ -54,9 +54,11 @@ def known_on(path: Path, desk: Desk) -> dict[str, float]:
         return read_bench(path)
     desk.say(f"Which of these have you measured directly? You are asked once; the answers are kept in {path}.")
     known: dict[str, float] = {}
-    for name, meaning in ASKED.items():
-        known |= _asked(desk, name, meaning)
-    desk.clear()
+    try:
+        for name, meaning in ASKED.items():
+            known |= _asked(desk, name, meaning)
+    finally:
+        desk.clear()
     write_text(path, tomli_w.dumps({"known": known}))
     desk.say(f"Saved in {path}; edit that file to correct a value.")
     return known

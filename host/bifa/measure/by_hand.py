@@ -49,7 +49,14 @@ class ByHand:
         Raises KeyboardInterrupt where the answer is to stop.
         """
         turn = Turn(planned, number, total)
-        self._instruments.begin(turn)
+        self._instruments.begin(turn, writer.partial / RAW)
+        try:
+            return self._until_kept(rig, uno, turn, on_progress, writer)
+        finally:
+            self._desk.clear()
+
+    def _until_kept(self, rig, uno: Uno, turn: Turn, on_progress, writer: DatasetWriter) -> Trial:
+        planned, number, total = turn.planned, turn.number, turn.total
         while True:
             self._desk.say(f"\nTrial {number} of {total}: {planned.title}")
             try:
@@ -62,7 +69,6 @@ class ByHand:
                 continue
             if self._accepted(rig, uno, turn, trial, writer):
                 self._instruments.keep(writer.partial / RAW)
-                self._desk.clear()
                 return trial
 
     def _accepted(self, rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:

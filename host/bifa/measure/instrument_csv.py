@@ -30,6 +30,8 @@ from bifa.measure.plan import PlannedTrial
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
 _CHAMBERS = ("body", "head", "tail")
+_HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
+_LOST = "no value (a lost marker?); fill the gap by the instrument's own means, or record again"
 
 
 class InstrumentFileError(BifaError):
@@ -55,7 +57,7 @@ def import_trial(
     """
     recorded = _added_to(folder, known) if add else None
     measured, edges = read_instrument(instrument, CHANNELS[planned.experiment])
-    uno = read_columns(_telemetry_file(telemetry), ("time_s", "sequence", *(f"pressure_{c}_psi" for c in _CHAMBERS)))
+    uno = _read_telemetry(_telemetry_file(telemetry), planned)
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
     columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
@@ -86,15 +88,25 @@ def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
 
 
 def _refuse_copy(recorded: Dataset, trial: Trial, instrument: Path) -> None:
+    """By what the instrument measured: the pressures are the telemetry's, and may be another's."""
+    own = {name: values for name, values in trial.columns.items() if name.startswith(("displacement", "force"))}
     for old in recorded.trials:
-        if all(np.array_equal(old.columns.get(name), values) for name, values in trial.columns.items()):
+        if all(np.array_equal(old.columns.get(name), values) for name, values in own.items()):
             raise InstrumentFileError(f"{instrument} is in {recorded.path} already, as {old.file}")
 
 
 def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s] from the
-    file beside it. Raises InstrumentFileError."""
-    return _whole(path, ("time_s", *channels)), _whole(sync_file(path), ("sync_time_s",))["sync_time_s"]
+    file beside it; both rise. A tail that was not tracked at all is no column. Raises InstrumentFileError."""
+    columns, edges = _whole(path, ("time_s", *channels)), _whole(sync_file(path), ("sync_time_s",))
+    _refuse_falling(path, columns, "time_s")
+    _refuse_falling(sync_file(path), edges, "sync_time_s")
+    if _HEAD in channels and _TAIL in columns:
+        if np.isnan(columns[_TAIL]).all():
+            del columns[_TAIL]
+        else:
+            _refuse_gaps(path, columns, (_TAIL,), _LOST)
+    return columns, edges["sync_time_s"]
 
 
 def sync_file(path: Path) -> Path:
@@ -105,14 +117,38 @@ def sync_file(path: Path) -> Path:
 def _whole(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
     """As `read_columns`, with a value in every field of what is required."""
     columns = read_columns(path, required)
-    for name in required:
+    _refuse_gaps(path, columns, required, _LOST)
+    return columns
+
+
+def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
+    whole = ("time_s", "sequence", *(f"pressure_{chamber}_psi" for chamber in _CHAMBERS))
+    columns = read_columns(path, (*whole, *(f"command_{chamber}" for chamber in _commanded(planned))))
+    _refuse_gaps(path, columns, whole, "no value (a cut line?); remove that line, or record again")
+    return columns
+
+
+def _commanded(planned: PlannedTrial) -> tuple[str, ...]:
+    """The chambers whose commands are columns of the trial."""
+    if planned.experiment == "locomotion":
+        return _CHAMBERS
+    return (("body" if planned.actuator == "large" else "head"),) if planned.experiment == "step_response" else ()
+
+
+def _refuse_gaps(path: Path, columns: dict[str, np.ndarray], names: tuple[str, ...], problem: str) -> None:
+    for name in names:
         if not np.isfinite(columns[name]).all():
             line = int(np.flatnonzero(~np.isfinite(columns[name]))[0]) + 2
-            raise InstrumentFileError(
-                f"{path}, line {line}, column {name}: no value (a lost marker?); fill the gap by the instrument's own "
-                "means, or record again"
-            )
-    return columns
+            raise InstrumentFileError(f"{path}, line {line}, column {name}: {problem}")
+
+
+def _refuse_falling(path: Path, columns: dict[str, np.ndarray], name: str) -> None:
+    steps = np.diff(columns[name])
+    if (steps <= 0.0).any():
+        line = int(np.flatnonzero(steps <= 0.0)[0]) + 3
+        raise InstrumentFileError(
+            f"{path}, line {line}, column {name}: not later than the line before; times rise from line to line"
+        )
 
 
 def _telemetry_file(path: Path) -> Path:
@@ -130,11 +166,12 @@ def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:  # a spreadsheet begins its files with a mark
             rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InstrumentFileError(f"{path} cannot be read: {error}") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InstrumentFileError(f"{path} cannot be read as a CSV: {error}") from None
     while rows and not any(rows[-1]):
         rows.pop()
     header = rows[0] if rows else []
+    _refuse_shape(path, header, rows)
     missing = [name for name in required if name not in header]
     if missing:
         raise InstrumentFileError(f"{path} lacks the column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
@@ -151,6 +188,24 @@ def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]
     if len(rows) < 3:
         raise InstrumentFileError(f"{path} holds {max(len(rows) - 1, 0)} samples: nothing to synchronise")
     return columns
+
+
+def _refuse_shape(path: Path, header: list[str], rows: list[list[str]]) -> None:
+    """Other separators, columns of one name, and lines with more fields than there are names."""
+    for mark, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and mark in header[0]:
+            raise InstrumentFileError(
+                f"{path}: its columns are separated by {name}; save it with commas between columns, points in numbers"
+            )
+    for name in header:
+        if name and header.count(name) > 1:
+            raise InstrumentFileError(f"{path} has the column {name} more than once; keep the right one")
+    for line, row in enumerate(rows[1:], 2):
+        if any(row[len(header) :]):
+            raise InstrumentFileError(
+                f"{path}, line {line}: {len(row)} fields, but {len(header)} columns; are there commas in the numbers? "
+                "Save it with decimal points"
+            )
 
 
 def _is_number(text: str) -> bool:
@@ -209,7 +264,7 @@ def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instru
 
 def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
     step = planned.experiment == "step_response"
-    chambers = (("body" if planned.actuator == "large" else "head"),) if step else _CHAMBERS
+    chambers = _commanded(planned)
     commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])
     keep = np.isfinite(commands).all(axis=0)
     keep &= (uno["time_s"] >= instrument_s[0]) & (uno["time_s"] <= instrument_s[-1])

@@ -60,15 +60,16 @@ class OwnInstruments:
     def __init__(self, desk: Desk, watch: Path | None = None) -> None:
         self._desk, self._watch = desk, watch
         self._turn: Turn | None = None
+        self._kept: Path | None = None
         self._step = ""
         self._experiment = ""
         self._known: dict[Path, tuple] = {}
         self._seen: dict[Path, tuple[tuple, float]] = {}
         self._record: tuple[Path, dict[str, np.ndarray]] | None = None
 
-    def begin(self, turn: Turn) -> None:
-        """What is asked from now on is for this trial."""
-        self._turn = turn
+    def begin(self, turn: Turn, kept: Path | None = None) -> None:
+        """What is asked from now on is for this trial; `kept`: the folder of the earlier trials' files."""
+        self._turn, self._kept = turn, kept
 
     def mount(self, experiment: str, **settings) -> None:
         """See Instruments."""
@@ -178,8 +179,13 @@ class OwnInstruments:
     def _take_named(self, answer: str) -> bool:
         if not answer and self._watch is not None:
             return False  # it is looked for anyway
-        path = Path(answer.strip("'\"")).expanduser()
-        if not answer or not path.is_file():
+        path = Path(answer.strip("'\""))
+        try:
+            path = path.expanduser()
+            there = path.is_file()
+        except (OSError, RuntimeError, ValueError):  # too long a name, a user who is not known
+            there = False
+        if not answer or not there:
             self._desk.say(f"There is no file {answer!r}. Type the path of the CSV, or q to stop.")
             return False
         return self._take(path)
@@ -187,12 +193,20 @@ class OwnInstruments:
     def _take(self, path: Path) -> bool:
         try:
             columns, edges = read_instrument(path, CHANNELS[self._experiment])
+            self._refuse_earlier(path)
         except InstrumentFileError as error:
             self._desk.say(f"{error}. Correct it and save it again.")
             return False
         self._record = (path, {**columns, "sync_time_s": edges})
         self._step = "saved"
         return True
+
+    def _refuse_earlier(self, path: Path) -> None:
+        """A file that an earlier trial was kept with: somebody saved or named the wrong one."""
+        data = path.read_bytes()
+        for old in sorted(self._kept.glob("*.csv")) if self._kept is not None else ():
+            if old.name != self._turn.planned.file and old.read_bytes() == data:
+                raise InstrumentFileError(f"{path} is the record of an earlier trial, {old.name}")
 
 
 def on_machine(experiment: str) -> bool:

@@ -109,6 +109,6 @@ def session(
         for pressure in pressures_psi or (0.0, 5.0, 8.5):
             conditions.append(PlannedTrial("anchor_pull", None, pressure, rate_mm_s or PULL_RATE_MM_S))
     if "locomotion" in experiments:
-        conditions += [PlannedTrial("locomotion", gait=gait, cycles=cycles) for gait in gaits]
-    conditions = [replace(condition, settings=dict(settings or {})) for condition in conditions]
+        walks = [PlannedTrial("locomotion", gait=gait, cycles=cycles) for gait in gaits]
+        conditions += [replace(walk, settings=dict(settings or {})) for walk in walks]
     return tuple(replace(condition, repeat=repeat) for repeat in range(1, repeats + 1) for condition in conditions)

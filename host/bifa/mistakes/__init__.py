@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from bifa.data import Dataset, Trial
 from bifa.data.check import Finding
 
+from .copies import check_copies
 from .known import check_known
 from .loadings import check_anchor_pull, check_static_loading
 from .repeats import check_repeats
@@ -36,4 +37,7 @@ def find_mistakes(dataset: Dataset) -> list[Finding]:
     walks = dataset.of("locomotion")
     found = [finding for trial in dataset.trials for finding in mistakes_in(trial, walks)]
     files = {finding.file for finding in found}
-    return [*check_known(dataset.known), *found, *check_repeats(dataset, files)]
+    odd = list(check_repeats(dataset, files))
+    told = {trial.file for trial in dataset.trials for f in odd if trial.file == f.file or trial.file in f.text}
+    copies = check_copies(dataset, told)
+    return [*check_known(dataset.known), *found, *copies, *odd]

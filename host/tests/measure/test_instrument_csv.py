@@ -8,7 +8,7 @@ import pytest
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import MARK_PAUSE
-from bifa.measure.instrument_csv import InstrumentFileError, import_trial
+from bifa.measure.instrument_csv import InstrumentFileError, import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import open_rig
 
@@ -205,3 +205,52 @@ def test_what_a_spreadsheet_adds_does_not_matter(files):
     (files / "pull.csv").write_text("\ufeff" + "\n".join(table) + "\n")
     dataset, _ = import_trial(files / "pull.csv", files, PULL, files / "out")
     assert len(dataset.trials) == 1
+
+
+def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
+    return f"{header}\n" + "".join(f"{t},1,2{end}\n" for t in times)
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "message"),
+    [
+        ("pull.csv", table((1, 2, 2, 3)), "line 4, column time_s: not later"),
+        ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", "line 4, column sync_time_s: not later"),
+        ("pull.csv", table().replace(",", ";"), "separated by semicolons"),
+        ("pull.csv", table().replace(",", "\t"), "separated by tabs"),
+        ("pull.csv", table(end=",5"), "line 2: 4 fields, but 3 columns.*decimal points"),
+        ("pull.csv", table(header="time_s,displacement_mm,force_N,force_N", end=",5"), "force_N more than once"),
+        ("pull.csv", table(end="x" * 140_000), "cannot be read as a CSV"),
+    ],
+)
+def test_a_file_in_another_shape_is_refused_with_what_to_do(files, file, text, message):
+    (files / file).write_text(text)
+    with pytest.raises(InstrumentFileError, match=message):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+def test_a_tail_with_gaps_is_refused_and_one_never_tracked_is_absent(tmp_path):
+    path, header = tmp_path / "walk.csv", "time_s,displacement_head_mm,displacement_tail_mm\n"
+    (tmp_path / "walk.sync.csv").write_text("sync_time_s\n1\n2\n3\n")
+    path.write_text(header + "1,1,1\n2,1,\n3,1,1\n")
+    with pytest.raises(InstrumentFileError, match="line 3, column displacement_tail_mm: no value"):
+        read_instrument(path, ("displacement_head_mm",))
+    path.write_text(header + "1,1,\n2,1,\n3,1,\n")
+    assert "displacement_tail_mm" not in read_instrument(path, ("displacement_head_mm",))[0]
+
+
+def test_telemetry_without_commands_or_with_a_gap_is_refused(files):
+    with pytest.raises(InstrumentFileError, match="lacks the column command_body"):
+        import_trial(files / "pull.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
+    path = files / "telemetry_1.csv"
+    path.write_text(path.read_text().replace(",200.000000,", ",,"))
+    with pytest.raises(InstrumentFileError, match="column sequence: no value"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+def test_a_record_is_not_added_again_with_other_pressures(files):
+    import_trial(files / "pull.csv", files, PULL, files / "out")
+    path = files / "telemetry_1.csv"
+    path.write_text(path.read_text().replace("8.500000", "8.400000"))
+    with pytest.raises(InstrumentFileError, match="already"):
+        import_trial(files / "pull.csv", files, PULL, files / "out", add=True)
