@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from bifa.data import Dataset, read_dataset
+from bifa.data import Dataset, DatasetError, read_dataset
 from bifa.measure.plan import REPEATS, PlannedTrial
 from bifa.measure.session import run_session
 from bifa.robot.gait import Gait
@@ -57,6 +57,12 @@ def resolve(
         ran.append(found.next)
         found = diagnose(dataset)
     return dataset, found, tuple(ran)
+
+
+def refuse_leftovers(folder: Path) -> None:
+    """Raise DatasetError where an earlier `resolve` has left an experiment, before minutes are spent on a diagnosis."""
+    if left := sorted(path.name for path in folder.glob("separate-*") if path.suffix != ".partial"):
+        raise DatasetError(f"{folder} holds {', '.join(left)} of an earlier --resolve: move that folder away first")
 
 
 def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:

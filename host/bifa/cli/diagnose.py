@@ -27,7 +27,7 @@ def diagnose(
     out: Annotated[Path | None, typer.Option(help="Write the model, completed by the effects found.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with the evidence.")] = None,
     model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the search; the same seed gives the same verdict.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the search; the same seed gives the same verdict.")] = 0,
     resolve: Annotated[
         bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and continue.")
     ] = False,
@@ -56,6 +56,7 @@ def diagnose(
 
     check_targets(json, out, report)
 
+    from bifa.campaign.resolve import refuse_leftovers
     from bifa.data import read_dataset
     from bifa.pipe_robot.accuracy import accuracies
     from bifa.robot import load_model
@@ -66,6 +67,8 @@ def diagnose(
     measured = read_dataset(dataset)
     beside = named(dataset)
     folder = beside.with_name(f"{beside.name}-resolved") if resolve else None
+    if folder is not None:
+        refuse_leftovers(folder)
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     found = _found(console, measured, robot, good_enough, seed, folder, port, watch, workers)
@@ -82,7 +85,7 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
     from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 
     with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console) as progress:
-        task = progress.add_task("fitting stiffness curves, steps and pulls in turn")
+        task = progress.add_task("fitting stiffness curves")
 
         def said(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
@@ -128,6 +131,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
     """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance; where a person
     works the instruments, no bar redraws itself over the questions."""
     from contextlib import contextmanager
+    from functools import cache
 
     from bifa.campaign.resolve import SPECIMEN
     from bifa.cli.campaign import at_desk
@@ -135,6 +139,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
 
     made = {**measured.provenance, **measured.provenance.get("options", {})}
     options = {key: made[key] for key in SPECIMEN if key in made} if port == "virtual" else {}
+    desk = cache(lambda: at_desk(console, watch)[1])  # one for all: each reads the terminal on
 
     @contextmanager
     def opened(number: int):
@@ -142,7 +147,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
             if rig.instruments is not None:
                 yield rig
                 return
-            at_desk(console, watch)[1].equip(rig)
+            desk().equip(rig)
             progress.stop()
             yield rig
         progress.start()

@@ -1,5 +1,6 @@
 """`bifa experiment`: the paper's characterisation experiments on a rig, written as a data set."""
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -48,9 +49,11 @@ def experiment(
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk.")] = 5,
     inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
     repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
-    quick: Annotated[bool, typer.Option(help="Fewer conditions, faster, twice each: for a first try.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="The same conditions twice each, faster: for a first try.")
+    ] = False,
     profile: Annotated[Profile | None, PROFILE] = None,
-    seed: Annotated[int | None, typer.Option(help="Of a virtual rig: its noise.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of a virtual rig: its noise.")] = None,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     watch: Annotated[Path | None, WATCH] = None,
     instrument: Annotated[Path | None, file_option("CSV of your own instrument, instead of a rig's.")] = None,
@@ -90,6 +93,10 @@ def experiment(
     for psi in pressure or []:
         _check_within("--pressure", psi, *RANGES["pressure_psi"])
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
+    if rate is not None and not math.isfinite(rate):
+        raise typer.BadParameter(f"--rate is a finite number of mm/s, not {rate:g}")
+    if inclination and name not in (Experiment.LOCOMOTION, Experiment.ALL):
+        raise typer.BadParameter(f"--inclination is of walks; leave it out, or run locomotion instead of {name.value}")
     gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),

@@ -1,5 +1,6 @@
 """Reading a data set from its folder: strict, and nothing guessed."""
 
+import itertools
 import os
 import tomllib
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -26,6 +27,8 @@ from .layout import (
 )
 from .table import read_table
 
+_CHAMBERS = ("body", "head", "tail")
+_CLOCK_S = 0.1  # by which a time may be outside its trial: of the order of a command's age
 _COMMON_OPTIONAL = ("session_order", "extra")
 
 
@@ -55,6 +58,8 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
         Trial(**{**head, "columns": read_table(file, head["file"], EXPERIMENTS[head["experiment"]])})
         for head, file in zip(heads, paths, strict=True)
     ]
+    for number, trial in enumerate(trials, start=1):
+        _check_switches(trial, source, number)
     return Dataset(folder, name, known, tuple(trials), provenance)
 
 
@@ -117,6 +122,25 @@ def _trial_head(entry: Any, source: Source, number: int) -> dict[str, Any]:
         notes.number(key, *NOTED[key])
     fields.finish(also=layout.optional + _COMMON_OPTIONAL)
     return {**head, "extra": {**noted, **extra}}
+
+
+def _check_switches(trial: Trial, source: Source, number: int) -> None:
+    """When the valves switched, if that is noted: a list for a step, a table of them for a walk."""
+    noted = trial.extra.get("switch_time_s")
+    if noted is None or trial.experiment not in ("step_response", "locomotion"):
+        return
+    extra = Fields({"switch_time_s": noted}, source, trial=number, table="extra")
+    lists = [noted]
+    if trial.experiment == "locomotion":
+        if not isinstance(noted, dict) or set(noted) - set(_CHAMBERS):
+            raise extra.error("switch_time_s", f"{trial.file}: must be a table of lists {', '.join(_CHAMBERS)}")
+        lists = list(noted.values())
+    low, high = trial.time_s[0] - _CLOCK_S, 1.1 * trial.time_s[-1] + _CLOCK_S  # a clock may be 10 % off (NOTED)
+    for times in lists:
+        if not isinstance(times, list) or any(type(t) not in (int, float) for t in times):
+            raise extra.error("switch_time_s", f"{trial.file}: must be a list of numbers")
+        if not all(low <= t <= high for t in times) or any(b <= a for a, b in itertools.pairwise(times)):
+            raise extra.error("switch_time_s", f"{trial.file}: must be rising times within the trial, in s")
 
 
 def _setting(fields: Fields, key: str, source: Source, number: int) -> Any:
