@@ -25,8 +25,9 @@ class Judged:
 
     @property
     def counted_mm_s(self) -> np.ndarray:
-        """(n,) what the optimiser sees: 0 where the rules are broken or the robot goes the wrong way."""
-        return np.where(self.refused, 0.0, np.maximum(self.speed_mm_s, 0.0))
+        """(n,) what the optimiser sees: 0 where the rules are broken, the robot goes the wrong way, or it
+        cannot be simulated (a spring beyond its curve's end)."""
+        return np.where(self.refused, 0.0, np.fmax(self.speed_mm_s, 0.0))
 
 
 @dataclass(frozen=True)

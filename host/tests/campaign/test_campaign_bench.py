@@ -8,10 +8,11 @@ import bifa.campaign.bench
 from bifa.campaign import loop
 from bifa.campaign.about import about
 from bifa.campaign.bench import Bench
+from bifa.campaign.compare import _with_stand_in
 from bifa.campaign.loop import Effort, campaign
 from bifa.campaign.stages import StageError, run_stages
 from bifa.cli.campaign import _kept
-from bifa.data import Dataset, read_dataset, write_dataset
+from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
 from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench
 from bifa.measure.plan import PlannedTrial
@@ -151,6 +152,14 @@ def test_a_base_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch):
     assert "none walks" in (tmp_path / "gait-base.toml").read_text()
     with pytest.raises(SearchError):
         stages["optimise-completed"].run(tmp_path, tmp_path)
+
+
+def test_a_baseline_that_stands_in_is_told_under_both_names():
+    (walk,) = [Trial("baseline_1.csv", "locomotion", columns={}, gait=BASELINE.as_dict(), repeat=1)]
+    walked = Dataset(None, "walks", {}, (walk,), {})
+    assert [trial.file for trial in _with_stand_in(walked).trials] == ["baseline_1.csv", "base_1.csv"]
+    both = replace(walked, trials=(walk, replace(walk, file="base_1.csv")))
+    assert _with_stand_in(both) is both
 
 
 def test_what_to_type_for_the_same_campaign_again_has_all_that_decides_it():

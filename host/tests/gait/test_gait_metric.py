@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bifa.gait.metric import Metric, Passage
+from bifa.gait.metric import Judged, Metric, Passage
 from bifa.simulate import Progress, speeds
 from bifa.simulate.terrain import passed_at_m, tunnel
 
@@ -31,6 +31,12 @@ def test_the_speed_is_that_of_the_settled_cycles():
 )
 def test_what_breaks_the_rules_counts_nothing(advance, slip):
     assert Metric().judge(progress(advance, slip)).counted_mm_s == [0.0]
+
+
+def test_a_robot_that_cannot_be_simulated_does_not_walk():
+    """One among many would otherwise make every quantile and mean of a gait's robots NaN, and no gait the best."""
+    judged = Judged(np.array([np.nan, 5.0, -5.0]), np.zeros(3, dtype=bool))
+    assert judged.counted_mm_s.tolist() == [0.0, 5.0, 0.0]
 
 
 def test_slip_below_the_tolerance_and_before_the_judged_cycles_is_forgiven():
