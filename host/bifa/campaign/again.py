@@ -15,6 +15,7 @@ from bifa.campaign.resolve import joined
 from bifa.campaign.stages import StageError
 from bifa.campaign.walks import predict, predicted_speed, speeds
 from bifa.data import Dataset, Trial, read_dataset
+from bifa.files import write_text
 from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 
@@ -144,4 +145,4 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)
     save_gait(outputs / "gait-last.toml", gait, {"created_by": "bifa campaign"})
-    (outputs / "rounds.json").write_text(json.dumps([asdict(r) for r in rounds], indent=1) + "\n")
+    write_text(outputs / "rounds.json", json.dumps([asdict(r) for r in rounds], indent=1) + "\n")

@@ -1,7 +1,7 @@
 """The whole loop: measure, fit, walk, find what is missing, optimise with it, walk again, compare."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -76,48 +76,39 @@ def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
 
 
 def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
-    trials = plan.session(quick=effort.quick)
-
-    def run(inputs: Path, outputs: Path) -> None:
-        if (outputs / "bench").exists():
-            return  # interrupted after its last trial
-        with bench.open(0) as rig:
-            run_session(
-                rig,
-                outputs / "bench",
-                trials,
-                name="campaign: characterisation",
-                known=known_of(rig, bench.known),
-                provenance=bench.settings(0),
-                on_event=lambda e: part(e.planned.title, (e.number - 1 + e.share) / e.total),
-            )
-
+    run, _ = _session(bench, effort, part, "bench", "campaign: characterisation", bench.known)
+    title = "characterise the robot on its bench"
     settings = bench.settings(0) | {"effort": asdict(effort), "known": dict(bench.known)}
-    return Stage("measure", "characterise the robot on its bench", (), ("bench",), run, settings, resumes=True)
+    return Stage("measure", title, (), ("bench",), run, settings, resumes=True)
 
 
 def _measure_once(bench: Bench, effort: Effort, part: Part) -> Stage:
     """A real robot, without the known values that the person gives: to correct one is no reason to measure again."""
-    trials = plan.session(quick=effort.quick)
-    told = _told(bench, part)
+    run, trials = _session(bench, effort, part, "measured", "campaign", {})
+    title = f"characterise the robot: {trials} trials"
+    settings = bench.settings(0) | {"effort": asdict(effort)}
+    return Stage("measure", title, (), ("measured",), run, settings, resumes=True, by_hand=True)
+
+
+def _session(
+    bench: Bench, effort: Effort, part: Part, data: str, name: str, known: Mapping[str, float]
+) -> tuple[Callable[[Path, Path], None], int]:
+    """What records the characterisation into the data set `data`, named `name`, and of how many trials it is."""
+    trials, told = plan.session(quick=effort.quick), _told(bench, part)
 
     def run(inputs: Path, outputs: Path) -> None:
-        if (outputs / "measured").exists():
-            return  # interrupted after its last trial
         with bench.open(0) as rig:
             run_session(
                 rig,
-                outputs / "measured",
+                outputs / data,
                 trials,
-                name="campaign",
-                known=known_of(rig, {}),
+                name=name,
+                known=known_of(rig, known),
                 provenance=bench.settings(0),
                 on_event=lambda e: told(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
 
-    title = f"characterise the robot: {len(trials)} trials"
-    settings = bench.settings(0) | {"effort": asdict(effort)}
-    return Stage("measure", title, (), ("measured",), run, settings, resumes=True, by_hand=True)
+    return run, len(trials)
 
 
 def _declare(bench: Bench) -> Stage:
@@ -173,8 +164,6 @@ def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, ef
     walks = f"walks-{name.removeprefix('walk-')}"
 
     def run(inputs: Path, outputs: Path) -> None:
-        if (outputs / walks).exists():
-            return  # interrupted after its last walk
         loaded = {key: load_gait(inputs / file) if file else BASELINE for key, file in gaits.items()}
         with bench.open(number) as rig:
             measure_walks(rig, outputs / walks, loaded, effort.cycles, effort.repeats, _told(bench, part))

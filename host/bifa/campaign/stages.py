@@ -35,7 +35,8 @@ class Stage:
     needs, makes: names of artefacts (files or folders, relative to the campaign's folder).
     run(inputs, outputs): `inputs` is the campaign's folder, `outputs` the scratch folder to write `makes` into.
     settings: whatever else decides the result (seed, gait, port); plain JSON.
-    resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept.
+    resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept; it writes none of `makes`
+    before it is complete, and is not called where all are there.
     by_hand: a real robot was measured for hours to make it. It is not run again for another version of bifa, with
     other settings only on request, and what it made before is kept beside the new.
     """
@@ -213,15 +214,19 @@ def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping) -> d
 
 
 def _made(folder: Path, scratch: Path, stage: Stage, asked: dict) -> dict[str, str]:
-    """Run the stage; the digests of what it made."""
+    """Run the stage, unless an interrupted run has made all there is to make; the digests of that."""
     _write_json(scratch / _ASKED, asked)
-    stage.run(folder, scratch)
-    missing = [name for name in stage.makes if not (scratch / name).exists()]
-    if missing:
+    if _missing(scratch, stage):
+        stage.run(folder, scratch)
+    if missing := _missing(scratch, stage):
         raise StageError(f"stage {stage.name} ended without making {', '.join(missing)}")
     made = {name: digest(scratch / name) for name in stage.makes}
     _write_json(scratch / _ASKED, asked | {"artefacts": made})
     return made
+
+
+def _missing(scratch: Path, stage: Stage) -> list[str]:
+    return [name for name in stage.makes if not (scratch / name).exists()]
 
 
 def _replace(new: Path, target: Path, keep: bool) -> None:

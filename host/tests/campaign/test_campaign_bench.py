@@ -132,9 +132,10 @@ def test_every_stage_that_measures_with_an_own_driver_keeps_what_it_measured(own
 
 
 def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path):
-    (tmp_path / "measured").mkdir()
+    (tmp_path / ".measure-unfinished" / "measured").mkdir(parents=True)
     measure, *_ = campaign(Bench("/dev/nowhere"), Effort(), lambda what, share: None)
-    measure.run(tmp_path, tmp_path)  # no such port: nothing is opened
+    run_stages(tmp_path, [measure])  # no such port: nothing is opened
+    assert (tmp_path / "measured").is_dir()
 
 
 def test_a_base_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch):
