@@ -337,15 +337,19 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     return found
 
 
+def falling(time_s: np.ndarray) -> str:
+    """Where times do not increase, in words; empty where they do."""
+    at = np.flatnonzero(~(np.diff(time_s) > 0.0))
+    if not len(at):
+        return ""
+    before, after = time_s[at[0] : at[0] + 2]
+    return f"time does not increase from sample {at[0]} ({before:g} s) to the next ({after:g} s)"
+
+
 def _increases(table: Table) -> None:
     """Windows and segments are cut by time. Raises RecordError."""
-    back = np.flatnonzero(~(np.diff(table.time_s) > 0.0))
-    if len(back):
-        at, (before, after) = int(back[0]), table.time_s[back[0] : back[0] + 2]
-        raise RecordError(
-            f"record {table.name}: time does not increase from sample {at} ({before:g} s) to the next ({after:g} s):"
-            " sort it by time, or give its parts one by one."
-        )
+    if said := falling(table.time_s):
+        raise RecordError(f"record {table.name}: {said}: sort it by time, or give its parts one by one.")
 
 
 def _part(table: Table, name: str) -> str:

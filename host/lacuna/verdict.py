@@ -66,7 +66,8 @@ class Verdict:
     """The engine's result. `verdict`: "none", "identified" or "unexplained"; `effects`: the effects named, with sizes,
     intervals and probabilities; `error`: of the model before and after and of the floor, RMS in units of the noise, on
     records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call;
-    `nuisances`: by record, what was fitted to each. These three are fitted to every record, once the errors are known.
+    `nuisances`: by record, what was fitted to each. For a system of a function these three are fitted to every record,
+    once the errors are known.
 
     `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws. `record` is all of it in plain types
     for JSON, `diagnosis` the engine's complete result.

@@ -9,6 +9,7 @@ import numpy as np
 
 from lacuna.check.numbers import SAME, first, spread
 from lacuna.errors import MisuseError
+from lacuna.records import falling
 from lacuna.system import Record
 
 _FEWEST_SAMPLES = 8
@@ -20,13 +21,8 @@ def check_record(trial: Record) -> None:
         raise MisuseError(f"trial {trial.name}: its times are not a sequence of at least {_FEWEST_SAMPLES} numbers.")
     if not np.isfinite(time).all():
         raise MisuseError(f"trial {trial.name}: time at sample {first(~np.isfinite(time))} is not a number.")
-    falls = np.diff(time) <= 0
-    if falls.any():
-        at = first(falls)
-        raise MisuseError(
-            f"trial {trial.name}: time does not increase from sample {at} ({time[at]:g} s) to the next"
-            f" ({time[at + 1]:g} s)."
-        )
+    if said := falling(time):
+        raise MisuseError(f"trial {trial.name}: {said}.")
     if not trial.channels:
         raise MisuseError(f"trial {trial.name} has no channel to compare a prediction with.")
     for name, column in trial.channels.items():
