@@ -20,13 +20,15 @@ SPIKE_MM = 5.0  # there and back within two samples; a snap-through goes there o
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing to look at. `file` is None where it concerns the whole data set; `line` is that of the CSV file."""
+    """One thing to look at. `file` is None where it concerns the whole data set, or several `files`; `line` is that of
+    the CSV file."""
 
     kind: str
     text: str
     file: str | None = None
     line: int | None = None
     column: str | None = None
+    files: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         place = [self.file, f"line {self.line}" if self.line else None, self.column]

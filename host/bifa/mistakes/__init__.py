@@ -38,6 +38,5 @@ def find_mistakes(dataset: Dataset) -> list[Finding]:
     found = [finding for trial in dataset.trials for finding in mistakes_in(trial, walks)]
     files = {finding.file for finding in found}
     odd = list(check_repeats(dataset, files))
-    told = {trial.file for trial in dataset.trials for f in odd if trial.file == f.file or trial.file in f.text}
-    copies = check_copies(dataset, told)
+    copies = check_copies(dataset, {file for finding in odd for file in (finding.file, *finding.files)})
     return [*check_known(dataset.known), *found, *copies, *odd]
