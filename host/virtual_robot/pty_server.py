@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from virtual_robot.errors import VirtualRobotError
+from virtual_robot.places import check_place
 
 _SLICE_S = 0.005
 _STATUS_S = 0.25
@@ -54,11 +55,7 @@ def serve(
 def _check_link(link: Path) -> None:
     if link.exists() and not link.is_symlink():
         raise VirtualRobotError(f"{link} exists and is no symbolic link; choose another name for the link")
-    folder = link.absolute().parent
-    if not folder.is_dir():
-        raise VirtualRobotError(f"the folder of the link {link} does not exist; create it first")
-    if not os.access(folder, os.W_OK):
-        raise VirtualRobotError(f"the link {link} cannot be made (no permission); choose another place")
+    check_place(link, "the link")
 
 
 def _point(link: Path, path: str) -> None:

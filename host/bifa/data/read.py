@@ -24,10 +24,11 @@ from .layout import (
     PRESSURE_RANGE_PSI,
     SETTINGS,
     TABLE_FILE,
+    is_command,
 )
 from .table import read_table
 
-_CHAMBERS = ("body", "head", "tail")
+_CHAMBERS = tuple(c.removeprefix("command_") for c in EXPERIMENTS["locomotion"].columns if is_command(c))
 _CLOCK_S = 0.1  # by which a time may be outside its trial: of the order of a command's age
 _COMMON_OPTIONAL = ("session_order", "extra")
 

@@ -21,15 +21,16 @@ from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
 from bifa.data.layout import TABLE_FILE
 from bifa.data.write import add_trial
 from bifa.errors import BifaError
+from bifa.link.table import CHAMBERS
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, align, align_after_restart, resampled
+from bifa.measure.experiments import CHAMBER_OF
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.locomotion import noted
 from bifa.measure.plan import PlannedTrial
 
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
-_CHAMBERS = ("body", "head", "tail")
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
 _LOST = "no value (a lost marker?); fill the gap by the instrument's own means, or record again"
 
@@ -122,7 +123,7 @@ def _whole(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
 
 
 def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
-    whole = ("time_s", "sequence", *(f"pressure_{chamber}_psi" for chamber in _CHAMBERS))
+    whole = ("time_s", "sequence", *(f"pressure_{chamber}_psi" for chamber in CHAMBERS))
     columns = read_columns(path, (*whole, *(f"command_{chamber}" for chamber in _commanded(planned))))
     _refuse_gaps(path, columns, whole, "no value (a cut line?); remove that line, or record again")
     return columns
@@ -131,8 +132,8 @@ def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
 def _commanded(planned: PlannedTrial) -> tuple[str, ...]:
     """The chambers whose commands are columns of the trial."""
     if planned.experiment == "locomotion":
-        return _CHAMBERS
-    return (("body" if planned.actuator == "large" else "head"),) if planned.experiment == "step_response" else ()
+        return CHAMBERS
+    return (CHAMBER_OF[planned.actuator],) if planned.experiment == "step_response" else ()
 
 
 def _refuse_gaps(path: Path, columns: dict[str, np.ndarray], names: tuple[str, ...], problem: str) -> None:
@@ -252,7 +253,7 @@ def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instru
         raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
     first, last = instrument_s[moved][0] - _MARGIN_S, instrument_s[moved][-1] + _MARGIN_S
     keep = overlap & (instrument_s >= first) & (instrument_s <= last)
-    chamber = "body" if planned.actuator == "large" else "head"
+    chamber = CHAMBER_OF.get(planned.actuator, "head")  # a pull has no actuator: it is of the head
     time_s = instrument_s[keep]
     return {
         "time_s": time_s - time_s[0],

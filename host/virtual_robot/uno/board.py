@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from virtual_robot.errors import EventsGoneError, FirmwareError, NotBuiltError, VirtualRobotError
+from virtual_robot.places import check_place
 from virtual_robot.uno import elf
 
 try:
@@ -38,10 +39,7 @@ class Event:
 
 def _check_eeprom(file: Path) -> None:
     """Before the board is made: the file is written when it closes, over what is there."""
-    if not file.absolute().parent.is_dir():
-        raise VirtualRobotError(f"the folder of the EEPROM file {file} does not exist; create it first")
-    if not os.access(file.absolute().parent, os.W_OK):
-        raise VirtualRobotError(f"the EEPROM file {file} cannot be written (no permission); choose another place")
+    check_place(file, "the EEPROM file")
     if file.exists() and not (file.is_file() and file.stat().st_size == EEPROM_SIZE):
         raise VirtualRobotError(
             f"{file} is no EEPROM file, which has {EEPROM_SIZE} bytes, and would be overwritten; choose another name"
