@@ -6,25 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from harness.pty_uno import PtyUno
-
 pytestmark = pytest.mark.real_time
 
 FULL = Path("/dev/full")
-GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
-
-
-@pytest.fixture
-def uno():
-    uno = PtyUno()
-    yield uno
-    uno.unplug()
-
-
-@pytest.fixture
-def gait(tmp_path) -> str:
-    (tmp_path / "gait.toml").write_text(GAIT)
-    return str(tmp_path / "gait.toml")
 
 
 def bifa(*arguments: str) -> list[str]:

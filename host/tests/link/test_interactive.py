@@ -11,7 +11,6 @@ import pytest
 from bifa.link import Counters, Sample
 from bifa.live.completion import Known, words_after
 from bifa.live.interactive import status_lines
-from harness.pty_uno import PtyUno
 from harness.terminal import Terminal
 
 pytestmark = pytest.mark.real_time
@@ -20,13 +19,6 @@ UP, CTRL_C, CTRL_D, ENTER, TAB = "\x1b[A", "\x03", "\x04", "\r", "\t"
 CTRL_R, CTRL_Z, CTRL_BACKSLASH = "\x12", "\x1a", "\x1c"
 PERIOD = "s (0.5 to 60 s, default 5.7 s)"
 KNOWN = Known({"period_s": 2.720001}, {"baseline": False, "fast": True})
-
-
-@pytest.fixture
-def uno():
-    uno = PtyUno()
-    yield uno
-    uno.unplug()
 
 
 @pytest.fixture

@@ -133,11 +133,14 @@ def test_signals_mean_afterwards_what_they_meant_before(board):
     assert leaving._death_signal() in (0, None)
 
 
-def test_ctrl_c_that_python_drops_comes_again(board):
-    class Dying:
-        def __del__(self) -> None:
-            signal.raise_signal(signal.SIGINT)
+class Dying:
+    """Ctrl-C while Python clears up, where it is dropped."""
 
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_that_python_drops_comes_again(board):
     def interrupted() -> None:
         with Uno(board, board) as uno:
             walk(uno, board)
@@ -151,10 +154,6 @@ def test_ctrl_c_that_python_drops_comes_again(board):
 
 def test_ctrl_c_that_waits_to_come_again_does_not_come_after_another(board, monkeypatch):
     monkeypatch.setattr(leaving, "AGAIN_AFTER_S", 0.3)
-
-    class Dying:
-        def __del__(self) -> None:
-            signal.raise_signal(signal.SIGINT)
 
     def interrupted() -> None:
         with Uno(board, board) as uno:

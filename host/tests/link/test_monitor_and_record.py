@@ -23,20 +23,9 @@ from harness.terminal import Terminal
 
 pytestmark = pytest.mark.real_time
 
-GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
 
-
-@pytest.fixture
-def uno():
-    uno = PtyUno()
-    yield uno
-    uno.unplug()
-
-
-def test_the_monitor_shows_the_robot_and_ctrl_c_turns_the_valves_off(uno, tmp_path):
-    path = tmp_path / "gait.toml"
-    path.write_text(GAIT)
-    with Terminal(tmp_path, "monitor", "--port", uno.device, "--gait", str(path), "--run") as terminal:
+def test_the_monitor_shows_the_robot_and_ctrl_c_turns_the_valves_off(uno, gait, tmp_path):
+    with Terminal(tmp_path, "monitor", "--port", uno.device, "--gait", gait, "--run") as terminal:
         terminal.sees("running", "positive", "vacuum", "●", "samples", "lost 0  bad frames 0")
         terminal.presses("\x03")
         assert terminal.exit_status() == 0
@@ -116,10 +105,9 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
     unos[1].unplug()
 
 
-def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, tmp_path):
-    path, out = tmp_path / "gait.toml", tmp_path / "out"
-    path.write_text(GAIT)
-    arguments = ["record", "--out", str(out), "--port", uno.device, "--gait", str(path)]
+def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, gait, tmp_path):
+    out = tmp_path / "out"
+    arguments = ["record", "--out", str(out), "--port", uno.device, "--gait", gait]
     with Terminal(tmp_path, *arguments) as terminal:
         terminal.sees("recording  samples")
         terminal.until(lambda: uno.board.valves != 0 and len(rows(out / "telemetry_1.csv")) > 2 * MARK_PAUSE)
