@@ -70,6 +70,8 @@ class FunctionSystem(System):
     Raises DeclarationError if names conflict.
     """
 
+    nuisances_anew = True
+
     def __init__(
         self,
         simulate: Simulate,

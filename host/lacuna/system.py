@@ -255,6 +255,9 @@ class System(Protocol):
 
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
     forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own
+    nuisances_anew: bool = (
+        False  # whether each run draws its own, so that repeats share nothing of them (`nuisances.py`)
+    )
 
     def predict_trials(
         self,

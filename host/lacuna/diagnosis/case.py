@@ -16,6 +16,7 @@ from lacuna.diagnosis.candidate import (
     sketches,
 )
 from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, met_by_chance
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
@@ -161,6 +162,26 @@ class Case:
             if candidate.cost - other.cost > least and self._exceeds(*both):
                 return profile.effect
         return None
+
+    @_once
+    def followed(self, candidate: Candidate) -> tuple[Followed, ...]:
+        """Nuisances that still follow the condition with an explanation: what none of the runs' own could be."""
+        if not self.system.nuisances_anew:
+            return ()
+        return find_followed(self._on_all(candidate), policy=self.policy, seed=self.seed)
+
+    def met_by_chance(self, before: Candidate, after: Candidate) -> float:
+        """The probability that what nuisances followed `before` is met by the effects that `after` has more, if it is
+        any number that each condition happens to have."""
+        library = self.system.effects
+        extra = sum(len(library[name].parameters) for name in after.effects if name not in before.effects)
+        runs = (by_condition(self._on_all(one)) for one in (before, after))
+        return met_by_chance(*runs, self.followed(before), extra)
+
+    def _on_all(self, candidate: Candidate) -> list[Fit]:
+        """An explanation on all trials that may inform a choice."""
+        known, unseen = self.converged(candidate), self.split.unseen
+        return [known, evaluate_on(known, unseen)] if unseen else [known]
 
     def outdone(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by

@@ -7,13 +7,14 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from lacuna.check import check
-from lacuna.check.numbers import listed
 from lacuna.diagnosis.candidate import finished_afresh
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
+from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.eliminate import eliminate
+from lacuna.diagnosis.explain_nuisances import explain_nuisances
 from lacuna.diagnosis.learn import holds, learn_correction
 from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
@@ -30,8 +31,6 @@ from lacuna.errors import TooLittleDataError
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
-
-_HARMFUL = 0.01  # of the gap: a share below zero by less is rounding
 
 
 @dataclass(frozen=True)
@@ -114,6 +113,12 @@ def diagnose(
     say = (lambda _: None) if stopped else crew.say  # what was said of stopping stays to be read
     say("deciding what is supported")
     found, choice = eliminate(case, found, choose(found, split, policy, case.suffices, case.outdone))
+    if not stopped:
+        try:
+            found, choice = explain_nuisances(case, found, choice, crew)
+        except KeyboardInterrupt:
+            crew.say("stopped: what nuisances follow is not asked (Ctrl-C again gives up)")
+            stopped, say = True, lambda _: None
     judged = _judged(case, found, choice)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
@@ -123,7 +128,9 @@ def diagnose(
             crew.say("stopped: no curve is learnt (Ctrl-C again gives up)")
             stopped, say = True, lambda _: None
     say("estimating how well the parameters are known")
-    said = (*([STOPPED] if stopped else []), *cautions, *warnings_of(final, split))
+    shown = choice.explanation if judged.verdict == "identified" else found.base
+    unforeseen = followed_by_nothing(case.followed(shown))
+    said = (*([STOPPED] if stopped else []), *cautions, *unforeseen, *warnings_of(final, split))
     return _reported(case, found, choice, judged, final, said, time.monotonic() - began)
 
 
@@ -158,36 +165,21 @@ def _besides(case: Case, choice: Choice, found: Search) -> str:
     if _supported(case, choice) and case.outdone(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
         return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
+    still = {one.nuisance for one in case.followed(choice.explanation)}
+    taken_up = [one for one in case.followed(found.base) if one.nuisance not in still]
+    if _supported(case, choice) and taken_up:
+        return f"{follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
     return ""
 
 
-def _at_odds(
-    case: Case, choice: Choice, effects: tuple[Named, ...], before: Error, explained: Error, floor: Floor
-) -> list[str]:
-    """What speaks against a verdict that names `effects`, or none: an explanation that is more probable, or supported,
-    and still not named; or, since the final trials inform no choice, effects with which these are predicted worse."""
-    named, said = " and ".join(choice.candidate.effects), []
+def _doubts(case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, ...], errors: tuple[Error, Error]):
+    """What speaks against a verdict that names `effects`, or none; `errors` before and with them."""
+    if judged.verdict == "none":
+        return []
     if not effects:
-        if _supported(case, choice):
-            said = [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
-        return said
-    worse = [e.name for e in effects if e.share_of_gap < -_HARMFUL]
-    if explained.held_out > before.held_out:
-        said = [f"With {named} the records that were not fitted are predicted worse than without: doubt the verdict."]
-    elif before.held_out > floor.held_out and worse:
-        said = [f"With {listed(worse)} the records that were not fitted are predicted worse than without: doubt it."]
-    likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
-    if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
-        besides = [effect for effect in likeliest if effect not in choice.candidate.effects]
-        said.append(
-            f"With {listed(besides)}, too, the explanation would be more probable ({weight:.2f}), but that closes too"
-            " little of what is left to be named, or helps too little where nothing was fitted."
-        )
-    if len(case.split.held_out) == 1:
-        said.append(
-            f"One record alone was not fitted, {case.split.held_out[0].name}: the shares of the gap rest on it."
-        )
-    return said
+        return but_too_little(choice) if _supported(case, choice) else []
+    gap = (*errors, judged.floor) if judged.remainder.matters else None
+    return doubts(choice, case.split, effects, gap)
 
 
 def _supported(case: Case, choice: Choice) -> bool:
@@ -218,7 +210,7 @@ def _reported(
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
-            *(_at_odds(case, choice, effects, before, explained, judged.floor) if judged.verdict != "none" else ()),
+            *_doubts(case, choice, judged, effects, (before, explained)),
             *said,
             *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
         ),

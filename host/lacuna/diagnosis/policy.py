@@ -39,6 +39,13 @@ class Policy:
     )
 
     # Which mechanisms are supported?
+    condition_chance: float = _rule(
+        0.02,
+        "probability",
+        "an effect that nuisances follow from condition to condition meets what they have there better than some effect"
+        " of the library would meet any numbers",
+        "convention",
+    )
     gain: float = _rule(
         8.0,
         "log-likelihood over dispersion",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from lacuna.diagnosis.diagnose import Diagnosis, Left
+from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.residual_error import Error, Floor
 from lacuna.system import Correction, CorrectionSite
 
@@ -35,7 +35,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             name: {"value": _number(e.value), "interval_90": [_number(v) for v in e.interval]}
             for name, e in d.base_parameters.items()
         },
-        "remainder": _left(d.left),
+        "remainder": _left(d),
         "nearest": [{"effects": list(r.effects), "share_of_gap": _share(r.share_of_gap, d)} for r in d.nearest],
         "warnings": list(d.warnings),
         "held_out": {
@@ -81,11 +81,12 @@ def _curve(site: CorrectionSite, learnt: Correction) -> dict[str, Any]:
     }
 
 
-def _left(left: Left) -> dict[str, Any]:
+def _left(d: Diagnosis) -> dict[str, Any]:
     """What the named effects leave: `times_floor` is the RMS of what repeats share of it where that is largest."""
+    left = d.left
     return {
         "matters": left.matters,
-        "share_of_gap": _number(left.share_of_gap),
+        "share_of_gap": _share(left.share_of_gap, d) if d.effects else 1.0,
         "times_floor": _number(math.sqrt(max(left.remainder.largest, 0.0))),
         "experiments": list(dict.fromkeys(experiment for experiment, _ in left.remainder.found)),
         "depends_on": list(left.signature.depends_on),
@@ -104,8 +105,9 @@ def _sides(error: Error | Floor) -> dict[str, Any]:
 
 
 def _share(share: float, d: Diagnosis) -> float | None:
-    """None where the base model leaves no gap on the held-out trials: a share of it would say nothing."""
-    return _number(share) if d.before.held_out > d.floor.held_out else None
+    """None where the base model leaves no gap on the held-out trials, or none that matters (what is missing was taken
+    up by nuisances): a share of it would say nothing."""
+    return _number(share) if d.remainder_before.matters and d.before.held_out > d.floor.held_out else None
 
 
 def _number(value: float) -> float | None:

@@ -18,7 +18,7 @@ def own_form(effect: Mapping[str, Any]) -> str:
 
 
 def share_in_words(share: float | None) -> str:
-    """A share of the gap; None where no trial was left to measure it on."""
+    """A share of the gap; None where there is none, or no trial was left to measure it on."""
     return "an unknown share of the gap" if share is None else f"{100 * share:.0f} % of the gap"
 
 
@@ -40,7 +40,8 @@ def verdict_sentence(
         return "The base model lacks something that no effect of the library explains."
     names = " and ".join(words(effect) for effect in effects)
     left = remainder["share_of_gap"]
-    closed = share_in_words(None if left is None else 1 - left)
     rest = "; what is left still matters" if remainder["matters"] else "; nothing that matters is left"
+    if left is None:
+        return f"What the base model lacks is {names}{rest}."
     close = "which closes" if len(effects) == 1 else "which together close"
-    return f"What the base model lacks is {names}, {close} {closed}{rest}."
+    return f"What the base model lacks is {names}, {close} {share_in_words(1 - left)}{rest}."

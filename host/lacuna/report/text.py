@@ -20,8 +20,7 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
     lines += _effects(record)
     lines += _errors(record["error"])
     lines += _wrapped(floor_sentence(diagnosis))
-    where = record["remainder"]["text"] if record["verdict"] == "identified" else record["signature"]["text"]
-    lines += ["", *_wrapped(("What is left: " if record["verdict"] == "identified" else "") + where)]
+    lines += ["", *_where(record)]
     lines += _unnamed(record["verdict"], diagnosis.final.structure.effects)
     lines += _learnt(record["learnt"])
     lines += _nearest(record)
@@ -38,14 +37,26 @@ def _sentence(record: Mapping[str, Any]) -> str:
     return verdict_sentence(record["verdict"], record["effects"], record["remainder"])
 
 
+def _where(record: Mapping[str, Any]) -> Iterator[str]:
+    """Where what is missing shows: of an explanation what it leaves, and first where that was if no error showed it."""
+    lacking = record["signature"]["text"]
+    if record["verdict"] != "identified":
+        yield from _wrapped(lacking)
+        return
+    if record["remainder"]["share_of_gap"] is None:
+        yield from _wrapped(f"What was missing: {lacking}")
+    yield from _wrapped(f"What is left: {record['remainder']['text']}")
+
+
 def _wrapped(text: str, mark: str = "") -> list[str]:
     return textwrap.wrap(text, _WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark))
 
 
 def _effects(record: Mapping[str, Any]) -> Iterator[str]:
     for effect in record["effects"]:
-        closed = share_in_words(effect["share_of_gap"])
-        yield f"{effect['name']}: closes {closed}, probability {effect['probability']:.2f}"
+        share = effect["share_of_gap"]
+        closes = "" if share is None else f"closes {share_in_words(share)}, "
+        yield f"{effect['name']}: {closes}probability {effect['probability']:.2f}"
         if form := own_form(effect):
             yield from _wrapped(form, "    ")
         for name, value in effect["parameters"].items():
@@ -86,8 +97,11 @@ def _learnt(curves: Sequence[Mapping[str, Any]]) -> list[str]:
 def _nearest(record: Mapping[str, Any]) -> list[str]:
     if record["verdict"] == "none" or not record["nearest"]:
         return []
-    near = [f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in record["nearest"][:_TRIED]]
-    return _wrapped(f"Also tried, with what each would close: {', '.join(near)}.")
+    near = record["nearest"][:_TRIED]
+    if near[0]["share_of_gap"] is None:
+        return _wrapped(f"Also tried: {', '.join(' + '.join(r['effects']) for r in near)}.")
+    each = (f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in near)
+    return _wrapped(f"Also tried, with what each would close: {', '.join(each)}.")
 
 
 def _unseen(effects: Sequence[str]) -> list[str]:

@@ -3,11 +3,11 @@
 import subprocess
 import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 from toy import hide
 
-from lacuna.diagnosis.diagnose import _at_odds, diagnose
+from lacuna.diagnosis.diagnose import diagnose
+from lacuna.diagnosis.doubts import doubts
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.record import as_record
 from lacuna.diagnosis.remainder import Remainder
@@ -59,13 +59,14 @@ def test_where_something_matters_it_is_told_where():
 
 def test_an_effect_that_does_harm_and_a_likelier_set_speak_against_a_verdict():
     found = diagnose(hide({"delay.delay_s": 0.02}, seed=30))
-    case, before, floor = SimpleNamespace(split=found.split), found.before, found.floor
-    assert _at_odds(case, found.choice, found.effects, before, found.after, floor) == []
+    gap = (found.before, found.after, found.floor)
+    assert doubts(found.choice, found.split, found.effects, gap) == []
     harmful = (replace(found.effects[0], share_of_gap=-0.3),)
     likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
-    harm, odds = _at_odds(case, likelier, harmful, before, found.after, floor)
+    harm, odds = doubts(likelier, found.split, harmful, gap)
     assert "With delay the records that were not fitted are predicted worse" in harm
     assert "With stiction, too," in odds
+    assert doubts(likelier, found.split, harmful, None) == [odds]
 
 
 def test_unusable_input_ends_with_status_2(tmp_path):

@@ -1,0 +1,34 @@
+"""The effect that nuisances follow, where an explanation leaves nothing in the residual because they take it up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lacuna.diagnosis.candidate import finish, judge, profiles, sketches
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.decide import Choice, weigh
+from lacuna.diagnosis.search import Search
+
+_FINISHED = 3  # of the most promising, to the end
+
+
+def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> tuple[Search, Choice]:
+    """`choice` with the effect more that nuisances follow the condition by, if there is one; and the search with what
+    was tried for it. What a condition sets (where its runs begin) may have any value in each, and some effect meets
+    such values roughly; so it has to do so better than by chance."""
+    followed = case.followed(choice.explanation)
+    if not followed or choice.freed or not case.suffices(choice.candidate):
+        return found, choice
+    parent, policy = choice.candidate, case.policy
+    fresh = [name for name in case.system.effects if name not in parent.effects]
+    crew.say(f"asking what {followed[0].nuisance} follows")
+    near = sketches(profiles(parent.fitted, fresh, case.split, found.floor, crew), crew)
+    least = policy.least_gain(1, parent.pieces)
+    grown = sorted((judge(fitted, case.split, near=parent.checked) for fitted, _ in near), key=lambda c: c.cost)
+    promising = [c for c in grown if parent.cost - c.cost > least][:_FINISHED]
+    finished = [judge(finish(c.fitted), case.split, near=c.checked) for c in promising]
+    tried = {frozenset(c.effects): c for c in (*grown, *found.tried, *finished)}
+    found = replace(found, tried=tuple(tried.values()))
+    able = [c for c in finished if len(fresh) * case.met_by_chance(parent, c) < policy.condition_chance]
+    return (found, weigh(found, min(able, key=lambda c: c.cost), policy)) if able else (found, choice)

@@ -1,0 +1,103 @@
+"""Do nuisances follow the condition? What differs from run to run is drawn anew in each, so repeats share none of it.
+
+A mechanism that shifts all runs of a condition alike, as another initial state or gain would, leaves no residual: the
+nuisance of each run takes it up. The model lacks it all the same, since no run of another condition can be foreseen.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from lacuna.diagnosis.policy import Policy
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.uncertainty import pieces_of
+
+_DEALT = 2000
+
+Runs = Mapping[str, Sequence[np.ndarray]]  # of a nuisance, by condition its values, one a run
+
+
+class Followed(NamedTuple):
+    """A nuisance that follows the condition: `share` of its mean square is what repeats have in common."""
+
+    nuisance: str
+    share: float
+
+
+def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tuple[Followed, ...]:
+    """The nuisances of which repeats share more than chance makes of it, and so much that runs foreseen without them
+    would be predicted worse than is relevant; those first that follow it most. `fits`: one explanation, each on trials
+    of its own; the first one has derivatives.
+
+    The mean product of two repeats' nuisances, in standard deviations from the mean of all runs, is the mean square of
+    what they share. Under chance any run may be of any condition: runs are dealt out at random.
+    """
+    felt = _felt(fits[0])
+    tested = {name: runs for name, runs in by_condition(fits).items() if name in felt and _pairs(runs)}
+    draw, found = np.random.default_rng(seed), []
+    for name, runs in tested.items():
+        values = np.concatenate(runs)
+        values = values - values.mean()
+        shared, whole = _shared(runs, values), float(np.mean(values**2))
+        by_chance = np.array([_shared(runs, draw.permutation(values)) for _ in range(_DEALT)])
+        chance = (1 + np.count_nonzero(by_chance >= shared)) / (1 + _DEALT)
+        adds = felt[name] * shared / (1.0 + felt[name] * max(whole - shared, 0.0))
+        if len(tested) * chance < policy.chance and adds > policy.relevance:
+            found.append(Followed(name, min(shared / whole, 1.0)))
+    return tuple(sorted(found, key=lambda one: -one.share))
+
+
+def met_by_chance(before: Runs, after: Runs, followed: Sequence[Followed], parameters: int) -> float:
+    """The probability that so many `parameters` more take so much away of what each condition has on average of the
+    nuisances `followed`, if these are any numbers that conditions happen to have: an F-test with a sample a condition.
+    `before` and `after`: runs with either explanation."""
+    was, left = (_between(runs, followed) for runs in (before, after))
+    spare = min(len(before[one.nuisance]) for one in followed) - 1 - parameters
+    if spare < 1 or left >= was:
+        return 1.0
+    ratio = (was - left) / parameters / max(left / spare, 1e-300)
+    return float(f_distribution.sf(ratio, parameters, spare))
+
+
+def _between(runs: Runs, followed: Sequence[Followed]) -> float:
+    """Sum of squares between the conditions, over all of these nuisances."""
+    each = (runs[one.nuisance] for one in followed)
+    return sum(len(v) * float(np.mean(v) - np.concatenate(of_one).mean()) ** 2 for of_one in each for v in of_one)
+
+
+def by_condition(fits: Sequence[Fit]) -> Runs:
+    """Of each nuisance, by condition its values in standard deviations from what is expected, an entry a run."""
+    found: dict[str, dict[object, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for fit in fits:
+        every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
+        for trial, values, parameters in every:
+            for value, p in zip(values, parameters, strict=True):
+                found[p.name][trial.experiment, trial.condition].append((value - p.value) / p.step_scale)
+    return {name: [np.array(runs) for runs in conditions.values()] for name, conditions in found.items()}
+
+
+def _felt(fit: Fit) -> dict[str, float]:
+    """Of each nuisance, what a standard deviation of it does to a run's residual: mean square, in floors."""
+    squares: dict[str, list[float]] = defaultdict(list)
+    every = zip(fit.problem.trials, fit.solution.sensitivities, fit.problem.nuisances, strict=False)
+    for trial, sensitivity, parameters in every:
+        own = np.diag(sensitivity.gram)[sensitivity.structure :]
+        for square, p in zip(own, parameters, strict=True):
+            squares[p.name].append(square * p.step_scale**2 / pieces_of(trial, fit.problem.floor))
+    return {name: float(np.mean(each)) for name, each in squares.items()}
+
+
+def _pairs(runs: Sequence[np.ndarray]) -> int:
+    return sum(len(values) * (len(values) - 1) // 2 for values in runs)
+
+
+def _shared(runs: Sequence[np.ndarray], values: np.ndarray) -> float:
+    """Mean product of different runs of a condition; `values` of all runs, one condition after another."""
+    ends = np.cumsum([0, *(len(each) for each in runs)])
+    sums, squares = (np.add.reduceat(q, ends[:-1]) for q in (values, values**2))
+    return float((sums**2 - squares).sum() / 2.0 / _pairs(runs))

@@ -1,0 +1,91 @@
+"""Nuisances are drawn anew in each run: where repeats share them, the model lacks what they follow, or says so."""
+
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.diagnosis.nuisances import Followed, met_by_chance
+
+TIME_S = np.linspace(0.0, 1.0, 60)
+TEMPERATURES_K = (-10.0, -4.0, 0.0, 3.0, 7.0, 12.0)
+SPREAD_MM, NOISE_MM = 0.3, 0.05
+
+
+def simulate(record, theta):
+    x = theta.gain * np.sin(2.0 * np.pi * record.time_s)
+    drift = theta.expansion.mm_per_K * record["warmer_K"]
+    return {"x_mm": x + theta.zero_mm + drift + theta.cubic.per_mm2 * x**3}
+
+
+def system():
+    return lacuna.System(
+        simulate,
+        [Parameter("gain", "mm", 1.0, 0.1, 10.0)],
+        [
+            Effect("expansion", Parameter("mm_per_K", "mm/K", 0.05, -2.0, 2.0)),
+            Effect("cubic", Parameter("per_mm2", "1/mm^2", 0.02, -0.5, 0.5)),
+        ],
+        nuisances=[Parameter("zero_mm", "mm", 0.0, -5.0, 5.0, scale=SPREAD_MM)],
+    )
+
+
+def records(seed, of_condition):
+    """Four runs at each temperature, with its own value of `of_condition` besides each run's own zero."""
+    draw = np.random.default_rng(seed)
+    return {
+        f"{warmer_K:g} K, {run}": {
+            "time_s": TIME_S,
+            "warmer_K": warmer_K,
+            "x_mm": 2.0 * np.sin(2.0 * np.pi * TIME_S)
+            + shift
+            + SPREAD_MM * draw.standard_normal()
+            + NOISE_MM * draw.standard_normal(len(TIME_S)),
+            "condition": f"{warmer_K:g} K",
+        }
+        for warmer_K, shift in zip(TEMPERATURES_K, of_condition, strict=True)
+        for run in range(4)
+    }
+
+
+def followed(verdict):
+    return [said for said in verdict.warnings if "zero_mm" in said and "between conditions" in said]
+
+
+def test_what_nuisances_follow_is_named():
+    found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), progress=False)
+    assert [effect.name for effect in found.effects] == ["expansion"]
+    lower, upper = found.effects[0].interval["mm_per_K"]
+    assert 0.5 * lower < 0.08 < 2.0 * upper
+    assert "zero_mm" in found.record["signature"]["text"]
+    assert not followed(found)
+    assert np.std([values["zero_mm"] for values in found.nuisances.values()]) < 1.5 * SPREAD_MM
+
+
+def test_nuisances_of_their_own_follow_nothing():
+    for seed in range(3):
+        found = lacuna.diagnose(system(), records(seed, np.zeros(6)), progress=False)
+        assert found.verdict == "none"
+        assert not followed(found)
+
+
+def test_what_a_condition_sets_is_told_and_no_effect_named():
+    """Neither grows with the temperature: where the runs of each condition begin."""
+    found = lacuna.diagnose(system(), records(4, (0.7, -0.5, 0.6, -0.7, 0.5, -0.6)), progress=False)
+    assert not found.effects
+    assert len(followed(found)) == 1
+
+
+@pytest.mark.parametrize("parameters", [1, 2])
+def test_probability_of_meeting_conditions_by_chance(parameters):
+    """That of an effect that has nothing to do with what conditions happen to have is uniform: a regression on random
+    regressors, in place of an effect's."""
+    draw, found = np.random.default_rng(5), []
+    for _ in range(400):
+        mean = draw.standard_normal(8)
+        regressors = np.column_stack([np.ones(8), draw.standard_normal((8, parameters))])
+        left = mean - regressors @ np.linalg.lstsq(regressors, mean, rcond=None)[0]
+        was, now = ([np.full(3, value) for value in values] for values in (mean, left))
+        found.append(met_by_chance({"q": was}, {"q": now}, [Followed("q", 1.0)], parameters))
+    assert np.mean(found) == pytest.approx(0.5, abs=0.06)
+    assert np.mean(np.array(found) < 0.1) == pytest.approx(0.1, abs=0.05)
