@@ -10,8 +10,9 @@ from scipy.signal import find_peaks
 
 from lacuna.system import Channels, Record
 
-_RESOLUTION_HZ = 0.005
-_LOCAL_HZ = 0.5  # the background that a peak must stand out from is taken over this width
+_CELLS_A_LINE = 3  # grid cells, at least, within the width of a line in the longest record
+_MOST_CELLS = 200_000
+_LOCAL = 100  # cells: the background that a peak must stand out from is taken over so many
 _LONGEST = 20.0  # a trial's power at a frequency counts at most so many times its background
 
 
@@ -20,14 +21,15 @@ def peaks(
 ) -> list[float]:
     """The `count` most prominent frequencies [Hz] of the residuals `scaled`, pooled over trials and channels, each
     weighed by its own background."""
-    frequencies = np.arange(lower_hz, upper_hz, _RESOLUTION_HZ)
+    resolution_hz = _resolution_hz(max(trial.time_s[-1] - trial.time_s[0] for trial in trials), upper_hz - lower_hz)
+    frequencies = np.arange(lower_hz, upper_hz, resolution_hz)
     pooled, weight = np.zeros(len(frequencies)), np.zeros(len(frequencies))
     for trial, channels in zip(trials, scaled, strict=True):
         sample_s = float(np.median(np.diff(trial.time_s)))
         resolved = (frequencies > 1.5 / (trial.time_s[-1] - trial.time_s[0])) & (frequencies < 0.4 / sample_s)
         for residual in channels.values():
-            power = _power(np.nan_to_num(residual), sample_s, frequencies)
-            background = median_filter(power, size=max(3, round(_LOCAL_HZ / _RESOLUTION_HZ)), mode="nearest")
+            power = _power(np.nan_to_num(residual), sample_s, frequencies, resolution_hz)
+            background = median_filter(power, size=_LOCAL, mode="nearest")
             pooled += resolved * np.minimum(power / np.maximum(background, 1e-30), _LONGEST)
             weight += resolved
     mean = pooled / np.maximum(weight, 1.0)
@@ -35,8 +37,16 @@ def peaks(
     return [float(frequencies[k]) for k in sorted(found, key=lambda k: -mean[k])[:count]]
 
 
-def _power(residual: np.ndarray, sample_s: float, frequencies: np.ndarray) -> np.ndarray:
+def _resolution_hz(longest_s: float, range_hz: float) -> float:
+    """The largest of 1, 2, 5, 10 ... mHz (and so on) that divides a line's width in the longest record."""
+    finest = 1.0 / (_CELLS_A_LINE * longest_s)
+    decade = 10.0 ** np.floor(np.log10(finest))
+    largest = max(digit for digit in (1.0, 2.0, 5.0) if digit * decade <= finest)
+    return max(largest * decade, range_hz / _MOST_CELLS)
+
+
+def _power(residual: np.ndarray, sample_s: float, frequencies: np.ndarray, resolution_hz: float) -> np.ndarray:
     """Power of a tapered trace at `frequencies`."""
     tapered = (residual - residual.mean()) * np.hanning(len(residual))
-    size = 1 << int(np.ceil(np.log2(max(len(residual), 1.0 / (_RESOLUTION_HZ * sample_s)))))
+    size = 1 << int(np.ceil(np.log2(max(len(residual), 1.0 / (resolution_hz * sample_s)))))
     return np.interp(frequencies, np.fft.rfftfreq(size, sample_s), np.abs(np.fft.rfft(tapered, size)) ** 2)
