@@ -11,6 +11,7 @@ from .layout import Layout, is_command
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NUMERIC_BYTES = b"0123456789+-.eE, \t\n"
 _BLANKS = " \t"
+_SEPARATORS = {";": "semicolons", "\t": "tabs"}  # that other programs write
 LARGEST = 1e12  # in any unit: no measurement, and small enough to be squared and averaged
 SHORTEST_STEP_S = 1e-6
 
@@ -61,6 +62,9 @@ def _header(lines: list[str], file: str, layout: Layout) -> list[str]:
     if names[0].startswith("#"):
         problem = 'the header begins with #, as numpy.savetxt writes it; have it written with comments=""'
         raise DatasetError(problem, file=file, line=1, column=names[0])
+    if len(names) == 1 and (other := next((c for c in _SEPARATORS if c in lines[0]), None)):
+        problem = f"columns are separated by {_SEPARATORS[other]}, not by commas"
+        raise DatasetError(problem, file=file, line=1)
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -103,8 +107,10 @@ def _parse_slowly(lines: list[str], names: list[str], file: str) -> np.ndarray:
             raise DatasetError("a blank line among the data", file=file, line=number)
         fields = text.split(",")
         if len(fields) != len(names):
+            commas = len(fields) > len(names) and "." not in text
             raise DatasetError(
-                f"{len(fields)} fields where the header has {len(names)}",
+                f"{len(fields)} fields where the header has {len(names)}"
+                + ("; write decimals with a point, not a comma" if commas else ""),
                 file=file,
                 line=number,
                 column=names[len(fields)] if len(fields) < len(names) else f"{len(names) + 1}",

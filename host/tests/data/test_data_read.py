@@ -137,7 +137,9 @@ MALFORMED_CSV = {
     "header as a remark": (write_walk(b"# " + HEADER + b"0,0,0,0,0,0,0,0\n"), 1, "# time_s", 'comments=""'),
     "Latin 1": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\xb5,0,0,0\n"), 3, None, "0xb5 is not UTF-8"),
     "NUL": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\0,0,0,0\n"), 3, "displacement_head_mm", "not a"),
-    "semicolons": (write_walk(HEADER.replace(b",", b";")), 1, None, "unknown column"),
+    "semicolons": (write_walk(HEADER.replace(b",", b";")), 1, None, "separated by semicolons, not by commas"),
+    "tabs": (write_walk(HEADER.replace(b",", b"\t")), 1, None, "separated by tabs, not by commas"),
+    "decimal commas": (write_walk(HEADER + b"0,00,0,0,0,0,1,5,0\n0,01,0,0,0,0,1,5,0\n"), 2, "9", "with a point"),
 }
 
 
