@@ -29,6 +29,7 @@ def gaits(
     """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or recompute them."""
     from rich.table import Table
 
+    from bifa.errors import BifaError
     from bifa.files import check_targets
     from bifa.gait import library
     from bifa.screen import Console
@@ -41,6 +42,9 @@ def gaits(
         with stoppable(lambda: f"the gaits named above are in {folder}"):
             _make(console, model, folder, names, seed)
         return
+    idle = [name for name, given in (("--model", model), ("--out", out), ("--seed", seed)) if given]
+    if idle:
+        raise BifaError(f"{idle[0]} is for a new search: add --make, or leave it out to list the gaits that there are")
     title = "Gaits of the nominal robot: mm/s; head, tail ahead; vacuum of body, head, tail"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("gait", "speed", "9 in 10", "period, s", "ahead, °", "vacuum"):

@@ -75,6 +75,12 @@ def test_the_list_of_gaits_is_readable_at_80_columns():
     assert any("robust" in line and "197, 323" in line and "0.65, 0.43, 0.43" in line for line in lines)
 
 
+def test_options_of_a_search_are_refused_where_gaits_are_listed(tmp_path):
+    (tmp_path / "mine.toml").touch()
+    for options in (["--seed", "3"], ["--out", tmp_path], ["--model", tmp_path / "mine.toml"]):
+        assert f"{options[0]} is for a new search" in str(invoke("gaits", *options).exception)
+
+
 @pytest.mark.parametrize("make", [["--make"], []])
 def test_gaits_refuses_an_unknown_scenario(tmp_path, make):
     result = invoke("gaits", *make, "--only", "moon", "--out", tmp_path)
