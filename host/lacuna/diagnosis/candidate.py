@@ -21,7 +21,7 @@ from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
-from lacuna.system import Effect, Parameter
+from lacuna.system import Effect, Parameter, Record
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
@@ -55,6 +55,16 @@ class Candidate:
         """Weighted RMS residual of the known trials, in units of the noise; large ones compressed, as in the fit."""
         return float(np.sqrt(2.0 * (self.fitted.cost + self.checked.cost) / self.pieces))
 
+    @property
+    def checked_cost(self) -> float:
+        """Minus log-likelihood of the trials that it was not fitted to."""
+        return self.checked.cost
+
+    @property
+    def trials(self) -> tuple[Record, ...]:
+        """All that it is judged on."""
+        return (*self.fitted.problem.trials, *self.checked.problem.trials)
+
     @cached_property
     def checked_error(self) -> tuple[int, float]:
         """How many of the trials that it was not fitted to it cannot predict at all, and the RMS residual of the
@@ -66,24 +76,24 @@ class Candidate:
         """Minus log-likelihood of all known trials, plus what implausible parameters and extra ones cost."""
         system = self.fitted.structure.system
         extra = sum(len(system.effects[name].parameters) for name in self.effects)
-        trials = [*self.fitted.problem.trials, *self.checked.problem.trials]
-        own = sum(len(self.fitted.structure.own(trial)) for trial in trials)
+        own = sum(len(self.fitted.structure.own(trial)) for trial in self.trials)
         return (
             self.fitted.cost
             + self.checked.cost
             + implausibility(self.fitted)
             + 0.5 * extra * np.log(max(self.pieces, 2.0))
-            + 0.5 * own * np.log(max(self.pieces / len(trials), 2.0))
+            + 0.5 * own * np.log(max(self.pieces / len(self.trials), 2.0))
         )
 
     @cached_property
     def by_trial(self) -> dict[str, float]:
         """Of each trial that it is judged on, by name, minus the log-likelihood of its residuals."""
-        return {
-            trial.name: 0.5 * float(r @ r)
-            for fit in (self.fitted, self.checked)
-            for trial, r in zip(fit.problem.trials, fit.problem.residuals(fit.solution.point), strict=True)
-        }
+        return costs_by_trial([self.fitted, self.checked])
+
+    @property
+    def unseen_by_trial(self) -> dict[str, float]:
+        """The same of trials that it was not fitted to, at least."""
+        return self.by_trial
 
     @cached_property
     def errors(self) -> dict[str, float]:
@@ -95,6 +105,15 @@ class Candidate:
     def excess(self) -> float:
         """Of the cost, what noise at the floor would not leave."""
         return max(self.cost - 0.5 * self.pieces, 0.0)
+
+
+def costs_by_trial(fits: Sequence[Fit]) -> dict[str, float]:
+    """Of each trial of these fits, by name, minus the log-likelihood of its residuals."""
+    return {
+        trial.name: 0.5 * float(r @ r)
+        for fit in fits
+        for trial, r in zip(fit.problem.trials, fit.problem.residuals(fit.solution.point), strict=True)
+    }
 
 
 def implausibility(fitted: Fit) -> float:

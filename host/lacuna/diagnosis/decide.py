@@ -82,7 +82,7 @@ def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, polic
 def _beyond_doubt(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:
     """Better by more than noise and remaining misfit make of nothing, also on trials that it was not fitted to."""
     gain = (smaller.cost - larger.cost) / dispersion
-    unseen = (smaller.checked.cost - larger.checked.cost) / dispersion
+    unseen = (smaller.checked_cost - larger.checked_cost) / dispersion
     least = policy.least_gain(len(larger.effects) - len(smaller.effects), smaller.pieces)
     return gain > least and unseen > policy.unseen_gain * least and larger.checked_error < smaller.checked_error
 
@@ -133,7 +133,7 @@ def _predicts_better(chosen: Candidate, smaller: Candidate, unseen, dispersion: 
 
 
 def _cost_on(candidate: Candidate, trials) -> float:
-    return sum(candidate.by_trial[trial.name] for trial in trials)
+    return sum(candidate.unseen_by_trial[trial.name] for trial in trials)
 
 
 def _square_on(candidate: Candidate, trials) -> float:
@@ -151,7 +151,7 @@ def _weights(search: Search, chosen: Candidate, dispersion: float) -> dict[tuple
     others = [c for c in search.tried if frozenset(c.effects) != frozenset(chosen.effects)]
     best = [c for c in sorted(others, key=lambda c: c.cost) if c.effects][:_COMPARED]
     compared = [chosen, *([search.base] if chosen.effects else []), *best]
-    trials = [*chosen.fitted.problem.trials, *chosen.checked.problem.trials]
+    trials = chosen.trials
     keys = list(dict.fromkeys((t.experiment, t.condition) for t in trials))
     costs = np.zeros((len(compared), len(keys)))
     for trial in trials:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lacuna.check import check
 from lacuna.diagnosis.candidate import finished_afresh
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew, Progress
+from lacuna.diagnosis.cross_fit import cross_fitted, is_due
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of
-from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing
+from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing, not_foreseen
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.explain_nuisances import explain_nuisances
@@ -112,7 +113,13 @@ def diagnose(
     found, stopped = _explanations(case, base, crew)
     say = (lambda _: None) if stopped else crew.say  # what was said of stopping stays to be read
     say("deciding what is supported")
-    found, choice = eliminate(case, found, choose(found, split, policy, case.suffices, case.outdone))
+    try:
+        choice = _chosen(case, found, None if stopped else crew)
+    except KeyboardInterrupt:
+        crew.say("stopped: one record in five chooses (Ctrl-C again gives up)")
+        stopped, say = True, lambda _: None
+        choice = _chosen(case, found, None)
+    found, choice = eliminate(case, found, choice)
     if not stopped:
         try:
             found, choice = explain_nuisances(case, found, choice, crew)
@@ -132,6 +139,21 @@ def diagnose(
     unforeseen = followed_by_nothing(case.followed(shown))
     said = (*([STOPPED] if stopped else []), *cautions, *unforeseen, *warnings_of(final, split))
     return _reported(case, found, choice, judged, final, said, time.monotonic() - began)
+
+
+def _chosen(case: Case, found: Search, crew: Crew | None) -> Choice:
+    """What explains best; without repeats, and with a crew, by what predicts every known record."""
+    if crew is None or len(found.tried) == 1 or not is_due(case.system.trials):
+        return choose(found, case.split, case.policy, case.suffices, case.outdone)
+    judged = cross_fitted(case, found, crew)
+    choice = choose(
+        judged,
+        replace(case.split, select=case.split.known),
+        case.policy,
+        lambda one: case.suffices(one.of),
+        lambda held, better: case.outdone(held.of, better.of),
+    )
+    return replace(choice, candidate=choice.candidate.of, freed=choice.freed and choice.freed.of)
 
 
 @dataclass(frozen=True)
@@ -175,7 +197,7 @@ def _besides(case: Case, choice: Choice, found: Search) -> str:
 def _doubts(case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, ...], errors: tuple[Error, Error]):
     """What speaks against a verdict that names `effects`, or none; `errors` before and with them."""
     if judged.verdict == "none":
-        return []
+        return not_foreseen(judged.base, case.split, errors[0], judged.floor, case.policy)
     if not effects:
         return but_too_little(choice) if _supported(case, choice) else []
     gap = (*errors, judged.floor) if judged.remainder.matters else None

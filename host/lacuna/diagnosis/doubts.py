@@ -8,10 +8,27 @@ from lacuna.check.numbers import listed
 from lacuna.diagnosis.decide import Choice
 from lacuna.diagnosis.named import Named
 from lacuna.diagnosis.nuisances import Followed
+from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import Error, Floor
 from lacuna.diagnosis.split import Split
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.uncertainty import pieces_of
 
 _HARMFUL = 0.01  # of the gap: a share below zero by less is rounding
+_SURELY = 4.0  # standard deviations
+
+
+def not_foreseen(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
+    """Of a verdict that nothing is missing: records that were not fitted, and are predicted worse than that beyond
+    chance."""
+    pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.held_out)
+    above = error.held_out**2 - floor.held_out**2 if split.held_out else 0.0
+    if above <= policy.relevance * floor.held_out**2 or above < _SURELY * floor.held_out**2 * (2.0 / pieces) ** 0.5:
+        return []
+    return [
+        f"Records that were not fitted ({listed([trial.name for trial in split.held_out])}) are predicted to"
+        f" {error.held_out:.2f} times the noise, those fitted to {error.fitted:.2f}: something may be missing there."
+    ]
 
 
 def but_too_little(choice: Choice) -> list[str]:

@@ -1,0 +1,93 @@
+"""Without repeats, every known record judges once: explanations are refitted without it, and predict it.
+
+Which record selects is otherwise a matter of the order in which they are given, and of few records each is of another
+kind. Cross-validation by whole records (Stone 1974), each fit begun where the explanation stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from lacuna.diagnosis.candidate import Candidate, costs_by_trial
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.residual_error import failed, rms
+from lacuna.diagnosis.search import Search
+from lacuna.estimation.fit import Fit, evaluate_on, refit_on
+from lacuna.system import Record, groups_of_repeats
+
+_FOLDS = 5
+_COMPARED = 10  # explanations, the best first
+_REFIT = {"max_iterations": 12, "relative": 1e-5}  # fine: a fit that stays where it was knows what it is to predict
+
+
+@dataclass(frozen=True, eq=False)
+class CrossFitted(Candidate):
+    """An explanation `fitted` to all known records; `left_out`: its fits to the others, each on what it was not fitted
+    to; `of`: the explanation as the search found it."""
+
+    left_out: tuple[Fit, ...]
+    of: Candidate
+
+    @property
+    def checked_cost(self) -> float:
+        return sum(fit.cost for fit in self.left_out)
+
+    @cached_property
+    def checked_error(self) -> tuple[int, float]:
+        lost = sum(len(failed(fit.problem.trials, fit.scaled_residuals())) for fit in self.left_out)
+        return lost, rms(z for fit in self.left_out for z in fit.scaled_residuals())
+
+    @cached_property
+    def by_trial(self) -> dict[str, float]:
+        return costs_by_trial([self.fitted, self.checked])
+
+    @cached_property
+    def unseen_by_trial(self) -> dict[str, float]:
+        return costs_by_trial(self.left_out)
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        every = (pair for fit in self.left_out for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
+        return {trial.name: rms([z]) for trial, z in every}
+
+
+def is_due(trials: Sequence[Record]) -> bool:
+    """Whether records judge by turns: no condition has repeats."""
+    return all(len(group) == 1 for group in groups_of_repeats(trials))
+
+
+def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
+    """`found` with its leading explanations judged on every known record."""
+    leading = sorted((c for c in found.tried if c is not found.base), key=lambda c: c.cost)[:_COMPARED]
+    candidates = [found.base, *leading, *found.freed]
+    folds = _folds(case.split.known)
+    known = [case.on_known(candidate) for candidate in candidates]
+    jobs = [(fit, fold) for fit in known for fold in folds]
+    names = [c.effects or ("nothing",) for c in candidates for _ in folds]
+    left_out = crew.map("predicting each record in turn with", names, _left_out, jobs)
+    judged = {}
+    for k, (candidate, fit) in enumerate(zip(candidates, known, strict=True)):
+        mine = left_out[k * len(folds) : (k + 1) * len(folds)]
+        unseen = evaluate_on(fit, case.split.unseen)
+        judged[candidate] = CrossFitted(fit, unseen, tuple([*mine, unseen] if case.split.unseen else mine), candidate)
+    return replace(
+        found,
+        base=judged[found.base],
+        tried=tuple(judged[c] for c in candidates if c not in found.freed),
+        freed=tuple(judged[c] for c in found.freed),
+    )
+
+
+def _folds(known: Sequence[Record]) -> list[list[Record]]:
+    count = min(_FOLDS, len(known))
+    return [list(known[k::count]) for k in range(count)]
+
+
+def _left_out(fitted: Fit, fold: Sequence[Record]) -> Fit:
+    """The explanation fitted to the other records, on these."""
+    names = {trial.name for trial in fold}
+    others = [trial for trial in fitted.problem.trials if trial.name not in names]
+    return evaluate_on(refit_on(fitted, others, near=(fitted,), **_REFIT), fold, near=fitted)

@@ -1,0 +1,84 @@
+"""Without repeats every known record is predicted once from the others."""
+
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.cross_fit import cross_fitted, is_due
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.search import Search
+from lacuna.diagnosis.split import split_trials
+from lacuna.run import with_records
+
+NOISE = 0.2
+
+
+def simulate(record, theta):
+    return {"y": theta.level + theta.bend.per_x2 * record["x"] ** 2}
+
+
+def system():
+    return lacuna.System(
+        simulate,
+        [Parameter("level", "", 1.0, -10.0, 10.0)],
+        [Effect("bend", Parameter("per_x2", "", 0.5, -5.0, 5.0))],
+        sensor_noise={"y": NOISE},
+    )
+
+
+def records(seed, count, bend=0.0, steps=0.0, **more):
+    """`steps`: standard deviation of a level of each record's own."""
+    draw, other = np.random.default_rng(seed), np.random.default_rng([seed, 1])
+    time_s = np.linspace(0.0, 1.0, 40)
+    return [
+        {
+            "name": f"r{k}",
+            "time_s": time_s,
+            "x": (x := time_s + 0.1 * k),
+            "y": 2.0 + steps * other.standard_normal() + bend * x**2 + NOISE * draw.standard_normal(40),
+        }
+        | more
+        for k in range(count)
+    ]
+
+
+def judged(trials):
+    case = Case(trials, split_trials(trials.trials), POLICY, 0)
+    base = case.judge(case.fit_base(1))
+    crew = Crew(lambda _: None)
+    return cross_fitted(case, Search(base, base.fitted.problem.floor, (base,), ()), crew).base
+
+
+def test_each_record_is_predicted_by_the_mean_of_the_others():
+    """Of a constant, where that is leave-one-out in closed form."""
+    found = judged(with_records(system(), records(1, 5, steps=0.3)))
+    known = found.fitted.problem.trials
+    assert sorted(found.errors) == sorted(trial.name for trial in known)
+    sd = found.fitted.problem.floor.channels["run", "y"].sd
+    for one in known:
+        others = np.mean([trial.channels["y"].mean() for trial in known if trial is not one])
+        expected = np.sqrt(np.mean((one.channels["y"] - others) ** 2)) / sd
+        assert found.errors[one.name] == pytest.approx(expected, rel=3e-3)
+
+
+def test_it_is_due_where_nothing_is_repeated():
+    assert is_due(with_records(system(), records(1, 5)).trials)
+    assert not is_due(with_records(system(), records(1, 5, condition="same")).trials)
+
+
+def test_the_names_do_not_depend_on_the_order_of_the_records():
+    given = records(2, 7, bend=0.6)
+    found = [lacuna.diagnose(system(), given[k:] + given[:k], progress=False) for k in range(7)]
+    assert {tuple(e.name for e in one.effects) for one in found} == {("bend",)}
+
+
+def test_records_that_show_more_than_those_fitted_are_told():
+    """The bend shows where x is largest, in the one record that judges at the end."""
+    given = records(2, 7, bend=0.3)
+    found = lacuna.diagnose(system(), given[2:] + given[:2], progress=False)
+    assert found.verdict == "none"
+    assert any("Records that were not fitted (r6) are predicted to 1.39 times the noise" in w for w in found.warnings)
+    assert not lacuna.diagnose(system(), records(2, 7), progress=False).warnings
