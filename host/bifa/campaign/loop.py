@@ -55,17 +55,10 @@ def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
     stages = [
         *([_measure_once(bench, effort, part), _declare(bench)] if bench.is_kept else [_measure(bench, effort, part)]),
         _fit(bench, part),
-        _optimise_base(bench, part),
+        _optimise("base", bench, part),
         _walk("walk-base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
         _diagnose(bench, part),
-        _optimise(
-            "optimise-completed",
-            "gait from the completed model",
-            "model-completed.toml",
-            "gait-completed.toml",
-            bench,
-            part,
-        ),
+        _optimise("completed", bench, part),
         _walk("walk-completed", {"completed": "gait-completed.toml"}, 2, bench, effort, part),
         _again(bench, effort, part),
     ]
@@ -130,27 +123,25 @@ def _fit(bench: Bench, part: Part) -> Stage:
     return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run)
 
 
-def _optimise(name: str, title: str, model: str, gait: str, bench: Bench, part: Part) -> Stage:
+def _optimise(which: str, bench: Bench, part: Part) -> Stage:
+    """The gait of the base or of the completed model."""
+    model, gait = f"model-{which}.toml", f"gait-{which}.toml"
+
     def run(inputs: Path, outputs: Path) -> None:
-        robot = load_model(inputs / model)
+        save_gait(outputs / gait, *_gait_of(load_model(inputs / model), bench, part))
+
+    settings = {"seed": bench.seed, "spread": SPREAD}
+    return Stage(f"optimise-{which}", f"gait from the {which} model", (model,), (gait,), run, settings)
+
+
+def _gait_of(robot: Model, bench: Bench, part: Part) -> tuple[Gait, dict]:
+    """The gait found with a model, and where it comes from. A base model that lacks much may have none that walks, and
+    neither may a robot whose bench shakes it: that ends no campaign, and the baseline stands in."""
+    try:
         best = _robust_gait(robot, bench, part)
-        save_gait(outputs / gait, best.gait, provenance(best, robot.name, "bifa campaign"))
-
-    return Stage(name, title, (model,), (gait,), run, {"seed": bench.seed, "spread": SPREAD})
-
-
-def _optimise_base(bench: Bench, part: Part) -> Stage:
-    """A base model that lacks much may have no gait that walks: that ends no campaign, whose point is what it lacks."""
-    found = _optimise("optimise-base", "gait from the base model", "model-base.toml", "gait-base.toml", bench, part)
-
-    def run(inputs: Path, outputs: Path) -> None:
-        try:
-            found.run(inputs, outputs)
-        except SearchError as error:
-            said = {"made_by": "bifa campaign", "instead_of": f"the base model's gait: {error}"}
-            save_gait(outputs / "gait-base.toml", BASELINE, said)
-
-    return replace(found, run=run)
+    except SearchError as error:
+        return BASELINE, {"made_by": "bifa campaign", "instead_of": f"a gait of {robot.name}: {error}"}
+    return best.gait, provenance(best, robot.name, "bifa campaign")
 
 
 def _robust_gait(robot: Model, bench: Bench, part: Part) -> Optimum:
@@ -219,7 +210,7 @@ def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
         for folder in sorted((inputs / "separating").iterdir()):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
         named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
-        trades = Trades(complete, lambda robot: _robust_gait(robot, bench, part).gait, walk)
+        trades = Trades(complete, lambda robot: _gait_of(robot, bench, part)[0], walk)
         again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
 
     needs = ("bench", "separating", "walks-base", "walks-completed", "diagnosis.json")

@@ -35,7 +35,7 @@ GAIT_NAMES = {
     "base": "found with the base model",
     "completed": "found with the completed model",
 }
-_STAND_IN = "baseline: base model has none"
+_STAND_IN = "baseline: the {} model has none"
 FILES = (
     ("bench/dataset.toml", "data set"),
     ("diagnosis.json", "verdict"),
@@ -241,7 +241,7 @@ def speed_table(gaits: Sequence[Mapping]) -> Table:
     """Predicted and measured speeds of the gaits."""
     rows = [
         [
-            _STAND_IN if gait.get("stand_in") else GAIT_NAMES[gait["gait"]],
+            _STAND_IN.format(gait["gait"]) if gait.get("stand_in") else GAIT_NAMES[gait["gait"]],
             f"{gait['base_model']:.2f}",
             f"{gait['completed_model']:.2f}",
             f"{gait['measured']:.2f}{NBSP}±{NBSP}{gait['spread']:.2f}",

@@ -53,6 +53,7 @@ class Case:
 
     def __init__(self, system: System, split: Split, policy: Policy, seed: int):
         self.system, self.split, self.policy, self.seed = system, split, policy, seed
+        self.by_turns: dict[Candidate, Candidate] = {}  # without repeats: as they predict each record from the others
         self._answers: dict[tuple[str, Candidate], Any] = {}
 
     def fit_base(self, starts: int) -> Fit:
@@ -211,6 +212,9 @@ class Case:
     def closed(self, candidate: Candidate, base: Candidate) -> float:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may
         inform a choice."""
+        if base in self.by_turns and candidate in self.by_turns:
+            before, after = (self.by_turns[one].checked_error[1] for one in (base, candidate))
+            return share_of_gap(before, after, 1.0)  # without repeats the floor is the unit
         before, after = (rms(c.checked.scaled_residuals()) for c in (base, candidate))
         fits = (candidate.fitted, candidate.checked)
         scaled = {t.name: z for f in fits for t, z in zip(f.problem.trials, f.scaled_residuals(), strict=True)}

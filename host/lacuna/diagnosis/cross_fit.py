@@ -54,13 +54,13 @@ class CrossFitted(Candidate):
         return {trial.name: rms([z]) for trial, z in every}
 
 
-def is_due(trials: Sequence[Record]) -> bool:
-    """Whether records judge by turns: no condition has repeats."""
-    return all(len(group) == 1 for group in groups_of_repeats(trials))
+def is_due(case: Case) -> bool:
+    """Whether records judge by turns: no condition has repeats, and there are others to fit."""
+    return len(case.split.known) > 2 and all(len(group) == 1 for group in groups_of_repeats(case.system.trials))
 
 
 def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
-    """`found` with its leading explanations judged on every known record."""
+    """`found` with its leading explanations judged on every known record; the case knows them by their originals."""
     leading = sorted((c for c in found.tried if c is not found.base), key=lambda c: c.cost)[:_COMPARED]
     candidates = [found.base, *leading, *found.freed]
     folds = _folds(case.split.known)
@@ -68,7 +68,7 @@ def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
     jobs = [(fit, fold) for fit in known for fold in folds]
     names = [c.effects or ("nothing",) for c in candidates for _ in folds]
     left_out = crew.map("predicting each record in turn with", names, _left_out, jobs)
-    judged = {}
+    judged = case.by_turns
     for k, (candidate, fit) in enumerate(zip(candidates, known, strict=True)):
         mine = left_out[k * len(folds) : (k + 1) * len(folds)]
         unseen = evaluate_on(fit, case.split.unseen)

@@ -143,7 +143,7 @@ def diagnose(
 
 def _chosen(case: Case, found: Search, crew: Crew | None) -> Choice:
     """What explains best; without repeats, and with a crew, by what predicts every known record."""
-    if crew is None or len(found.tried) == 1 or not is_due(case.system.trials):
+    if crew is None or len(found.tried) == 1 or not is_due(case):
         return choose(found, case.split, case.policy, case.suffices, case.outdone)
     judged = cross_fitted(case, found, crew)
     choice = choose(

@@ -45,8 +45,12 @@ def records(seed, count, bend=0.0, steps=0.0, **more):
     ]
 
 
-def judged(trials):
-    case = Case(trials, split_trials(trials.trials), POLICY, 0)
+def case_of(*given, **more):
+    trials = with_records(system(), records(*given, **more))
+    return Case(trials, split_trials(trials.trials), POLICY, 0)
+
+
+def judged(case):
     base = case.judge(case.fit_base(1))
     crew = Crew(lambda _: None)
     return cross_fitted(case, Search(base, base.fitted.problem.floor, (base,), ()), crew).base
@@ -54,7 +58,7 @@ def judged(trials):
 
 def test_each_record_is_predicted_by_the_mean_of_the_others():
     """Of a constant, where that is leave-one-out in closed form."""
-    found = judged(with_records(system(), records(1, 5, steps=0.3)))
+    found = judged(case_of(1, 5, steps=0.3))
     known = found.fitted.problem.trials
     assert sorted(found.errors) == sorted(trial.name for trial in known)
     sd = found.fitted.problem.floor.channels["run", "y"].sd
@@ -65,8 +69,8 @@ def test_each_record_is_predicted_by_the_mean_of_the_others():
 
 
 def test_it_is_due_where_nothing_is_repeated():
-    assert is_due(with_records(system(), records(1, 5)).trials)
-    assert not is_due(with_records(system(), records(1, 5, condition="same")).trials)
+    assert is_due(case_of(1, 5))
+    assert not is_due(case_of(1, 5, condition="same"))
 
 
 def test_the_names_do_not_depend_on_the_order_of_the_records():

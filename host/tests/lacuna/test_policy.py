@@ -127,8 +127,15 @@ class Tried:
 
     @property
     def checked(self):
-        trials = self.trials[len(self.fitted_costs) :]
-        return SimpleNamespace(problem=SimpleNamespace(trials=trials), cost=sum(self.checked_costs))
+        return SimpleNamespace(problem=SimpleNamespace(trials=self.trials[len(self.fitted_costs) :]))
+
+    @property
+    def checked_cost(self):
+        return sum(self.checked_costs)
+
+    @property
+    def unseen_by_trial(self):
+        return self.by_trial
 
     @property
     def checked_error(self):
