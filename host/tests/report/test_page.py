@@ -211,7 +211,7 @@ def test_a_baseline_in_the_place_of_a_gait_is_called_so():
     gait = {**sample.summary()["gaits"][0], "gait": "base"}
     assert [speed_table([gait | {"stand_in": there}]).rows[0][0] for there in (False, True)] == [
         "found with the base model",
-        "baseline: base model has none",
+        "baseline: the base model has none",
     ]
 
 
