@@ -89,3 +89,11 @@ def test_probability_of_meeting_conditions_by_chance(parameters):
         found.append(met_by_chance({"q": was}, {"q": now}, [Followed("q", 1.0)], parameters))
     assert np.mean(found) == pytest.approx(0.5, abs=0.06)
     assert np.mean(np.array(found) < 0.1) == pytest.approx(0.1, abs=0.05)
+
+
+def test_no_share_of_a_gap_is_given_where_nuisances_had_closed_it(tmp_path):
+    found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), progress=False)
+    assert found.record["effects"][0]["share_of_gap"] is None
+    assert "What was missing" in str(found)
+    assert "of the gap" not in str(found)
+    assert "no gap was measured" in found.report(tmp_path / "page.html").read_text()
