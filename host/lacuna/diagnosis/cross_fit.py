@@ -61,7 +61,9 @@ def is_due(case: Case) -> bool:
 
 def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
     """`found` with its leading explanations judged on every known record; the case knows them by their originals."""
-    leading = sorted((c for c in found.tried if c is not found.base), key=lambda c: c.cost)[:_COMPARED]
+    least = min(c.cost for c in found.tried)
+    near = (c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least)
+    leading = sorted(near, key=lambda c: c.cost)[:_COMPARED]
     candidates = [found.base, *leading, *found.freed]
     folds = _folds(case.split.known)
     known = [case.on_known(candidate) for candidate in candidates]
