@@ -64,7 +64,9 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
     said = ["The gap is the base model's error beyond the noise floor, on held-out trials."]
     for effect in effects:
         name = effect_words(effect["name"])
-        sentence = f"{name[:1].upper()}{name[1:]} closes {_percent(effect['share_of_gap'])} of it"
+        share = effect["share_of_gap"]
+        closes = "takes up what repeats do not show" if share is None else f"closes {_percent(share)} of it"
+        sentence = f"{name[:1].upper()}{name[1:]} {closes}"
         if effect["probability"] is not None:
             sentence += f"; its probability is {effect['probability']:.2f}"
         if effect["confusable_with"]:
@@ -128,7 +130,7 @@ def nearest_table(record: Mapping[str, Any]) -> Table | None:
 
 
 def _percent(share: float | None) -> str:
-    return "" if share is None else f"{100 * share:.0f} %" if share >= 0.005 else "under 1 %"
+    return "" if share is None else f"{100 * min(share, 1.0):.0f} %" if share >= 0.005 else "under 1 %"
 
 
 def noise_table(error: Mapping[str, Any]) -> Table:

@@ -18,8 +18,9 @@ def own_form(effect: Mapping[str, Any]) -> str:
 
 
 def share_in_words(share: float | None) -> str:
-    """A share of the gap; None where there is none, or no trial was left to measure it on."""
-    return "no gap was measured" if share is None else f"{100 * share:.0f} % of the gap"
+    """A share of the gap, the whole at most: below the floor there is but chance. None where there is no gap, or no
+    trial was left to measure it on."""
+    return "no gap was measured" if share is None else f"{100 * min(share, 1.0):.0f} % of the gap"
 
 
 def number_in_words(value: float | None, digits: str = ".4g") -> str:
