@@ -33,7 +33,7 @@ class CrossFitted(Candidate):
 
     @property
     def checked_cost(self) -> float:
-        return sum(fit.cost for fit in self.left_out)
+        return sum(fit.cost - fit.problem.structure_prior_cost(fit.solution.point) for fit in self.left_out)
 
     @cached_property
     def checked_error(self) -> tuple[int, float]:

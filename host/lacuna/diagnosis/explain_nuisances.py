@@ -8,7 +8,7 @@ from lacuna.diagnosis.candidate import finish, judge, profiles, sketches
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.decide import Choice, weigh
-from lacuna.diagnosis.search import Search
+from lacuna.diagnosis.search import Search, reweighed
 
 _FINISHED = 3  # of the most promising, to the end
 
@@ -21,6 +21,8 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> 
     if not followed or choice.freed or not case.suffices(choice.candidate):
         return found, choice
     parent, policy = choice.candidate, case.policy
+    if not parent.fitted.solution.sensitivities:
+        parent = reweighed(parent, case.split, found.floor)
     fresh = [name for name in case.system.effects if name not in parent.effects]
     crew.say(f"asking what {followed[0].nuisance} follows")
     near = sketches(profiles(parent.fitted, fresh, case.split, found.floor, crew), crew)

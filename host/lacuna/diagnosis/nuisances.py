@@ -77,7 +77,8 @@ def by_condition(fits: Sequence[Fit]) -> Runs:
         every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
         for trial, values, parameters in every:
             for value, p in zip(values, parameters, strict=True):
-                found[p.name][trial.experiment, trial.condition].append((value - p.value) / p.step_scale)
+                if "." not in p.name:  # an effect's own (a phase) may do as it likes
+                    found[p.name][trial.experiment, trial.condition].append((value - p.value) / p.step_scale)
     return {name: [np.array(runs) for runs in conditions.values()] for name, conditions in found.items()}
 
 

@@ -178,11 +178,15 @@ class Problem:
         return self._recent[key]
 
     def prior_cost(self, point: Point) -> float:
-        """Minus log of the priors on the nuisances and on the learnt curves."""
-        cost = 0.5 * self.prior_shift(point) @ self.prior_precision @ self.prior_shift(point)
+        """Minus log of the priors on the structure's vector (the learnt curves') and on the nuisances."""
+        cost = self.structure_prior_cost(point)
         for values, parameters in zip(point.nuisances, self.nuisances, strict=True):
             cost += 0.5 * sum(((v - p.value) / p.step_scale) ** 2 for v, p in zip(values, parameters, strict=True))
         return float(cost)
+
+    def structure_prior_cost(self, point: Point) -> float:
+        """The part of it that is one for all trials."""
+        return 0.5 * self.prior_shift(point) @ self.prior_precision @ self.prior_shift(point)
 
     def prior_shift(self, point: Point) -> np.ndarray:
         """How far the structure's vector is from the mean of its prior."""
