@@ -41,10 +41,6 @@ class CrossFitted(Candidate):
         return lost, rms(z for fit in self.left_out for z in fit.scaled_residuals())
 
     @cached_property
-    def by_trial(self) -> dict[str, float]:
-        return costs_by_trial([self.fitted, self.checked])
-
-    @cached_property
     def unseen_by_trial(self) -> dict[str, float]:
         return costs_by_trial(self.left_out)
 

@@ -30,7 +30,11 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> 
     grown = sorted((judge(fitted, case.split, near=parent.checked) for fitted, _ in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > least][:_FINISHED]
     finished = [judge(finish(c.fitted), case.split, near=c.checked) for c in promising]
-    tried = {frozenset(c.effects): c for c in (*grown, *found.tried, *finished)}
+    tried = {frozenset(c.effects): c for c in found.tried}
+    for one in (*grown, *finished):
+        same = frozenset(one.effects)
+        tried[same] = min(tried.get(same, one), one, key=lambda c: c.cost)
     found = replace(found, tried=tuple(tried.values()))
-    able = [c for c in finished if len(fresh) * case.met_by_chance(parent, c) < policy.condition_chance]
+    offered = [tried[frozenset(c.effects)] for c in finished]
+    able = [c for c in offered if len(fresh) * case.met_by_chance(parent, c) < policy.condition_chance]
     return (found, weigh(found, min(able, key=lambda c: c.cost), policy)) if able else (found, choice)
