@@ -19,6 +19,7 @@ from lacuna.diagnosis.explain_nuisances import explain_nuisances
 from lacuna.diagnosis.learn import holds, learn_correction
 from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
+from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
@@ -187,11 +188,15 @@ def _besides(case: Case, choice: Choice, found: Search) -> str:
     if _supported(case, choice) and case.outdone(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
         return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
-    still = {one.nuisance for one in case.followed(choice.explanation)}
-    taken_up = [one for one in case.followed(found.base) if one.nuisance not in still]
-    if _supported(case, choice) and taken_up:
+    if _supported(case, choice) and (taken_up := _taken_up(case, choice, found)):
         return f"{follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
     return ""
+
+
+def _taken_up(case: Case, choice: Choice, found: Search) -> list[Followed]:
+    """The nuisances that follow the condition with the base model, and no longer with what was chosen."""
+    still = {one.nuisance for one in case.followed(choice.explanation)}
+    return [one for one in case.followed(found.base) if one.nuisance not in still]
 
 
 def _doubts(case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, ...], errors: tuple[Error, Error]):
@@ -270,9 +275,10 @@ def _verdict(case: Case, choice: Choice, found: Search, matters: bool, besides: 
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
     if not _supported(case, choice):
         return "unexplained"
-    # of what passes for noise there is no gap to close half of
+    # of what passes for noise, or nuisances take up, there is no gap to close half of
+    hidden = besides or _taken_up(case, choice, found)
     explains = case.closed(choice.explanation, found.base) >= case.policy.half
-    return "identified" if explains or (besides and case.suffices(choice.explanation)) else "unexplained"
+    return "identified" if explains or (hidden and case.suffices(choice.explanation)) else "unexplained"
 
 
 def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew: Crew | None) -> Fit:
