@@ -105,6 +105,7 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
 
 def _report(console, measured, found, json: Path | None, model: Path | None, page: Path | None) -> None:
     """Print the diagnosis, and write what was asked for."""
+    from datetime import date
     from json import dumps
 
     from bifa.data.dataset import labels_of
@@ -118,7 +119,7 @@ def _report(console, measured, found, json: Path | None, model: Path | None, pag
     record, labels = as_record(found), labels_of(measured)
     print_diagnosis(console, record, labels)
     if model is not None:
-        save_model(model, completed_model(found.final))
+        save_model(model, completed_model(found.final, date.today().isoformat()))
         console.print(f"model: {model}. Next: bifa optimize --model {model} --out gait.toml", highlight=False)
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")

@@ -33,6 +33,7 @@ def fit(
     check_targets(out, report, folders=(pictures,))
 
     import time
+    from datetime import date
 
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -52,6 +53,7 @@ def fit(
         found = identify(
             measured,
             load_model(model) if model else None,
+            date=date.today().isoformat(),
             progress=lambda stage: progress.update(task, description=stage),
         )
     save_model(out, found.model)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bifa.identify.robust import with_uncertainty
+from bifa.identify.robust import labelled, with_uncertainty
 from bifa.pipe_robot.sites import learnt_curves
 from bifa.robot import Model
 from bifa.simulate import plant
@@ -15,9 +15,9 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import uncertainty
 
 
-def completed_model(fit: Fit) -> Model:
+def completed_model(fit: Fit, date: str = "") -> Model:
     """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of those
-    values that the data determine."""
+    values that the data determine. `date`: of the fit, for its provenance."""
     structure = fit.structure
     system = structure.system
     model = system.model_at(fit.theta, structure.effects)
@@ -26,4 +26,4 @@ def completed_model(fit: Fit) -> Model:
     sd = np.sqrt(np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fit))))
     named = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
     spread = {e.name: float(s) for e, s in zip(known.estimates, sd, strict=True) if e.determined and e.name in named}
-    return with_uncertainty(model, known, spread)
+    return labelled(with_uncertainty(model, known, spread), system, "bifa diagnose", date)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 
 from bifa.data import Dataset
 from bifa.identify.estimate import IntervalEstimate
-from bifa.identify.robust import with_uncertainty
+from bifa.identify.robust import labelled, with_uncertainty
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import StaticFit
 from bifa.pipe_robot.inputs import ANCHOR
@@ -85,10 +85,11 @@ def identify(
     dataset: Dataset,
     model: Model | None = None,
     *,
+    date: str = "",
     progress: Callable[[str], None] = lambda stage: None,
 ) -> Identification:
     """Identify the robot of `dataset` from `model` (the nominal one) on: what static loadings, rests and sensors say by
-    themselves, then all experiments together.
+    themselves, then all experiments together. `date`: of the fit, for the model's provenance.
 
     Raises UndeterminedError where nothing at all can be fitted. Deterministic.
     """
@@ -102,7 +103,7 @@ def identify(
     intervals |= _profiles(fit, intervals)
     return Identification(
         system=system,
-        model=_model(system, fit, known, intervals, dataset),
+        model=_model(system, fit, known, intervals, date),
         fit=fit,
         uncertainty=known,
         intervals=intervals,
@@ -145,13 +146,11 @@ def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, 
 
 
 def _model(
-    system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, IntervalEstimate], dataset: Dataset
+    system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, IntervalEstimate], date: str
 ) -> Model:
     """The identified model: fitted values with their sd, and the covariance of those that are determined."""
     sd = {name: interval.sd for name, interval in intervals.items()}
-    model = with_uncertainty(system.model_at(fit.theta), known, sd, f"fitted to {dataset.name}")
-    provenance = f"bifa fit, {len(dataset.trials)} trials of {dataset.name}"
-    return replace(model, name=dataset.name, provenance=provenance)
+    return labelled(with_uncertainty(system.model_at(fit.theta), known, sd), system, "bifa fit", date)
 
 
 _TOLD = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before

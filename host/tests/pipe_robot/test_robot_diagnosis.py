@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from datetime import date
 
 import pytest
 
@@ -45,7 +46,10 @@ def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
     assert "none" in said.splitlines()
     assert "Nothing that matters is missing" in said
     assert "Nothing that matters is missing" in page.read_text(encoding="utf-8")
-    assert load_model(model).effects == {}
+    completed = load_model(model)
+    assert completed.effects == {}
+    assert completed.name == read_dataset(folder).name
+    assert completed.provenance.startswith(f"bifa diagnose on {date.today():%Y-%m-%d}: fitted to 45 trials of")
 
 
 @pytest.mark.parametrize(
