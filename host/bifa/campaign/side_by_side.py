@@ -99,8 +99,8 @@ def compare_page(runs: Sequence[Run]) -> Page:
 def _lead(runs: Sequence[Run]) -> str:
     found = {run.name: {effect["name"] for effect in run.summary["effects"]} for run in runs}
     shared = set.intersection(*found.values())
-    fastest = max(runs, key=lambda run: _speed(run, "completed"))
-    walks = f"The fastest gait walks {_speed(fastest, 'completed'):.1f} mm/s, in {fastest.name}."
+    speed, gait, where = max((_speed(run, gait), gait, run.name) for run in runs for gait in GAIT_NAMES)
+    walks = f"The fastest gait ({GAIT_NAMES[gait]}) walks {speed:.2f} mm/s, in {where}."
     if not any(found.values()):
         return f"No effect was named in any of them. {walks}"
     if all(names == shared for names in found.values()):
@@ -183,10 +183,10 @@ def gait_table(runs: Sequence[Run], which: str) -> Table:
 
 
 def _errors(runs: Sequence[Run]) -> Chart:
-    pairs = {
-        run.name: (run.summary["error"]["before"]["held_out"], run.summary["error"]["after"]["held_out"])
-        for run in runs
-    }
+    pairs = {}
+    for run in runs:
+        before, after, floor = (run.summary["error"][side]["held_out"] for side in ("before", "after", "noise_floor"))
+        pairs[run.name] = (before / floor, after / floor)
     return before_and_after(pairs, 1.0, "Error on held-out trials of each campaign, before and after")
 
 

@@ -29,7 +29,8 @@ def errors_chart(error: Mapping) -> Chart:
 
 
 def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | None, alt: str) -> Chart:
-    """A row a name: the error of the base model and of the completed one, in units of the noise floor."""
+    """A row a name: the error of the base model and of the completed one, in units of the noise; `floor`: the least
+    that held-out trials allow."""
     names = list(pairs)
     before, after = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
     rows = np.arange(len(names), 0, -1, dtype=float)
@@ -45,7 +46,7 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
     reach = (0.7 * min(everything), 1.5 * max(everything))
     panel = Panel(
         [*links, *marks],
-        Axis("RMS error in units of the noise floor", reach, log=True),
+        Axis("RMS error in units of the noise", reach, log=True),
         Axis(range=(0.4, len(names) + 1.0), ticks=dict(zip(names, rows.tolist(), strict=True))),
         [("x", floor, "noise floor")] if floor else [],
         len(names) * _ROW_PX / 150,
@@ -55,7 +56,9 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
         [Column([panel])],
         keys,
         alt,
-        "1 is the noise floor: no model can predict better than runs of the same condition agree.",
+        f"No model predicts better than runs of the same condition agree: to {floor:.2f} on held-out trials."
+        if floor
+        else "",
         across=1,
     )
 

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from bifa.campaign.page import GAIT_NAMES
 from bifa.campaign.side_by_side import CompareError, compare_page, parameter_table, read_runs, verdict_table
 from bifa.report.page import render
 from tests.report import sample
@@ -27,6 +28,23 @@ def test_equal_campaigns_are_said_to_agree(tmp_path):
     runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
     assert "All found the same: hysteresis" in compare_page(runs).lead
     assert not [row for row in parameter_table(runs).rows if "≠" in row[0]]
+
+
+def test_the_fastest_gait_is_the_fastest_of_all_that_were_walked(tmp_path):
+    runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
+    gaits = runs[1].summary["gaits"]
+    gaits[1]["measured"] = 22.814
+    assert f"({GAIT_NAMES[gaits[1]['gait']]}) walks 22.81 mm/s, in b" in compare_page(runs).lead
+
+
+def test_errors_stand_in_units_of_each_campaigns_own_floor(tmp_path):
+    runs = read_runs([sample.finished(tmp_path / "a"), sample.finished(tmp_path / "b")])
+    error = runs[0].summary["error"]
+    error["noise_floor"]["held_out"] = 2.0
+    panel = compare_page(runs).sections[0].charts[0].columns[0].panels[0]
+    before = next(s for s in panel.series if s.keys == ("base model",))
+    assert before.x[0] == error["before"]["held_out"] / 2.0
+    assert [place for _, place, _ in panel.rules] == [1.0]
 
 
 def test_folders_of_one_name_go_by_their_paths(tmp_path):
