@@ -128,6 +128,7 @@ def walking(walks: Mapping[str, Walk]) -> Section:
     """The walk that the base model misses by most, as predicted and as measured."""
     walk = most_missed(walks)
     svg, seconds, rate = motion_of(walk)
+    shown_s = round(seconds * rate, 1)
     how_fast = "in real time" if round(rate, 1) == 1.0 else f"at {rate:.1f} times real time"
     return Section(
         "The robot, walking",
@@ -135,7 +136,9 @@ def walking(walks: Mapping[str, Walk]) -> Section:
             f"The {walk.title}, for which the base model has the largest error: as the base model predicts it, as the "
             "motion capture measured it, and as the completed model predicts it."
         ],
-        motion=Motion(svg, seconds, f"To scale, {how_fast}; blue body, orange head, green tail. The dot is the clock."),
+        motion=Motion(
+            svg, seconds, shown_s, f"To scale, {how_fast}; blue body, orange head, green tail. The dot is the clock."
+        ),
     )
 
 

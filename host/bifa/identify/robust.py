@@ -14,7 +14,7 @@ from lacuna.estimation.uncertainty import Uncertainty
 
 
 def with_uncertainty(model: Model, known: Uncertainty, sd: Mapping[str, float]) -> Model:
-    """The model with standard deviations for the values named in `sd`, and their covariance: correlations as `known`."""
+    """The model with standard deviations for the values named in `sd`, and their covariance, correlated as `known`."""
     if not sd:
         return model
     chosen = [k for k, e in enumerate(known.estimates) if e.name in sd]

@@ -18,7 +18,7 @@ LENGTH_MM = 186.0  # from tail to head when contracted: 240 mm extended less the
 ANCHORED_MM, FREE_MM = PIPE_MM, 0.72 * PIPE_MM
 _BODY_MM, _END_MM, _WALL_MM = 52.0, 24.0, 4.0
 _MARGIN_MM, _LABEL_MM, _RULER_MM = 16.0, 46.0, 46.0
-_EVERY_MM = 50
+_SHORT_MM = 640.0  # up to which lettering is as large as it stands here; in longer pictures it grows with them
 
 
 def animate_walks(
@@ -36,44 +36,49 @@ def animate_walks(
     origin_mm = min(path["tail"].min() for path in paths.values())
     far_mm = max(path["head"].max() for path in paths.values()) - origin_mm + LENGTH_MM
     width = far_mm + 2 * _MARGIN_MM + _END_MM
-    lane_mm = PIPE_MM + 2 * _WALL_MM + _LABEL_MM
-    height = lane_mm * len(lanes) + 2 * _RULER_MM
+    zoom = max(1.0, width / _SHORT_MM)
+    label_mm, ruler_mm = zoom * _LABEL_MM, zoom * _RULER_MM
+    lane_mm = PIPE_MM + 2 * _WALL_MM + label_mm
+    height = lane_mm * len(lanes) + 2 * ruler_mm
     rules, drawn = [], []
     left = _MARGIN_MM + 0.5 * _END_MM - origin_mm
     for number, (label, path) in enumerate(paths.items()):
         top = number * lane_mm
-        middle = top + _LABEL_MM + _WALL_MM + PIPE_MM / 2
+        middle = top + label_mm + _WALL_MM + PIPE_MM / 2
         tail, head = path["tail"] + left, path["head"] + left + LENGTH_MM
         moves = {
-            "body": _moves(tail, middle, "X", head - tail),
-            "tail": _moves(tail, middle, "Y", path["tail_mm"]),
-            "head": _moves(head, middle, "Y", path["head_mm"]),
+            "body": _moves(tail, middle, "X", (head - tail) / LENGTH_MM),
+            "tail": _moves(tail, middle, "Y", path["tail_mm"] / PIPE_MM),
+            "head": _moves(head, middle, "Y", path["head_mm"] / PIPE_MM),
         }
-        drawn.append(_lane(label, top, width))
+        drawn.append(_lane(label, top + label_mm, width))
         for part, steps in moves.items():
             name = f"walk{number}-{part}"
             rules.append(_keyframes(name, steps, seconds))
+            # of natural size: a browser that stops an animation shows a shape of one unit, enlarged, as a blur
             box = (
-                f'x="0" width="1" y="{-_BODY_MM / 2:g}" height="{_BODY_MM:g}"'
+                f'x="0" width="{LENGTH_MM:g}" y="{-_BODY_MM / 2:g}" height="{_BODY_MM:g}"'
                 if part == "body"
-                else f'x="{-_END_MM / 2:g}" width="{_END_MM:g}" y="-0.5" height="1"'
+                else f'x="{-_END_MM / 2:g}" width="{_END_MM:g}" y="{-PIPE_MM / 2:g}" height="{PIPE_MM:g}"'
             )
             drawn.append(f'<rect class="{name}" {box} fill="var(--{part})"/>')
     bottom = len(lanes) * lane_mm
-    drawn += [_ruler(bottom + 8, left + origin_mm, far_mm), _clock(bottom + _RULER_MM + 8, width, frames_s)]
-    rules.append(_keyframes("walk-clock", _clock_moves(bottom + _RULER_MM + 8, width), seconds))
+    ruler, clock = bottom + 8 * zoom, bottom + ruler_mm + 8 * zoom
+    drawn += [_ruler(ruler, left + origin_mm, far_mm, zoom), _clock(clock, width, frames_s, zoom)]
+    rules.append(_keyframes("walk-clock", _clock_moves(clock, width), seconds))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}">'
-        f"<title>{escape(title)}</title><style>{_colours() if standalone else ''}{_LOOK}{''.join(rules)}"
+        f"<title>{escape(title)}</title><style>{_colours() if standalone else ''}{_look(zoom)}{''.join(rules)}"
         "@media (prefers-reduced-motion: reduce) { [class^=walk] { animation-play-state: paused } }</style>"
         f"{_ground() if standalone else ''}{''.join(drawn)}</svg>"
     )
 
 
-_LOOK = (
-    "svg text { font: 13px system-ui, sans-serif; fill: var(--ink) } "
-    "@media (max-width: 30rem) { svg text { font-size: 24px } svg .minor { display: none } }"
-)
+def _look(zoom: float) -> str:
+    return (
+        f"svg text {{ font: {13 * zoom:.1f}px system-ui, sans-serif; fill: var(--ink) }} "
+        f"@media (max-width: 30rem) {{ svg text {{ font-size: {24 * zoom:.1f}px }} svg .minor {{ display: none }} }}"
+    )
 
 
 def _paths(columns: Mapping[str, np.ndarray], frames_s: np.ndarray) -> dict[str, np.ndarray]:
@@ -90,7 +95,7 @@ def _paths(columns: Mapping[str, np.ndarray], frames_s: np.ndarray) -> dict[str,
 
 
 def _moves(x: np.ndarray, y: float, along: str, size: np.ndarray) -> list[str]:
-    return [f"translate({a:.1f}px,{y:.0f}px) scale{along}({s:.1f})" for a, s in zip(x, size, strict=True)]
+    return [f"translate({a:.1f}px,{y:.0f}px) scale{along}({s:.4f})" for a, s in zip(x, size, strict=True)]
 
 
 def _keyframes(name: str, steps: list[str], seconds: float) -> str:
@@ -99,8 +104,7 @@ def _keyframes(name: str, steps: list[str], seconds: float) -> str:
     return f".{name}{{animation:{name} {seconds:g}s linear infinite;transform:{steps[0]}}}@keyframes {name}{{{frames}}}"
 
 
-def _lane(label: str, top: float, width: float) -> str:
-    pipe = top + _LABEL_MM
+def _lane(label: str, pipe: float, width: float) -> str:
     walls = "".join(
         f'<rect x="0" y="{y:.0f}" width="{width:.0f}" height="{_WALL_MM:g}" fill="var(--quiet)"/>'
         for y in (pipe, pipe + PIPE_MM + _WALL_MM)
@@ -108,32 +112,35 @@ def _lane(label: str, top: float, width: float) -> str:
     return f'<text x="{_MARGIN_MM:g}" y="{pipe - 12:.0f}">{escape(label)}</text>{walls}'
 
 
-def _ruler(y: float, zero: float, far_mm: float) -> str:
+def _ruler(y: float, zero: float, far_mm: float, zoom: float) -> str:
     """A scale in mm along the pipe."""
-    marks = []
-    for place in range(0, int(far_mm) + 1, _EVERY_MM):
-        x, minor = zero + place, ' class="minor"' if place % (2 * _EVERY_MM) else ""
-        unit, anchor = (" mm", "start") if place == 0 else ("", "middle")
-        marks.append(f'<path d="M{x:.0f} {y:.0f}v7" stroke="var(--quiet)"/>')
-        marks.append(f'<text{minor} x="{x:.0f}" y="{y + 30:.0f}" text-anchor="{anchor}">{place}{unit}</text>')
-    return f'<path d="M{zero:.0f} {y:.0f}h{far_mm:.0f}" stroke="var(--quiet)"/>{"".join(marks)}'
+    places = np.arange(0, far_mm + 1e-6, _step(far_mm, 12))
+    return _scale(y, zero, far_mm, [(zero + place, f"{place:g}") for place in places], "mm", zoom)
 
 
-def _clock(y: float, width: float, frames_s: np.ndarray) -> str:
+def _clock(y: float, width: float, frames_s: np.ndarray, zoom: float) -> str:
     """A line of the walk's time with a dot that runs along it."""
-    start, end = frames_s[0], frames_s[-1]
-    long = width - 2 * _MARGIN_MM
-    step = next(s for s in (1, 2, 5, 10, 20, 50, 100) if (end - start) / s <= 10)
-    marks = []
-    for place in np.arange(0, end - start + 1e-6, step):
-        x = _MARGIN_MM + long * place / (end - start)
-        minor = ' class="minor"' if round(place / step) % 2 else ""
-        anchor = "start" if place == 0 else "middle"
-        unit = " s" if place == 0 else ""
-        marks.append(f'<path d="M{x:.0f} {y:.0f}v7" stroke="var(--quiet)"/>')
-        marks.append(f'<text{minor} x="{x:.0f}" y="{y + 30:.0f}" text-anchor="{anchor}">{place:g}{unit}</text>')
-    line = f'<path d="M{_MARGIN_MM:g} {y:.0f}h{long:.0f}" stroke="var(--quiet)"/>'
-    return f'{line}{"".join(marks)}<circle class="walk-clock" r="6" fill="var(--ink)"/>'
+    lasts, long = frames_s[-1] - frames_s[0], width - 2 * _MARGIN_MM
+    places = np.arange(0, lasts + 1e-6, _step(lasts, 10))
+    marks = [(_MARGIN_MM + long * place / lasts, f"{place:g}") for place in places]
+    dot = f'<circle class="walk-clock" r="{6 * zoom:.1f}" fill="var(--ink)"/>'
+    return _scale(y, _MARGIN_MM, long, marks, "s", zoom) + dot
+
+
+def _step(reach: float, most: int) -> float:
+    return next(s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000) if reach / s <= most)
+
+
+def _scale(y: float, start: float, long: float, marks: list[tuple[float, str]], unit: str, zoom: float) -> str:
+    """A line with a labelled mark at each place; every other one is `minor`, left out where there is little room."""
+    drawn = [f'<path d="M{start:.0f} {y:.0f}h{long:.0f}" stroke="var(--quiet)"/>']
+    for number, (x, label) in enumerate(marks):
+        minor = ' class="minor"' if number % 2 else ""
+        said = label if number else f"{label} {unit}"
+        anchor = "start" if number == 0 else "end" if x > start + long - 20 * zoom else "middle"
+        drawn.append(f'<path d="M{x:.0f} {y:.0f}v{7 * zoom:.0f}" stroke="var(--quiet)"/>')
+        drawn.append(f'<text{minor} x="{x:.0f}" y="{y + 30 * zoom:.0f}" text-anchor="{anchor}">{said}</text>')
+    return "".join(drawn)
 
 
 def _clock_moves(y: float, width: float) -> list[str]:

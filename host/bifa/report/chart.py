@@ -35,6 +35,15 @@ class Axis:
     log: bool = False
     ticks: Mapping[str, float] | None = None
 
+    @property
+    def log_ticks(self) -> list[float] | None:
+        """Of a logarithmic axis over less than two decades, on which powers of ten would be one mark or none."""
+        if not self.log or self.range is None or self.range[1] >= 100.0 * self.range[0]:
+            return None
+        low, high = self.range
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+        return [tick for tick in np.outer(decades, (1.0, 2.0, 5.0)).ravel().tolist() if low <= tick <= high]
+
 
 @dataclass(frozen=True)
 class Panel:

@@ -32,10 +32,12 @@ class Section(engine.Section):
 
 @dataclass(frozen=True)
 class Motion:
-    """An animation: an SVG that runs by itself, so many seconds long; trusted markup made by this package."""
+    """An animation: an SVG that runs by itself; trusted markup made by this package. It takes `seconds` to show
+    `shown_s` of a walk."""
 
     svg: str
     seconds: float
+    shown_s: float
     caption: str
 
 

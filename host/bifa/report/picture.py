@@ -81,6 +81,9 @@ def _scale(axis, name: str, one: Axis) -> None:
     if one.log:
         axis.set(**{f"{name}scale": "log"})
         getattr(axis, f"{name}axis").set_major_formatter("{x:g}")
+        if one.log_ticks:
+            axis.set(**{f"{name}ticks": one.log_ticks})
+            getattr(axis, f"{name}axis").set_minor_formatter("")
     if one.range is not None:
         axis.set(**{f"{name}lim": one.range})
     if one.ticks is not None:

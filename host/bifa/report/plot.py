@@ -79,6 +79,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
     }
     if axis.log:
         made |= {"type": "log", "dtick": 1}
+    if axis.log_ticks:
+        made |= {"tickvals": axis.log_ticks, "ticktext": [f"{tick:g}" for tick in axis.log_ticks]}
     if axis.range is not None:
         made["range"] = [log10(v) if axis.log else v for v in axis.range]
     if axis.ticks is not None:

@@ -125,7 +125,7 @@ ROUNDS = [
 _GAITS = (("baseline", 5.7, 8.0, 10.8), ("base", 2.9, 20.4, 23.3), ("completed", 2.8, 20.6, 23.3))
 
 
-def columns(period_s, cycles=7, speed_mm_s=10.0):
+def columns(period_s, cycles=14, speed_mm_s=10.0):
     """Those of a walk."""
     time_s = np.arange(0, cycles * period_s, 0.02)
     phase = 2 * np.pi * time_s / period_s

@@ -160,9 +160,32 @@ def test_the_animation_runs_pauses_and_is_set_by_its_slider(opened):
     still = page.evaluate(place)
     page.wait_for_timeout(300)
     assert page.evaluate(place) == still
-    figure.locator("input").fill("10")
+    slider = figure.locator("input")
+    slider.fill("10")
     assert page.evaluate(place) != still
     assert figure.locator("output").inner_text() == "10.0 s"
+    slider.press("ArrowRight")
+    assert figure.locator("output").inner_text() == "10.1 s"
+
+
+def test_the_clock_of_the_animation_tells_the_time_at_its_dot(opened):
+    page = opened("campaign")
+    figure = page.locator(".motion")
+    shown = float(figure.get_attribute("data-shown"))
+    assert shown > 1.5 * float(figure.get_attribute("data-seconds")), "a walk that is shown faster than life"
+    figure.locator("input").fill(f"{0.5 * shown:.1f}")
+    dot, line = (
+        page.evaluate(
+            "s => { const b = document.querySelector(s).getBoundingClientRect(); return [b.x + b.width / 2, b.width] }",
+            s,
+        )
+        for s in (".motion .walk-clock", ".motion svg")
+    )
+    assert dot[0] == pytest.approx(line[0], abs=0.01 * line[1]), "half of the walk, in the middle of its line"
+    assert figure.locator("output").inner_text() == f"{0.5 * shown:.1f} s"
+    slider = figure.locator("input")
+    slider.fill(str(shown))
+    assert figure.locator("output").inner_text() == f"{shown:.1f} s", "its end, not its beginning again"
 
 
 def test_the_animation_stands_still_for_who_prefers_that(opened):

@@ -19,7 +19,7 @@ def test_the_figure_is_written_as_png_and_svg(tmp_path):
 
 
 def test_both_gaits_have_the_same_axes_so_that_the_faster_one_looks_faster():
-    chart = walks_chart([Walk("a", 5.7, {MEASURED: columns(5.7)}), Walk("b", 2.5, {MEASURED: columns(2.5)})])
+    chart = walks_chart([Walk("a", 5.7, {MEASURED: columns(5.7, 7)}), Walk("b", 2.5, {MEASURED: columns(2.5, 7)})])
     for a, b in zip(chart.columns[0].panels, chart.columns[1].panels, strict=True):
         assert a.x.range == b.x.range
         assert a.y.range == b.y.range

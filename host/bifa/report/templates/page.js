@@ -46,9 +46,9 @@
   // --- Animations: they run by themselves, and stand still for who prefers that; here are pause, clock and slider.
   for (const figure of document.querySelectorAll(".motion")) {
     const moves = figure.querySelector("svg").getAnimations({ subtree: true });
-    const seconds = Number(figure.dataset.seconds);
+    const [seconds, shown] = [figure.dataset.seconds, figure.dataset.shown].map(Number);
     const [button, slider, clock] = ["button", "input", "output"].map((tag) => figure.querySelector(tag));
-    const time = () => (Number(moves[0].currentTime) / 1000) % seconds;
+    const time = () => ((Number(moves[0].currentTime) / 1000) % seconds) * (shown / seconds);
     const say = () => { slider.value = time(); clock.textContent = `${time().toFixed(1)} s`; };
     let running = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     const go = (on) => {
@@ -60,7 +60,8 @@
     button.addEventListener("click", () => go(!running));
     slider.addEventListener("input", () => {
       go(false);
-      moves.forEach((move) => { move.currentTime = 1000 * slider.value; });
+      const share = Math.min(slider.value / shown, 1 - 1e-6); // the very end is the beginning again
+      moves.forEach((move) => { move.currentTime = 1000 * seconds * share; });
       say();
     });
     figure.querySelector(".controls").hidden = false;
