@@ -86,7 +86,7 @@ void watchdog_feed() {
 }
 
 void watchdog_tick() {
-  if (++unfed_ms == kHungAfter_ms) give_up();
+  if (++unfed_ms >= kHungAfter_ms) give_up();
 }
 
 void watchdog_ticked() { ticked = true; }

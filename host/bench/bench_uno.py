@@ -217,8 +217,8 @@ def run() -> dict[str, float]:
     line("strobe jitter (walk, stream, uploads)", f"{jitter} cycles peak to peak", "limit 64")
     line("asleep, walking and streaming frames", f"{streaming:.1%}", f"limit 85 %; without streaming {quiet:.1%}")
     line("  streaming text", f"{text:.1%}", f"limit 85 %; both together {both:.1%}")
-    line("flash, with the real DAC library", f"{flash} bytes", "limit 26000")
-    line("static RAM, with it", f"{ram} bytes", "limit 1200")
+    line("flash, with the real DAC library", f"{flash} bytes", "limit 29000")
+    line("static RAM, with it", f"{ram} bytes", "limit 1300")
     line("stack never touched, with it", f"{free} bytes", "limit 300")
     line("stack at most, interrupts included", f"{deepest} bytes", f"limit {stack_bound.RAM_BYTES - ram}: what is left")
     return {

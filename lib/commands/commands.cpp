@@ -79,6 +79,11 @@ Result Commands::schedule_start() {
   return result_of(controller_.schedule_start());
 }
 
+void Commands::abandon() {
+  draft_state_ = Draft::kNone;
+  schedule_clear();
+}
+
 void Commands::use(const ParameterSet& set) {
   running_ = wanted_ = set;
   pending_ = false;

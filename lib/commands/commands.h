@@ -26,6 +26,9 @@ class Commands {
   Result schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state);
   Result schedule_start();
 
+  /// What is begun and not finished is void, a set that was not committed and timed holds: they were another session's.
+  void abandon();
+
   /// Changes one parameter (value in wire units) at once, also in a set that waits for the cycle boundary.
   Result set(ParameterId id, uint32_t value);
 

@@ -79,6 +79,7 @@ void Console::feed(uint8_t byte) {
     return;
   }
   if (c == '\t' || (c >= ' ' && c <= '~')) {
+    match_stop(c);
     if (length_ == kLongestLine) {
       too_long_ = true;
       return;
@@ -94,12 +95,25 @@ void Console::end_line() {
   if (echo_) print_line_end();
   line_[length_] = '\0';
   length_ = 0;
-  if (too_long_) {
+  // Whatever stands before it: what is left of a frame, noise, a line whose end was lost.
+  if ((spoilt_ || too_long_) && stop_matched_ == kStopLetters) {
+    stop();
+  } else if (too_long_) {
     print(BIFA_TEXT("error the line exceeds 63 characters\r\n"));
+  } else if (spoilt_) {
+    print(BIFA_TEXT("error the line arrived damaged\r\n"));
   } else {
     execute();
   }
   spoilt_ = too_long_ = false;
+  stop_matched_ = 0;
+}
+
+void Console::match_stop(char c) {
+  static const char kStop[] BIFA_FLASH = "stop";
+  if (c == ' ' || c == '\t') return;
+  if (stop_matched_ == kStopLetters || c != static_cast<char>(flash_byte(kStop + stop_matched_))) stop_matched_ = 0;
+  if (c == static_cast<char>(flash_byte(kStop + stop_matched_))) ++stop_matched_;
 }
 
 void Console::execute() {
@@ -116,9 +130,6 @@ void Console::execute() {
     while (*at != '\0' && *at != ' ' && *at != '\t') ++at;
   }
   command_ = find_command(words_[0]);
-  if (spoilt_ && command_ != static_cast<uint8_t>(CommandId::kStop)) {
-    return print(BIFA_TEXT("error the line arrived damaged\r\n"));
-  }
   if (word_count_ == 0) return answer(Result::kOk);
   if (command_ == kCommandCount) return answer(Result::kUnknown);
   commands_.controller().host_heard();
@@ -401,7 +412,7 @@ void Console::presets() {
 void Console::sample(const Sample& sample) {
   if (!streaming_ && !plotting_) return;
   // A line is printed whole or not at all, and telemetry makes nothing wait for long.
-  if (output_room() < kRoomForSample) return;
+  if (output_room() < kRoomForSample) return commands_.controller().lose_sample();
   if (streaming_) print_stream(sample);
   if (plotting_) print_plot(sample);
 }

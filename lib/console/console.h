@@ -21,7 +21,7 @@ class Console {
 
   /// Takes one byte of text. Only while not waiting().
   void feed(uint8_t byte);
-  /// Bytes were lost: the present line is answered with an error, unless it reads "stop".
+  /// Bytes were lost: the present line is answered with an error, unless it ends in "stop".
   void spoil() { spoilt_ = true; }
 
   /// Whether the last command is still busy (EEPROM) and its answer is owed.
@@ -35,6 +35,7 @@ class Console {
  private:
   void end_line();
   void execute();
+  void match_stop(char c);
   void answer(Result result);
   void answer_usage();
   void finish_later(Result started);
@@ -76,10 +77,12 @@ class Console {
   void print_plot(const Sample& sample);
 
   static const uint8_t kWords = 4;
+  static const uint8_t kStopLetters = 4;
 
   Commands& commands_;
   const Session& session_;
   uint8_t length_ = 0;
+  uint8_t stop_matched_ = 0;  ///< how many letters of "stop" the line ends in, blanks aside
   uint8_t word_count_ = 0;
   uint8_t command_ = 0;  ///< of the line that is carried out
   LinkCounters counters_ = {};

@@ -6,9 +6,6 @@ namespace bifa {
 
 namespace {
 
-const uint8_t kRestShift = 5;  ///< the slow means follow within about a third of a second
-const int16_t kRest_mpsi = 40;
-const uint16_t kRest_ms = 4000;
 const uint8_t kPhaseShift = 16;
 const uint16_t kSilenceUnit_ms = 10;
 
@@ -33,7 +30,7 @@ void Controller::begin(StartCause cause, const ParameterSet& set, const Calibrat
 Verdict Controller::run() {
   const Critical guard;
   if (supervisor_.is_latched()) return Verdict::kLatched;
-  if (supervisor_.state() != State::kIdle || emergency_stop_) return Verdict::kRefused;
+  if (supervisor_.state() != State::kIdle || schedule_.running() || emergency_stop_) return Verdict::kRefused;
   oscillators_.settle();
   host_silence_ms_ = 0;
   supervisor_.run();
@@ -87,6 +84,7 @@ Verdict Controller::schedule_add(uint32_t time_ms, Chamber chamber, ChamberState
 
 Verdict Controller::schedule_clear() {
   const Critical guard;
+  if (schedule_.running()) supervisor_.idle();
   schedule_.clear();
   return Verdict::kDone;
 }
@@ -94,7 +92,7 @@ Verdict Controller::schedule_clear() {
 Verdict Controller::schedule_start() {
   const Critical guard;
   if (supervisor_.is_latched()) return Verdict::kLatched;
-  if (supervisor_.state() == State::kRunning || emergency_stop_) return Verdict::kRefused;
+  if (supervisor_.state() == State::kRunning || schedule_.running() || emergency_stop_) return Verdict::kRefused;
   host_silence_ms_ = 0;
   schedule_.start();
   return Verdict::kDone;
@@ -103,10 +101,8 @@ Verdict Controller::schedule_start() {
 Verdict Controller::measure_zero(Calibration& measured) const {
   const Critical guard;
   if (supervisor_.state() != State::kIdle) return Verdict::kRefused;
-  if (rested_ < kRest_ms / kSamplePeriod_ms) return Verdict::kUnrest;
-  for (uint8_t i = 0; i < kChamberCount; ++i) {
-    measured.offset_mpsi[i] = static_cast<int16_t>((rest_[i] + (1 << (kRestShift - 1))) >> kRestShift);
-  }
+  if (!rest_.is_long()) return Verdict::kUnrest;
+  for (uint8_t i = 0; i < kChamberCount; ++i) measured.offset_mpsi[i] = rest_.mean_mpsi(i);
   return is_valid(measured) ? Verdict::kDone : Verdict::kOffset;
 }
 
@@ -133,6 +129,11 @@ bool Controller::take_sample(Sample& sample) {
   sample = sample_;
   sample_waits_ = false;
   return true;
+}
+
+void Controller::lose_sample() {
+  const Critical guard;
+  if (samples_lost_ < UINT16_MAX) ++samples_lost_;
 }
 
 Status Controller::status() const {
@@ -183,13 +184,13 @@ bool Controller::tick(bool emergency_stop_pressed) {
     since_sample_ms_ = 0;
     begin_sample();
   }
+  watch_host();  // before anything that could open a valve
   step_oscillators();
   follow_schedule();
   {
     const Critical guard;
     supervisor_.tick();
   }
-  watch_host();
   if (round_complete_) finish_sample();
   return since_sample_ms_ == kSamplePeriod_ms - 1;
 }
@@ -234,25 +235,22 @@ void Controller::begin_sample() {
 
 void Controller::finish_sample() {
   round_complete_ = false;
-  if (rested_ < UINT16_MAX) ++rested_;
-  int16_t pressure_mpsi[kChamberCount];
+  int16_t raw_mpsi[kChamberCount];
   for (uint8_t i = 0; i < kChamberCount; ++i) {
-    const int16_t raw_mpsi = sensor_mpsi(round_.sum[i]);
-    const int16_t mean_mpsi = static_cast<int16_t>(rest_[i] >> kRestShift);
-    rest_[i] += raw_mpsi - mean_mpsi;
-    const int16_t moved_mpsi = mean_mpsi - place_[i];
-    if (moved_mpsi > kRest_mpsi || moved_mpsi < -kRest_mpsi) {
-      place_[i] = mean_mpsi;
-      rested_ = 0;
-    }
-    pressure_mpsi[i] = clipped(static_cast<int32_t>(raw_mpsi) - calibration_.offset_mpsi[i]);
-    sampling_.pressure_mpsi[i] = pressure_mpsi[i];
+    raw_mpsi[i] = sensor_mpsi(round_.sum[i]);
+    sampling_.pressure_mpsi[i] = pressure_mpsi(i);
   }
-  last_second_.add(pressure_mpsi);
-  watch(pressure_mpsi);
-  if (sample_waits_ && samples_lost_ < UINT16_MAX) ++samples_lost_;
+  rest_.add(raw_mpsi);
+  last_second_.add(sampling_.pressure_mpsi);
+  watch(sampling_.pressure_mpsi);
+  if (sample_waits_) lose_sample();
   sample_ = sampling_;
   sample_waits_ = true;
+}
+
+/// In the last round.
+int16_t Controller::pressure_mpsi(uint8_t chamber) const {
+  return clipped(static_cast<int32_t>(sensor_mpsi(round_.sum[chamber])) - calibration_.offset_mpsi[chamber]);
 }
 
 void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
@@ -270,7 +268,7 @@ void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
 void Controller::watch_host() {
   if (host_timeout_ms_ == 0) return;
   if (host_silence_ms_ < UINT16_MAX) ++host_silence_ms_;
-  if (host_silence_ms_ < host_timeout_ms_ || !supervisor_.moves_air()) return;
+  if (host_silence_ms_ < host_timeout_ms_ || !(supervisor_.moves_air() || schedule_.running())) return;
   trip(Fault::kHostSilent, kNoChannel, static_cast<int16_t>(host_silence_ms_ / kSilenceUnit_ms),
        static_cast<int16_t>(host_timeout_ms_ / kSilenceUnit_ms));
 }
@@ -287,7 +285,7 @@ bool Controller::cause_stands() const {
     case Fault::kOverPressure:
     case Fault::kSensorRange:
       for (uint8_t i = 0; i < kChamberCount; ++i) {
-        if (SensorWatch::stands(fault.fault, round_.sum[i], sample_.pressure_mpsi[i], fault.limit)) return true;
+        if (SensorWatch::stands(fault.fault, round_.sum[i], pressure_mpsi(i), fault.limit)) return true;
       }
       return false;
     case Fault::kRegulator:

@@ -7,6 +7,7 @@
 #include "calibration.h"
 #include "oscillators.h"
 #include "parameter_table.h"
+#include "rest.h"
 #include "sample.h"
 #include "schedule.h"
 #include "sensor.h"
@@ -40,7 +41,8 @@ struct Status {
   int16_t pressure_mpsi[kChamberCount];
   uint8_t valves;  ///< bits of ValvePattern
   uint32_t uptime_ms;
-  uint16_t samples_lost;  ///< samples that the main loop did not take in time
+  uint16_t
+      samples_lost;  ///< that the main loop did not take in time, or that were asked for but not sent, in either form
 };
 
 /// Why the chip started. kRestart: by itself, because it hung with interrupts off or its supply dipped.
@@ -53,7 +55,7 @@ class Controller {
   /// Once, before the first tick. When the chip restarted by itself the controller begins in a fault.
   void begin(StartCause cause, const ParameterSet& set, const Calibration& calibration);
 
-  Verdict run();   ///< from idle; the oscillators start settled, the body at phase 0
+  Verdict run();   ///< from idle, unless timed holds run; the oscillators start settled, the body at phase 0
   Verdict stop();  ///< to idle; all chambers vent (a latched stop or fault stays)
   /// From idle or holding. When all chambers are off again the controller is idle.
   Verdict hold(Chamber chamber, ChamberState state);
@@ -65,11 +67,11 @@ class Controller {
 
   /// Timed holds, executed on the tick; time 0 is the first tick after the start. stop(), a stop, a fault end them.
   Verdict schedule_add(uint32_t time_ms, Chamber chamber, ChamberState state);
-  Verdict schedule_clear();
-  Verdict schedule_start();
+  Verdict schedule_clear();  ///< if they run all chambers vent: nobody else would end what they began
+  Verdict schedule_start();  ///< from idle or holding, once
 
-  /// Takes the present pressures as zero: only while idle, if they have rested for 4 s (within 0.04 psi: a count of the
-  /// converter), and if each is within kGreatestOffset_mpsi.
+  /// Takes the present pressures as zero: only while idle, if they have rested for 4 s (Rest), and if each is within
+  /// kGreatestOffset_mpsi.
   Verdict measure_zero(Calibration& measured) const;
   void calibrate(const Calibration& calibration);
   const Calibration& calibration() const { return calibration_; }
@@ -81,6 +83,8 @@ class Controller {
 
   /// The next sample, if there is a new one.
   bool take_sample(Sample& sample);
+  /// One that was asked for could not be sent.
+  void lose_sample();
   Status status() const;
   State state() const { return supervisor_.state(); }
   uint32_t uptime_ms() const;
@@ -117,6 +121,7 @@ class Controller {
   void finish_sample();
   void watch(const int16_t (&pressure_mpsi)[kChamberCount]);
   void watch_host();
+  int16_t pressure_mpsi(uint8_t chamber) const;
   void trip(Fault fault, uint8_t channel, int16_t value, int16_t limit);
   bool cause_stands() const;
   uint16_t set_point_mpsi() const;
@@ -139,9 +144,7 @@ class Controller {
   Sample sample_ = {};
   bool sample_waits_ = false;
   uint16_t samples_lost_ = 0;
-  int32_t rest_[kChamberCount] = {};   ///< slow means of the raw pressures, mpsi * 2^kRestShift
-  int16_t place_[kChamberCount] = {};  ///< where they have rested for so many samples
-  uint16_t rested_ = 0;
+  Rest rest_;
 
   TripLimit trip_limit_;
   DacWatch dac_;

@@ -7,21 +7,47 @@
 
 namespace bifa {
 
-/// Keeps interrupts off for as long as it lives; nests. Keep it short: a stop byte waits meanwhile.
+/// Keeps interrupts off for as long as it lives; nests. Keep it short: a stop byte waits meanwhile. Both ends are
+/// barriers to the compiler, which would otherwise move what is plain memory out of the guard.
 class Critical {
  public:
 #ifdef __AVR__
-  BIFA_AT_ONCE Critical() : status_(status()) { __builtin_avr_cli(); }
-  BIFA_AT_ONCE ~Critical() { status() = status_; }
+  BIFA_AT_ONCE Critical() : status_(status()) {
+    __builtin_avr_cli();
+    barrier();
+  }
+  BIFA_AT_ONCE ~Critical() {
+    barrier();
+    status() = status_;
+    barrier();
+  }
   Critical(const Critical&) = delete;
   Critical& operator=(const Critical&) = delete;
 
  private:
   BIFA_AT_ONCE static volatile uint8_t& status() { return *reinterpret_cast<volatile uint8_t*>(0x5F); }  // SREG
+  BIFA_AT_ONCE static void barrier() { __asm__ volatile("" ::: "memory"); }
   const uint8_t status_;
 #else
-  Critical() {}
-  ~Critical() {}
+  // Elsewhere nothing interrupts; tests see whether it is there.
+  Critical() {
+    ++depth();
+    ++entered();
+  }
+  ~Critical() { --depth(); }
+  Critical(const Critical&) = delete;
+  Critical& operator=(const Critical&) = delete;
+
+  /// How many live now.
+  static unsigned& depth() {
+    static unsigned depth = 0;
+    return depth;
+  }
+  /// How many there have been.
+  static unsigned& entered() {
+    static unsigned entered = 0;
+    return entered;
+  }
 #endif
 };
 

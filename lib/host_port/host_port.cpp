@@ -14,14 +14,10 @@ void HostPort::poll() {
   commands_.store().poll();
   session_.poll();
   console_.poll({frames_bad_, receiver_.lost()});
-  {
-    const Critical guard;
-    if (!receiver_.outdated()) commands_.controller().hear_from_now_on();
-  }
   uint8_t byte;
   // A bounded number, so that a flood keeps neither telemetry nor EEPROM waiting; and one line at most, whose answer may
   // take a twentieth of a second, so that the watchdog is not kept waiting either.
-  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && receiver_.pop(byte); --budget) {
+  for (uint8_t budget = 32; budget > 0 && !console_.waiting() && next(byte); --budget) {
     take(byte);
     if (!in_frame_ && (byte == '\n' || byte == '\r')) break;
   }
@@ -31,6 +27,15 @@ void HostPort::poll() {
   commands_.follow(sample);
   session_.sample(sample);
   console_.sample(sample);
+}
+
+/// The next byte; if it came after the last stop or fault so does the command that it ends.
+bool HostPort::next(uint8_t& byte) {
+  {
+    const Critical guard;
+    if (!receiver_.outdated()) commands_.controller().hear_from_now_on();
+  }
+  return receiver_.pop(byte);
 }
 
 void HostPort::take(uint8_t byte) {

@@ -33,6 +33,7 @@ class HostPort {
   bool has_input() const { return receiver_.has_input(); }
 
  private:
+  bool next(uint8_t& byte);
   void take(uint8_t byte);
   void recover();
 

@@ -60,7 +60,7 @@ extern const uint8_t kStopFrame[kStopFrameBytes];
 /// Exact size of the fields of a message to the Uno; false if there is no such message.
 bool inward_size(uint8_t message, uint8_t& size);
 
-/// open a session; everything of an earlier one is void.
+/// open a session; what an earlier one began and did not finish is void, timed holds included: they vent.
 struct ConnectMessage {
   uint16_t boot_nonce;
   uint16_t session_key;

@@ -51,7 +51,7 @@ void Receiver::put(uint8_t byte) {
   const uint8_t next = (head_ + 1) % kQueueBytes;
   if (overrun_ || next == tail_) {
     overrun_ = true;
-    if (lost_ != 0xFFFF) lost_ = lost_ + 1;
+    if (lost_ != 0xFFFF) ++lost_;
     return;
   }
   queue_[head_] = byte;
@@ -67,6 +67,11 @@ bool Receiver::pop(uint8_t& byte) {
   byte = queue_[tail_];
   tail_ = (tail_ + 1) % kQueueBytes;
   return true;
+}
+
+uint16_t Receiver::lost() const {
+  const Critical guard;  // two bytes, between which one may be lost
+  return lost_;
 }
 
 bool Receiver::recover() {

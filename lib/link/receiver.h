@@ -42,7 +42,7 @@ class Receiver {
   bool recover();
 
   /// How many bytes were lost so far, at least, up to 65535.
-  uint16_t lost() const { return lost_; }
+  uint16_t lost() const;
 
  private:
   static const uint8_t kSilenceMs = 20;
@@ -54,7 +54,7 @@ class Receiver {
   volatile uint8_t tail_ = 0;
   volatile bool overrun_ = false;
   volatile uint8_t silence_ms_ = 0;
-  volatile uint16_t lost_ = 0;
+  uint16_t lost_ = 0;
   volatile uint8_t outdated_ = 0;  ///< how many of the bytes in the queue
   bool in_frame_ = false;
   uint8_t frame_length_ = 0;

@@ -65,6 +65,7 @@ void Session::connect(const Frame& frame) {
     expected_ = 0;
     waiting_ = false;
     streaming_ = false;
+    commands_.abandon();
   }
   hello();
 }
@@ -141,7 +142,7 @@ void Session::on_status(uint8_t sequence, const LinkCounters& counters) {
   message.frames_bad = counters.frames_bad;
   message.frames_repeated = repeated_;
   message.bytes_lost = counters.bytes_lost;
-  message.samples_lost = status.samples_lost + samples_dropped_;
+  message.samples_lost = status.samples_lost;
   send(MessageId::kStatusReport, sequence, &message, sizeof message);
 }
 
@@ -159,7 +160,7 @@ void Session::sample(const Sample& sample) {
   if (!streaming_) return;
   SampleMessage message;
   if (output_room() < frame_room(sizeof message)) {
-    count(samples_dropped_);
+    commands_.controller().lose_sample();
     return;
   }
   message.sequence = sample.sequence;

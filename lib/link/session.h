@@ -87,7 +87,6 @@ class Session {
   bool waiting_ = false;  ///< for the EEPROM; the command is the one before the expected
   bool streaming_ = false;
   uint16_t repeated_ = 0;
-  uint16_t samples_dropped_ = 0;
 };
 
 }  // namespace bifa

@@ -19,9 +19,11 @@ void TripLimit::follow(uint16_t set_point_mpsi) {
 }
 
 SensorWatch::Finding SensorWatch::look(uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi, ChamberState chamber) {
-  if (out_of_range_.met(!is_in_range(sum), kRangeTime_ms / kSamplePeriod_ms)) {
+  const bool lost = !is_in_range(sum);
+  if (out_of_range_.met(lost, kRangeStep, kRangeStep * (kRangeTime_ms / kSamplePeriod_ms))) {
     return {Fault::kSensorRange, sensor_mpsi(sum < kSensorLow ? kSensorLow : kSensorHigh)};
   }
+  if (lost) return {Fault::kNone, 0};  // it says nothing of the pressure, least of all that it is good
   if (above_.met(pressure_mpsi > trip_mpsi, kTripStep, kTripStep * (kTripTime_ms / kSamplePeriod_ms))) {
     return {Fault::kOverPressure, trip_mpsi};
   }
@@ -45,9 +47,8 @@ SensorWatch::Finding SensorWatch::look(uint16_t sum, int16_t pressure_mpsi, int1
 }
 
 bool SensorWatch::stands(Fault fault, uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi) {
-  if (fault == Fault::kSensorRange) return !is_in_range(sum);
-  if (fault == Fault::kOverPressure) return pressure_mpsi > trip_mpsi;
-  return false;
+  if (fault != Fault::kSensorRange && fault != Fault::kOverPressure) return false;
+  return !is_in_range(sum) || (fault == Fault::kOverPressure && pressure_mpsi > trip_mpsi);
 }
 
 void SensorWatch::reset() {

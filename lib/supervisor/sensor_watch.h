@@ -16,7 +16,9 @@ const int16_t kGreatestTrip_mpsi = 14800;
 /// After the set-point is lowered the trip follows it no faster than air can leave.
 const int16_t kTripFall_mpsi_per_sample = 20;
 
+/// Out of range: for so long; shorter times add up, and are forgotten in four times as long.
 const uint16_t kRangeTime_ms = 50;
+const uint8_t kRangeStep = 4;
 /// A valve has switched and for so long, however often it switches again, not the least bit of the reading has moved.
 const uint16_t kStuckTime_ms = 2000;
 
@@ -51,7 +53,7 @@ class SensorWatch {
   /// `sum`: raw, `pressure_mpsi`: what it means, `chamber`: what its valves do.
   Finding look(uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi, ChamberState chamber);
 
-  /// Whether the cause of a fault is there in this very sample.
+  /// Whether the cause of a fault is there in this very sample, as far as it can tell: one out of range denies nothing.
   static bool stands(Fault fault, uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi);
 
   /// Forgets what was counted.
@@ -60,7 +62,7 @@ class SensorWatch {
  private:
   Accumulation above_;
   Accumulation jumping_;
-  Persistence out_of_range_;
+  Accumulation out_of_range_;
   Persistence unmoved_;
   int16_t last_sum_ = 0;
   int8_t last_jump_ = 0;  ///< 1 up, -1 down

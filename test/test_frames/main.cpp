@@ -3,6 +3,7 @@
 
 #include "../suite.h"
 #include "crc.h"
+#include "critical.h"
 #include "frame.h"
 #include "output.h"
 #include "receiver.h"
@@ -155,6 +156,20 @@ static void test_what_the_receiver_lost_or_damaged_is_counted_and_spoils_what_ca
   TEST_ASSERT_TRUE(receiver.push('!', true));
 }
 
+#ifndef __AVR__
+static void test_what_the_receive_interrupt_writes_is_read_under_guard() {
+  Receiver receiver;
+  uint8_t byte;
+  for (uint8_t i = 0; i < 3; ++i) receiver.push('x');
+  receiver.outdate();
+  unsigned before = Critical::entered();
+  receiver.lost();
+  TEST_ASSERT_EQUAL(before + 1, Critical::entered());
+  receiver.pop(byte);
+  TEST_ASSERT_EQUAL(before + 2, Critical::entered());
+}
+#endif
+
 static void run() {
   RUN_TEST(test_check_values);
   RUN_TEST(test_the_stop_frame_stops_at_its_last_byte);
@@ -165,5 +180,8 @@ static void run() {
   RUN_TEST(test_what_the_receiver_lost_or_damaged_is_counted_and_spoils_what_came_with_it);
   RUN_TEST(test_in_the_queue_every_frame_stands_between_two_delimiters);
   RUN_TEST(test_an_overrun_is_told_and_ends);
+#ifndef __AVR__
+  RUN_TEST(test_what_the_receive_interrupt_writes_is_read_under_guard);
+#endif
 }
 RUN_SUITE(run)

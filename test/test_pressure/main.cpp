@@ -4,6 +4,7 @@
 #include "../suite.h"
 #include "calibration.h"
 #include "extremes.h"
+#include "rest.h"
 #include "sensor.h"
 
 using bifa::kOversampling;
@@ -73,6 +74,42 @@ void test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon
   TEST_ASSERT_EQUAL_INT16(-100, last.lowest_mpsi(1));
 }
 
+// ---- the rest that a zero is taken from ----
+
+void add(bifa::Rest& rest, int16_t pressure, uint16_t samples) {
+  const int16_t pressures[] = {pressure, static_cast<int16_t>(-pressure), 0};
+  for (; samples > 0; --samples) rest.add(pressures);
+}
+
+void test_pressures_rest_once_their_means_have_stayed_for_four_seconds() {
+  bifa::Rest rest;
+  add(rest, 40, 399);
+  TEST_ASSERT_FALSE(rest.is_long());
+  add(rest, 40, 1);
+  TEST_ASSERT_TRUE(rest.is_long());
+  TEST_ASSERT_EQUAL_INT16(40, rest.mean_mpsi(0));
+  TEST_ASSERT_INT16_WITHIN(1, -40, rest.mean_mpsi(1));
+  TEST_ASSERT_EQUAL_INT16(0, rest.mean_mpsi(2));
+  add(rest, 500, 10);
+  TEST_ASSERT_FALSE(rest.is_long());
+}
+
+// 16 bits do not hold what lies between: on the chip the mean went the wrong way.
+void test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went() {
+  const int32_t rail = 18731;
+  bifa::Rest rest;
+  add(rest, static_cast<int16_t>(-rail), 2000);
+  const int16_t before[] = {rest.mean_mpsi(0), rest.mean_mpsi(1)};
+  TEST_ASSERT_INT16_WITHIN(2, -rail, before[0]);
+  TEST_ASSERT_INT16_WITHIN(2, rail, before[1]);
+  add(rest, rail, 1);
+  TEST_ASSERT_INT16_WITHIN(2, before[0] + 2 * rail / 32, rest.mean_mpsi(0));
+  TEST_ASSERT_INT16_WITHIN(2, before[1] - 2 * rail / 32, rest.mean_mpsi(1));
+  add(rest, rail, 2000);
+  TEST_ASSERT_INT16_WITHIN(2, rail, rest.mean_mpsi(0));
+  TEST_ASSERT_TRUE(rest.is_long());
+}
+
 void test_last_second_knows_nothing_before_the_first_sample() {
   LastSecond last;
   TEST_ASSERT_EQUAL_INT16(0, last.lowest_mpsi(0));
@@ -86,6 +123,8 @@ void run() {
   RUN_TEST(test_monitor_of_the_regulator_is_0_to_130_psi_at_1_to_5_volts);
   RUN_TEST(test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets);
   RUN_TEST(test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon_after);
+  RUN_TEST(test_pressures_rest_once_their_means_have_stayed_for_four_seconds);
+  RUN_TEST(test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went);
   RUN_TEST(test_last_second_knows_nothing_before_the_first_sample);
 }
 

@@ -3,8 +3,9 @@
 import pytest
 
 from bench.bench_uno import connected
+from bifa.link import frames
 from bifa.link.errors import LinkError, RefusedError
-from bifa.link.table import CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH
+from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH
 
 pytestmark = pytest.mark.uno
 
@@ -60,6 +61,69 @@ def test_schedule_of_seventeen_entries_does_not_run_without_its_last(bench):
     with pytest.raises(RefusedError):
         uno.session.call("schedule_start")
     assert not bench.valves_on
+
+
+def test_walk_is_refused_while_timed_holds_wait_and_none_of_them_is_lost(bench):
+    uno = connected(bench.board)
+    uno.schedule([(0.5, "body", "positive"), (1.0, "body", "off")])
+    assert "error not in this state" in bench.say("run")
+    with pytest.raises(RefusedError, match="not in this state"):
+        uno.session.call("schedule_start")
+    bench.wait(0.6)
+    assert bench.valves_on == [4]
+    bench.wait(0.6)
+    assert not bench.valves_on
+
+
+def test_clearing_timed_holds_that_run_vents(bench):
+    uno = connected(bench.board)
+    uno.schedule([(0, "body", "positive"), (5.0, "body", "off")])
+    bench.wait(0.1)
+    assert bench.valves_on == [4]
+    uno.session.call("schedule_clear")
+    assert not bench.valves_on
+
+
+def test_new_session_ends_the_timed_holds_of_the_one_before(bench):
+    uno = connected(bench.board)
+    first = bench.board.event_count
+    uno.schedule([(0.5, "body", "positive"), (1.0, "body", "off")])
+    uno.connect()
+    bench.wait(1.5)
+    assert not [e for e in bench.events_since(first) if e.kind == "pin" and e.index == 4]
+
+
+def test_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve_even_for_a_moment(bench):
+    uno = connected(bench.board)
+    uno.set("host_timeout_s", 0.5)
+    first = bench.board.event_count
+    uno.schedule([(1.0, "body", "positive"), (2.0, "body", "off")])
+    bench.wait(3.0)
+    assert not [e for e in bench.events_since(first) if e.kind == "pin" and e.index == 4]
+    assert "host_silent" in bench.say("status", 0.5)
+
+
+def test_stop_that_is_typed_behind_a_torn_frame_is_carried_out(bench):
+    bench.say("run")
+    torn = frames.encode(COMMANDS["status"], 0, (), frames.session_seed(1))
+    bench.board.send(torn[:5])
+    bench.wait(0.03)
+    bench.board.send(torn[5:])
+    bench.wait(0.03)
+    assert bench.say("stop").rstrip().endswith("ok")
+    assert not bench.valves_on
+
+
+def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench):
+    uno = connected(bench.board)
+    seed, sequence = frames.session_seed(uno.session._key), uno.session._sequence
+    status, clear = (
+        frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("status", "clear"))
+    )
+    bench.say("help", 0.001)  # while it prints the others wait
+    bench.board.send(status + b"!" + clear)
+    bench.wait(1.0)
+    assert "state idle" in bench.say("status", 0.5)
 
 
 def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench):

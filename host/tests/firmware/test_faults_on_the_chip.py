@@ -106,6 +106,18 @@ def test_sensor_without_its_wire_vents(bench):
     assert bench.say("clear").endswith("ok\r\n")
 
 
+@pytest.mark.parametrize("behind_psi", [0, 14.5])
+def test_sensor_with_a_loose_wire_vents_whatever_pressure_is_behind_it(bench, behind_psi):
+    bench.say("run")
+    for _ in range(10):
+        bench.volts[1] = 0.02
+        bench.wait(0.04)
+        bench.volts[1] = 2.5 + behind_psi * 4 / 30
+        bench.wait(0.01)
+    assert not bench.valves_on
+    assert "[fault sensor_range head" in bench.say("status", 0.5)
+
+
 def test_silent_host_vents(bench):
     bench.say("set host_timeout_s 0.5")
     bench.say("run", 0.05)

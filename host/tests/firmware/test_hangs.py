@@ -2,7 +2,7 @@
 
 import pytest
 
-from virtual_robot.uno import CLOCK_HZ
+from virtual_robot.uno import CLOCK_HZ, elf
 
 pytestmark = pytest.mark.uno
 
@@ -71,6 +71,19 @@ def test_clock_that_stops_restarts_the_chip_though_the_main_loop_goes_on(bench):
         bench.say("", 0.01)
     valves_fell_and_chip_restarted(bench, first, begin)
     assert cause(bench) == "watchdog"
+
+
+def test_count_of_unfed_milliseconds_that_is_past_its_limit_vents_at_once(bench):
+    bench.say("run")
+    run_into(bench, "main")
+    first, begin = bench.board.event_count, bench.board.cycle
+    counter = next(name for name in elf.symbols(bench.board.firmware) if "unfed_ms" in name)
+    bench.board.poke(counter, bytes([201]))
+    bench.board.hang(interrupts=True)
+    bench.wait(0.8)
+    falls = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in VALVES and e.value == 0]
+    assert max(e.cycle for e in falls) - begin <= 0.002 * CLOCK_HZ
+    assert bench.board.last_reset_cause == "watchdog"
 
 
 def test_main_loop_and_tick_that_only_take_long_are_no_hang(bench):

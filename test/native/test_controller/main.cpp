@@ -24,7 +24,8 @@ const uint16_t kMonitorZero = 0;
 const uint8_t kBodyPositive = 0x01;
 const uint8_t kBodyVacuum = 0x02;
 
-uint8_t pins = 0;  ///< what stands on the valves' pins
+uint8_t pins = 0;     ///< what stands on the valves' pins
+uint8_t ever_on = 0;  ///< what stood there ever
 
 /// A controller, and a board around it whose converter answers at once.
 struct Bench {
@@ -36,7 +37,7 @@ struct Bench {
   bool noisy = true;    ///< the last bit of the readings moves, as that of a sensor that lives
 
   explicit Bench(StartCause cause = StartCause::kPower, ParameterSet set = bifa::factory_preset(0)) {
-    pins = 0;
+    pins = ever_on = 0;
     controller.begin(cause, set, Calibration());
   }
 
@@ -247,6 +248,76 @@ void test_a_schedule_has_room_for_sixteen() {
   equal(Verdict::kDone, bench.controller.schedule_add(0, Chamber::kTail, ChamberState::kVacuum));
 }
 
+void test_nothing_walks_while_timed_holds_wait() {
+  Bench bench;
+  bench.controller.schedule_add(100, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_start();
+  bench.tick(10);
+  equal(State::kIdle, bench.state());
+  equal(Verdict::kRefused, bench.controller.run());
+  bench.tick(100);
+  TEST_ASSERT_EQUAL_HEX8(kBodyPositive, pins);  // none of them was lost
+}
+
+void test_timed_holds_that_run_are_not_started_again() {
+  Bench bench;
+  bench.controller.schedule_add(100, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_start();
+  bench.tick(60);
+  equal(Verdict::kRefused, bench.controller.schedule_start());
+  bench.tick(41);
+  TEST_ASSERT_EQUAL_HEX8(kBodyPositive, pins);
+  equal(Verdict::kDone, bench.controller.schedule_start());  // they have run
+}
+
+void test_clearing_timed_holds_that_run_vents_what_they_hold() {
+  Bench bench;
+  bench.controller.schedule_add(0, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_add(1000, Chamber::kBody, ChamberState::kOff);
+  bench.controller.schedule_start();
+  bench.tick(10);
+  TEST_ASSERT_EQUAL_HEX8(kBodyPositive, pins);
+  equal(Verdict::kDone, bench.controller.schedule_clear());
+  TEST_ASSERT_EQUAL_HEX8(0, pins);
+  equal(State::kIdle, bench.state());
+}
+
+void test_clearing_timed_holds_that_do_not_run_leaves_held_chambers_alone() {
+  Bench bench;
+  bench.controller.hold(Chamber::kBody, ChamberState::kVacuum);
+  bench.tick(10);
+  equal(Verdict::kDone, bench.controller.schedule_clear());
+  TEST_ASSERT_EQUAL_HEX8(kBodyVacuum, pins);
+}
+
+void test_timed_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.host_timeout_ms = 500;
+  Bench bench(StartCause::kPower, set);
+  bench.controller.schedule_add(2000, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_start();
+  for (uint16_t ms = 0; ms < 3000; ++ms) {
+    bench.tick();
+    TEST_ASSERT_EQUAL_HEX8(0, ever_on);
+  }
+  equal(Fault::kHostSilent, bench.fault());
+}
+
+void test_a_hold_that_falls_due_as_the_host_becomes_too_silent_opens_no_valve() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.host_timeout_ms = 500;
+  for (uint16_t due_ms = 498; due_ms < 502; ++due_ms) {
+    Bench bench(StartCause::kPower, set);
+    bench.controller.schedule_add(due_ms, Chamber::kBody, ChamberState::kPositive);
+    bench.controller.schedule_start();
+    bench.tick(499);
+    const uint8_t before = pins;
+    bench.tick(5);
+    TEST_ASSERT_EQUAL_HEX8(before, ever_on);
+    equal(Fault::kHostSilent, bench.fault());
+  }
+}
+
 // ---- sampling ----
 
 void test_a_sample_every_ten_milliseconds_stamped_with_the_strobe() {
@@ -390,6 +461,22 @@ void test_a_broken_sensor_is_a_fault_in_any_state_even_idle() {
   bench.tick(100);
   equal(Fault::kSensorRange, bench.fault());
   equal(Verdict::kCauseStands, bench.clear());
+}
+
+void test_over_pressure_behind_a_loose_plug_is_not_cleared() {
+  Bench bench;
+  bench.controller.run();
+  bench.pressure(2, 512 + 330);
+  bench.tick(250);
+  equal(Fault::kOverPressure, bench.fault());
+  bench.pressure(2, 0);
+  bench.tick(10);
+  equal(Verdict::kCauseStands, bench.clear());
+  bench.pressure(2, 512 + 330);
+  for (uint8_t ms = 0; ms < 10; ++ms) {  // also between a round and the tick that looks at it
+    bench.tick();
+    equal(Verdict::kCauseStands, bench.clear());
+  }
 }
 
 void test_a_stuck_sensor_is_a_fault_while_walking() {
@@ -561,6 +648,12 @@ void run() {
   RUN_TEST(test_a_stop_ends_timed_holds);
   RUN_TEST(test_timed_holds_do_not_outlive_a_stop_that_is_cleared_within_a_tick);
   RUN_TEST(test_a_schedule_has_room_for_sixteen);
+  RUN_TEST(test_nothing_walks_while_timed_holds_wait);
+  RUN_TEST(test_timed_holds_that_run_are_not_started_again);
+  RUN_TEST(test_clearing_timed_holds_that_run_vents_what_they_hold);
+  RUN_TEST(test_clearing_timed_holds_that_do_not_run_leaves_held_chambers_alone);
+  RUN_TEST(test_timed_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve);
+  RUN_TEST(test_a_hold_that_falls_due_as_the_host_becomes_too_silent_opens_no_valve);
   RUN_TEST(test_a_sample_every_ten_milliseconds_stamped_with_the_strobe);
   RUN_TEST(test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them);
   RUN_TEST(test_samples_that_nobody_takes_are_counted);
@@ -575,6 +668,7 @@ void run() {
   RUN_TEST(test_over_pressure_vents_latches_and_is_not_cleared_while_it_stands);
   RUN_TEST(test_a_spike_of_a_hundred_milliseconds_is_borne);
   RUN_TEST(test_a_broken_sensor_is_a_fault_in_any_state_even_idle);
+  RUN_TEST(test_over_pressure_behind_a_loose_plug_is_not_cleared);
   RUN_TEST(test_a_stuck_sensor_is_a_fault_while_walking);
   RUN_TEST(test_a_silent_host_vents_when_it_was_asked_to);
   RUN_TEST(test_without_a_time_out_the_host_may_be_silent_forever);
@@ -589,7 +683,10 @@ void run() {
 
 }  // namespace
 
-void bifa::set_valves(ValvePattern pattern) { pins = pattern.bits(); }
+void bifa::set_valves(ValvePattern pattern) {
+  pins = pattern.bits();
+  ever_on |= pins;
+}
 void bifa::outdate_input() {}
 
 void setUp() {}

@@ -1,0 +1,249 @@
+// What trips, what does not, and the three defects that were found in other pneumatic boards' sources.
+#include <unity.h>
+
+#include "../suite.h"
+#include "sensor.h"
+#include "sensor_watch.h"
+#include "supply_watch.h"
+
+using bifa::ChamberState;
+using bifa::Fault;
+using bifa::kTripMargin_mpsi;
+using bifa::Persistence;
+using bifa::SensorWatch;
+using bifa::TripLimit;
+
+namespace {
+
+const ChamberState kOff = ChamberState::kOff;
+const ChamberState kVacuum = ChamberState::kVacuum;
+const ChamberState kPositive = ChamberState::kPositive;
+const uint16_t kHalfScale = 512 * bifa::kOversampling;
+const int16_t kTrip_mpsi = 10000;
+const uint8_t kTripSamples = bifa::kTripTime_ms / bifa::kSamplePeriod_ms;
+
+Fault look(SensorWatch& watch, int16_t pressure_mpsi, uint16_t sum = kHalfScale, ChamberState chamber = kOff) {
+  return watch.look(sum, pressure_mpsi, kTrip_mpsi, chamber).fault;
+}
+
+// ---- a watchdog flag that is never cleared: two short spikes far apart must not add up ----
+
+void test_two_short_spikes_a_minute_apart_do_not_trip() {
+  SensorWatch watch;
+  TEST_ASSERT_TRUE(look(watch, kTrip_mpsi + 1) == Fault::kNone);
+  for (uint16_t sample = 0; sample < 5900; ++sample) TEST_ASSERT_TRUE(look(watch, 0) == Fault::kNone);
+  for (uint8_t sample = 1; sample < kTripSamples; ++sample) {
+    TEST_ASSERT_TRUE(look(watch, kTrip_mpsi + 1) == Fault::kNone);
+  }
+  TEST_ASSERT_TRUE(look(watch, 0) == Fault::kNone);
+}
+
+void test_over_pressure_trips_after_exactly_its_time_and_not_before() {
+  SensorWatch watch;
+  for (uint8_t sample = 1; sample < kTripSamples; ++sample) {
+    TEST_ASSERT_TRUE(look(watch, kTrip_mpsi + 1) == Fault::kNone);
+  }
+  TEST_ASSERT_TRUE(look(watch, kTrip_mpsi + 1) == Fault::kOverPressure);
+}
+
+void test_a_pressure_at_the_limit_is_not_above_it() {
+  SensorWatch watch;
+  for (uint8_t sample = 0; sample < 250; ++sample) TEST_ASSERT_TRUE(look(watch, kTrip_mpsi) == Fault::kNone);
+}
+
+// 300 * 1000 wraps in a 16-bit int: no time here is computed so, and none is longer than its counter.
+void test_times_are_counted_in_samples_that_fit_their_counter() {
+  TEST_ASSERT_TRUE(bifa::kTripTime_ms / bifa::kSamplePeriod_ms == 20);
+  TEST_ASSERT_TRUE(bifa::kRangeTime_ms / bifa::kSamplePeriod_ms == 5);
+  TEST_ASSERT_TRUE(bifa::kStuckTime_ms / bifa::kSamplePeriod_ms == 200);
+  TEST_ASSERT_TRUE(bifa::kMonitorTime_ms / bifa::kSamplePeriod_ms == 250);
+  Persistence persistence;
+  for (uint8_t times = 1; times < 250; ++times) TEST_ASSERT_FALSE(persistence.met(true, 250));
+  for (uint16_t times = 0; times < 1000; ++times) TEST_ASSERT_TRUE(persistence.met(true, 250));
+}
+
+// ---- a lost sensor that reads as low pressure: inflating until p < pmax would burst the chamber ----
+
+void test_a_sensor_that_is_lost_is_a_fault_though_it_reads_far_below_the_limit() {
+  SensorWatch watch;
+  const uint16_t broken_wire = 3 * bifa::kOversampling;
+  Fault fault = Fault::kNone;
+  for (uint8_t sample = 0; sample < bifa::kRangeTime_ms / bifa::kSamplePeriod_ms; ++sample) {
+    TEST_ASSERT_TRUE(fault == Fault::kNone);
+    fault = look(watch, bifa::sensor_mpsi(broken_wire), broken_wire);
+  }
+  TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
+}
+
+void test_a_saturated_sensor_is_a_sensor_fault() {
+  SensorWatch watch;
+  const uint16_t rail = 1023 * bifa::kOversampling;
+  Fault fault = Fault::kNone;
+  for (uint8_t sample = 0; sample < 10; ++sample) fault = look(watch, bifa::sensor_mpsi(rail), rail);
+  TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
+}
+
+// ---- a loose plug: what is out of range says nothing of the pressure, least of all that it is good ----
+
+const uint16_t kUnplugged = 0;
+
+void test_a_loose_plug_is_found_though_every_fifth_sample_is_good() {
+  SensorWatch watch;
+  Fault fault = Fault::kNone;
+  for (uint8_t sample = 0; sample < 10 && fault == Fault::kNone; ++sample) {
+    const uint16_t sum = sample % 5 == 4 ? kHalfScale : kUnplugged;
+    fault = look(watch, bifa::sensor_mpsi(sum), sum);
+  }
+  TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
+}
+
+void test_a_sample_out_of_range_now_and_then_is_borne() {
+  SensorWatch watch;
+  for (uint16_t sample = 0; sample < 1000; ++sample) {
+    const uint16_t sum = sample % 5 == 4 ? kUnplugged : kHalfScale + sample % 2;
+    TEST_ASSERT_TRUE(look(watch, bifa::sensor_mpsi(sum), sum) == Fault::kNone);
+  }
+}
+
+void test_over_pressure_is_found_through_a_loose_plug() {
+  SensorWatch watch;
+  Fault fault = Fault::kNone;
+  uint8_t samples = 0;
+  for (; samples < 100 && fault == Fault::kNone; ++samples) {
+    const bool lost = samples % 5 == 4;
+    fault = look(watch, lost ? bifa::sensor_mpsi(kUnplugged) : kTrip_mpsi + 1, lost ? kUnplugged : kHalfScale);
+  }
+  TEST_ASSERT_TRUE(fault == Fault::kOverPressure);
+  TEST_ASSERT_EQUAL_UINT8(kTripSamples + kTripSamples / 4 - 1, samples);
+}
+
+void test_a_sample_out_of_range_is_no_sign_that_over_pressure_is_over() {
+  TEST_ASSERT_TRUE(SensorWatch::stands(Fault::kOverPressure, kUnplugged, -18732, kTrip_mpsi));
+  TEST_ASSERT_TRUE(SensorWatch::stands(Fault::kOverPressure, kHalfScale, kTrip_mpsi + 1, kTrip_mpsi));
+  TEST_ASSERT_FALSE(SensorWatch::stands(Fault::kOverPressure, kHalfScale, kTrip_mpsi, kTrip_mpsi));
+  TEST_ASSERT_TRUE(SensorWatch::stands(Fault::kSensorRange, kUnplugged, -18732, kTrip_mpsi));
+  TEST_ASSERT_FALSE(SensorWatch::stands(Fault::kSensorRange, kHalfScale, kTrip_mpsi + 1, kTrip_mpsi));
+  TEST_ASSERT_FALSE(SensorWatch::stands(Fault::kSensorStuck, kUnplugged, kTrip_mpsi + 1, kTrip_mpsi));
+}
+
+void test_a_stuck_sensor_is_found_through_a_loose_plug() {
+  SensorWatch watch;
+  look(watch, 0, kHalfScale, kVacuum);
+  Fault fault = Fault::kNone;
+  uint16_t samples = 0;
+  for (; samples < 1000 && fault == Fault::kNone; ++samples) {
+    const uint16_t sum = samples % 6 == 5 ? kUnplugged : kHalfScale;
+    fault = look(watch, 0, sum, kPositive);
+  }
+  TEST_ASSERT_TRUE(fault == Fault::kSensorStuck);
+  TEST_ASSERT_UINT16_WITHIN(2, bifa::kStuckTime_ms / bifa::kSamplePeriod_ms * 6 / 5, samples);
+}
+
+// ---- a limit that is not a number disables the trip: here there are only integers, and every one of them is a limit ----
+
+void test_whatever_the_set_point_there_is_a_limit_within_the_sensor_s_range() {
+  for (uint32_t set_point = 0; set_point < 0x10000UL; set_point += 13) {
+    TripLimit limit;
+    limit.follow(static_cast<uint16_t>(set_point));
+    TEST_ASSERT_TRUE(limit.mpsi() >= kTripMargin_mpsi - bifa::kTripFall_mpsi_per_sample);
+    TEST_ASSERT_TRUE(limit.mpsi() <= bifa::kGreatestTrip_mpsi);
+  }
+}
+
+void test_trip_follows_a_raised_set_point_at_once_and_a_lowered_one_as_air_leaves() {
+  TripLimit limit;
+  limit.follow(8500);
+  TEST_ASSERT_EQUAL_INT16(8500 + kTripMargin_mpsi, limit.mpsi());
+  limit.follow(4500);
+  TEST_ASSERT_EQUAL_INT16(8480 + kTripMargin_mpsi, limit.mpsi());
+  for (uint8_t sample = 0; sample < 200; ++sample) limit.follow(4500);
+  TEST_ASSERT_EQUAL_INT16(4500 + kTripMargin_mpsi, limit.mpsi());
+}
+
+// ---- a stuck sensor ----
+
+void test_a_reading_that_does_not_move_by_a_bit_for_two_seconds_after_a_switch_is_stuck() {
+  SensorWatch watch;
+  look(watch, 0, kHalfScale, kVacuum);
+  uint16_t samples = 0;
+  while (look(watch, 0, kHalfScale, kPositive) == Fault::kNone && samples < 1000) ++samples;
+  TEST_ASSERT_UINT16_WITHIN(1, bifa::kStuckTime_ms / bifa::kSamplePeriod_ms, samples + 1);
+}
+
+void test_a_reading_that_rests_is_not_stuck_while_nothing_switches() {
+  SensorWatch watch;
+  for (uint16_t sample = 0; sample < 1000; ++sample) {
+    TEST_ASSERT_TRUE(look(watch, 0, kHalfScale, kPositive) == Fault::kNone);
+  }
+}
+
+void test_a_reading_that_moved_after_the_switch_may_rest() {
+  SensorWatch watch;
+  look(watch, 0, kHalfScale, kVacuum);
+  look(watch, 0, kHalfScale, kPositive);
+  for (uint16_t sample = 0; sample < 1000; ++sample) {
+    TEST_ASSERT_TRUE(look(watch, 0, kHalfScale + 1, kPositive) == Fault::kNone);
+  }
+}
+
+// ---- the supply ----
+
+void test_two_failures_of_the_dac_are_borne_and_the_third_in_a_row_is_not() {
+  bifa::DacWatch dac;
+  dac.told(false);
+  dac.told(false);
+  TEST_ASSERT_FALSE(dac.failed());
+  dac.told(true);
+  dac.told(false);
+  dac.told(false);
+  TEST_ASSERT_FALSE(dac.failed());
+  dac.told(false);
+  TEST_ASSERT_TRUE(dac.failed());
+  dac.told(true);
+  TEST_ASSERT_FALSE(dac.failed());
+}
+
+void test_a_monitor_that_is_not_connected_is_not_believed() {
+  bifa::RegulatorWatch regulator;
+  for (uint16_t sample = 0; sample < 2000; ++sample) TEST_ASSERT_FALSE(regulator.look(0, 8500));
+}
+
+void test_a_regulator_that_does_not_follow_is_found_and_one_that_takes_two_seconds_is_not() {
+  const uint16_t at_zero = 205, at_set_point = 258;
+  bifa::RegulatorWatch regulator;
+  for (uint16_t sample = 0; sample < 200; ++sample) TEST_ASSERT_FALSE(regulator.look(at_zero, 0));
+  for (uint16_t sample = 0; sample < 200; ++sample) TEST_ASSERT_FALSE(regulator.look(at_zero, 8500));
+  for (uint16_t sample = 0; sample < 200; ++sample) TEST_ASSERT_FALSE(regulator.look(at_set_point, 8500));
+  bool found = false;
+  for (uint16_t sample = 0; sample < 260; ++sample) found = regulator.look(at_zero, 8500);
+  TEST_ASSERT_TRUE(found);
+}
+
+void run() {
+  RUN_TEST(test_two_short_spikes_a_minute_apart_do_not_trip);
+  RUN_TEST(test_over_pressure_trips_after_exactly_its_time_and_not_before);
+  RUN_TEST(test_a_pressure_at_the_limit_is_not_above_it);
+  RUN_TEST(test_times_are_counted_in_samples_that_fit_their_counter);
+  RUN_TEST(test_a_sensor_that_is_lost_is_a_fault_though_it_reads_far_below_the_limit);
+  RUN_TEST(test_a_saturated_sensor_is_a_sensor_fault);
+  RUN_TEST(test_a_loose_plug_is_found_though_every_fifth_sample_is_good);
+  RUN_TEST(test_a_sample_out_of_range_now_and_then_is_borne);
+  RUN_TEST(test_over_pressure_is_found_through_a_loose_plug);
+  RUN_TEST(test_a_sample_out_of_range_is_no_sign_that_over_pressure_is_over);
+  RUN_TEST(test_a_stuck_sensor_is_found_through_a_loose_plug);
+  RUN_TEST(test_whatever_the_set_point_there_is_a_limit_within_the_sensor_s_range);
+  RUN_TEST(test_trip_follows_a_raised_set_point_at_once_and_a_lowered_one_as_air_leaves);
+  RUN_TEST(test_a_reading_that_does_not_move_by_a_bit_for_two_seconds_after_a_switch_is_stuck);
+  RUN_TEST(test_a_reading_that_rests_is_not_stuck_while_nothing_switches);
+  RUN_TEST(test_a_reading_that_moved_after_the_switch_may_rest);
+  RUN_TEST(test_two_failures_of_the_dac_are_borne_and_the_third_in_a_row_is_not);
+  RUN_TEST(test_a_monitor_that_is_not_connected_is_not_believed);
+  RUN_TEST(test_a_regulator_that_does_not_follow_is_found_and_one_that_takes_two_seconds_is_not);
+}
+
+}  // namespace
+
+void setUp() {}
+void tearDown() {}
+
+RUN_SUITE(run)
