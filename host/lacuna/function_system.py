@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from numbers import Real
 from typing import Any
 
@@ -28,6 +30,7 @@ from lacuna.system import (
 from lacuna.values import Values
 
 ESTIMATED = "estimated"
+_ONE_AT_A_TIME = threading.Lock()
 
 Simulate = Callable[[Record, Values], Any]
 
@@ -92,6 +95,8 @@ class FunctionSystem(System):
         self.simulate, self.name = simulate, name or getattr(simulate, "__name__", "system")
         self.outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
         self.trials: tuple[Record, ...] = ()
+        self._last: Any = None  # what `simulate` returned last
+        self._refills = False
         given, library, sites = tuple(parameters), _library(effects), tuple(curves)
         _check_names([p.name for p in given], "parameter")
         _check_names([e.name for e in library], "effect")
@@ -190,12 +195,34 @@ class FunctionSystem(System):
     def simulated(self, record: Record, values: Values) -> Any:
         """What `simulate` returns, of a stretch of a longer run its own samples."""
         if not isinstance(record.payload, Stretch):
-            return self.simulate(record, values)
+            return self.simulated_whole(record, values)
         whole = record.payload
-        found = self.simulate(whole.run, values)
+        found = self.simulated_whole(whole.run, values)
         if isinstance(found, Mapping):
             return {name: whole.of(column) for name, column in found.items()}
         return whole.of(found)
+
+    def simulated_whole(self, record: Record, values: Values) -> Any:
+        """What `simulate` returns, of copies and as a copy: it may return one array again and again, and is not to
+        write into what was measured. Raises MisuseError, with the column, where it does."""
+        given = _copied(record)
+        found = self._called(given, values)
+        if changed := _changed(record, given):
+            raise MisuseError(
+                f"trial {record.name}: simulate writes into {changed}, which it was given: the next call would find"
+                f' another. Let it work on a copy: record["{changed}"].copy().'
+            )
+        return found
+
+    def _called(self, record: Record, values: Values) -> Any:
+        """A model that fills one array of its own again and again is called by one thread at a time."""
+        if self._refills:
+            with _ONE_AT_A_TIME:
+                return _copy_all(self.simulate(record, values))
+        found = self.simulate(record, values)
+        self._refills = _shares(found, self._last)
+        self._last = found
+        return _copy_all(found)
 
     def run(self, record: Record, values: Values) -> Channels:
         """The result of `simulate`, in whatever form, as channels by name."""
@@ -294,6 +321,48 @@ class FunctionSystem(System):
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
         return self._experiments
+
+
+def _copy_all(found: Any) -> Any:
+    if isinstance(found, Mapping):
+        return {name: _copy(column) for name, column in found.items()}
+    return _copy(found)
+
+
+def _shares(found: Any, earlier: Any) -> bool:
+    """Whether two results of a model lie in the same memory."""
+    one, other = (list(f.values()) if isinstance(f, Mapping) else [f] for f in (found, earlier))
+    return any(
+        isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.may_share_memory(a, b)
+        for a in one
+        for b in other
+    )
+
+
+def _copy(column: Any) -> Any:
+    return column.copy() if isinstance(column, np.ndarray) else column
+
+
+def _copied(record: Record) -> Record:
+    inputs = {name: _copy(column) for name, column in record.inputs.items()}
+    channels = {name: _copy(column) for name, column in record.channels.items()}
+    return replace(record, time_s=_copy(record.time_s), inputs=inputs, channels=channels)
+
+
+def _changed(before: Record, after: Record) -> str | None:
+    """The name of a column whose samples are not what they were."""
+    if not _is_same(before.time_s, after.time_s):
+        return "time_s"
+    for old, new in ((before.inputs, after.inputs), (before.channels, after.channels)):
+        for name, column in old.items():
+            if not _is_same(column, new.get(name)):
+                return name
+    return None
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    """To the last bit, which is quick and knows NaN."""
+    return not isinstance(one, np.ndarray) or (isinstance(other, np.ndarray) and one.tobytes() == other.tobytes())
 
 
 def _library(effects: Iterable[Effect]) -> tuple[Effect, ...]:

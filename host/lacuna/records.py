@@ -6,18 +6,22 @@ import csv
 import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lacuna.decimals import number
 from lacuna.errors import LacunaError
 from lacuna.system import Record
 
-_TIMES = ("time_s", "time", "t", "t_s", "seconds")
+_TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # of a second
 _LABELS = ("name", "experiment", "condition", "order")
 _FEWEST = 8  # samples of a stretch
+_MOST_NAMED = 8  # columns in a message
+_TRUTHS = {"true": 1.0, "false": 0.0}
 
 
 class RecordError(LacunaError):
@@ -26,26 +30,29 @@ class RecordError(LacunaError):
 
 @dataclass(frozen=True)
 class Table:
-    """One record before it is known which of its columns are outputs. `labels`: of `_LABELS` those that it has."""
+    """One record before it is known which of its columns are outputs. `labels`: of `_LABELS` those that it has.
+    `clock`: the column that the times came from."""
 
     name: str
     time_s: np.ndarray
     columns: Mapping[str, Any]
     labels: Mapping[str, Any]
+    clock: str = ""
 
     def record(self, outputs: Sequence[str]) -> Record:
         """`outputs` become channels, all other columns inputs. Raises RecordError where one is missing."""
         for output in outputs:
             if output not in self.columns:
-                raise RecordError(f"record {self.name} has no column {output}; it has {', '.join(self.columns)}.")
+                raise RecordError(f"record {self.name} has no column {output}; it has {_listed(self.columns)}.")
         return Record(
             name=self.name,
             experiment=str(self.labels.get("experiment", "run")),
             condition=_plain(self.labels.get("condition", self.name)),
             time_s=self.time_s,
-            channels={name: _numbers(self.columns[name], self.name, name) for name in outputs},
+            channels={name: _samples(self.columns[name], self.name, name) for name in outputs},
             session_order=_whole(self.labels.get("order"), self.name),
             inputs={name: column for name, column in self.columns.items() if name not in outputs},
+            clock=self.clock,
         )
 
 
@@ -56,11 +63,13 @@ def read(data: Any) -> list[Record | Table]:
       DataFrame, an xarray Dataset (one dimension), or a `Record`,
     - a DataFrame with a column `name`, or an xarray Dataset with a second dimension, for many in one,
     - a folder: one CSV file per record, column names in its first line. Files that differ only by a number at the end
-      (`step_1.csv`, `step_2.csv`) are repeats of one condition, if no column `condition` says otherwise.
+      (`step_1.csv`, `step_2.csv`, numbered without a gap) are repeats of one condition, if no column `condition` says
+      otherwise. Hidden files are none of it.
 
-    A column `time_s` (or `time`, `t`; the index in pandas and xarray) holds seconds. Single values per record, and what
-    is called `condition` (records with an equal one are repeats), `experiment`, `order` (its place in the day), may
-    be among the columns or in `attrs`. Raises RecordError.
+    A column `time_s` (or `time`, `t`; the index in pandas and xarray) holds seconds, `time_ms` and `time_us` what they
+    say, or it holds dates. Single values per record, and what is called `condition` (records with an equal one are
+    repeats), `experiment`, `order` (its place in the day), may be among the columns or in `attrs`. Columns are copied:
+    what is missing or masked is NaN, true and false are 1 and 0. Raises RecordError.
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
@@ -71,7 +80,7 @@ def read(data: Any) -> list[Record | Table]:
     if isinstance(data, Mapping):
         if data and all(isinstance(column, np.ndarray) for column in data.values()):
             raise RecordError(
-                f"a record of {', '.join(map(str, data))} has no times: give a column time_s, in seconds (of static"
+                f"a record of {_listed(data)} has no times: give a column time_s, in seconds (of static"
                 " data the number of the row)."
             )
         return [_table(one, str(name)) for name, one in data.items()]
@@ -105,6 +114,11 @@ def _is_xarray(data: Any) -> bool:
 def _parts(data: Any) -> list[tuple[str, Any]]:
     """A table that holds many records, one at a time."""
     if _is_pandas(data) and "name" in data.columns:
+        if (missing := data["name"].isna().to_numpy()).any():
+            row = int(np.flatnonzero(missing)[0])
+            raise RecordError(
+                f"row {row} (counted from 0) has no name: which record is it of? Fill in the column name."
+            )
         return [(str(name), part) for name, part in data.groupby("name", sort=False)]
     if _is_xarray(data) and len(data.sizes) == 2:
         along = next((d for d in data.sizes if d not in _TIMES), next(iter(data.sizes)))
@@ -120,21 +134,28 @@ def _table(data: Any, name: str) -> Record | Table:
     for label in _LABELS:
         if label in columns:
             labels[label] = _single(columns.pop(label), name, label)
-    time_name = next((t for t in _TIMES if t in columns), None)
-    if time_name is not None:
-        time_s = columns.pop(time_name)
+    clock = next((t for t in _TIMES if t in columns), "")
+    if clock:
+        time_s = columns.pop(clock)
     if time_s is None:
-        raise RecordError(f"record {name} has no times: give a column time_s, in seconds. It has {', '.join(columns)}.")
+        raise RecordError(f"record {name} has no times: give a column time_s, in seconds. It has {_listed(columns)}.")
     name = str(labels.get("name", name))
-    return Table(name, _seconds(time_s, name), {n: _array(c) for n, c in columns.items()}, labels)
+    inputs = {n: _own(c, name, n) for n, c in columns.items()}
+    return Table(name, _seconds(time_s, name) / _TIMES.get(clock, 1), inputs, labels, clock)
 
 
 def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
     """Columns, labels, and what the index says of time."""
     if _is_pandas(data):
-        columns = {str(c): data[c].to_numpy() for c in data.columns}
-        own_index = data.index.name in _TIMES or data.index.dtype.kind in "mM"
-        return columns, dict(data.attrs), data.index.to_numpy() if own_index else None
+        names = [str(c) for c in data.columns]
+        if twice := [n for n in names if names.count(n) > 1]:
+            raise RecordError(f"record {name} has more than one column {twice[0]!r}: give each its own name.")
+        columns = {str(c): _of_series(data[c]) for c in data.columns}
+        index = data.index
+        if index.name in _TIMES and index.name not in columns:
+            columns[index.name] = _of_series(index.to_series())
+        dated = index.dtype.kind in "mM" or getattr(index.dtype, "tz", None) is not None
+        return columns, dict(data.attrs), _of_series(index.to_series()) if dated else None
     if _is_xarray(data):
         columns = {str(c): data[c].values for c in [*data.data_vars, *data.coords]}
         return columns, dict(data.attrs), None
@@ -143,31 +164,81 @@ def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]
     raise RecordError(f"record {name} is a {type(data).__name__}: give a mapping of columns, or a table.")
 
 
-def _array(column: Any) -> Any:
-    return column if callable(column) or np.ndim(column) == 0 else np.asarray(column)
+def _of_series(column: Any) -> np.ndarray:
+    """A column of pandas; times of a zone as those of UTC."""
+    zoned = getattr(column.dtype, "tz", None) is not None
+    return (column.dt.tz_convert(None) if zoned else column).to_numpy()
 
 
-def _numbers(column: Any, record: str, name: str) -> np.ndarray:
+def _own(column: Any, record: str, name: str) -> Any:
+    """What a model is given under a name: samples, a single value as it is, or a function."""
+    if callable(column):
+        return column
+    if np.ndim(column) == 0:
+        return _TRUTHS.get(column.lower(), column) if isinstance(column, str) else column
+    return _samples(column, record, name)
+
+
+def _samples(column: Any, record: str, name: str) -> np.ndarray:
+    """Numbers in an array of the record's own: nobody else's are changed where a model writes into it."""
+    if isinstance(column, np.ma.MaskedArray):
+        column = column.astype(float if column.dtype.kind in "fiub" else object).filled(np.nan)
+    column = np.asarray(column)
+    if column.dtype.kind in "fiuc":
+        return np.array(column)
+    cells = [_of_cell(cell) for cell in column.ravel()]
+    if None in cells:
+        at = cells.index(None)
+        seconds = "; count seconds from its start" if name in _TIMES else ""
+        raise RecordError(
+            f"record {record}, sample {at}: column {name} is not all numbers: {column.ravel()[at]!r}{seconds}. A model"
+            " computes with numbers: write some, or leave the column out."
+        )
+    return np.array(cells, float).reshape(column.shape)
+
+
+def _of_cell(cell: Any) -> float | None:
+    """A number, NaN for what is missing; None for what is no number."""
+    if _is_missing(cell):
+        return np.nan
+    if isinstance(cell, str):
+        return _TRUTHS.get(cell.strip().lower(), number(cell)) if cell.strip() else np.nan
     try:
-        return np.asarray(column, float)
+        return float(cell)
     except (TypeError, ValueError):
-        seconds = "; count seconds from its start" if name == "time" else ""
-        raise RecordError(f"record {record}: column {name} is not all numbers{seconds}.") from None
+        return None
+
+
+def _is_missing(cell: Any) -> bool:
+    return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
 
 
 def _seconds(time: Any, name: str) -> np.ndarray:
-    """Seconds; dates and durations count from the first."""
-    time = np.asarray(time)
-    if time.dtype.kind in "mM":
-        return (time - time[0]) / np.timedelta64(1, "s")
-    return _numbers(time, name, "time")
+    """Dates and durations count from the first; of a zone they need not be."""
+    dates = np.asarray(time)
+    if dates.dtype == object and len(dates) and all(isinstance(date, datetime) for date in dates):
+        return np.array([(date - dates[0]).total_seconds() for date in dates])
+    if dates.dtype.kind in "mM":
+        return (dates - dates[0]) / np.timedelta64(1, "s")
+    return _samples(time, name, "time").astype(float)
 
 
 def _single(column: Any, record: str, label: str) -> Any:
-    values = np.unique(np.asarray(column))
-    if len(values) != 1:
+    cells = np.asarray(column).ravel()
+    if missing := [at for at, cell in enumerate(cells) if _is_missing(cell)]:
+        raise RecordError(
+            f"record {record}, sample {missing[0]}: its {label} is missing; every sample has the same one."
+        )
+    if len(set(cells.tolist())) != 1:
         raise RecordError(f"record {record}: its {label} differs from sample to sample; it must have one.")
-    return values[0]
+    return cells[0]
+
+
+def _listed(names: Iterable[Any]) -> str:
+    """The first names, and how many more there are."""
+    names = [str(name) for name in names]
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return ", ".join(names[:_MOST_NAMED]) + more
 
 
 def _plain(label: Any) -> Hashable:
@@ -188,10 +259,42 @@ def _folder(folder: Path) -> list[Record | Table]:
         return [_csv(folder)]
     if not folder.exists():
         raise RecordError(f"{folder}: no such folder.")
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".csv" and file.is_file())
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() == ".csv" and _is_listed(file))
     if not files:
         raise RecordError(f"{folder} holds no CSV files.")
-    return [_csv(file) for file in files]
+    tables = {file.stem: _csv(file) for file in files}
+    _refuse_settings({stem: table for stem, table in tables.items() if table.labels["condition"] == _stem(stem)[0]})
+    return list(tables.values())
+
+
+def _is_listed(file: Path) -> bool:
+    """Not what an operating system or an office program leaves behind (._x.csv, ~$x.csv)."""
+    return file.is_file() and not file.name.startswith((".", "~$"))
+
+
+def _stem(stem: str) -> tuple[str, int | None]:
+    """A file's name without a number at its end, and that number."""
+    found = re.fullmatch(r"(.*?)[ _-]?([0-9]+)", stem)
+    return (found[1] or stem, int(found[2])) if found else (stem, None)
+
+
+def _refuse_settings(tables: Mapping[str, Table]) -> None:
+    """Names that differ by a number are taken for repeats; a number that does not count them may well be a setting,
+    whose effect would pass for noise. Raises RecordError."""
+    numbers: dict[str, list[int]] = {}
+    for stem in tables:
+        condition, count = _stem(stem)
+        if count is not None:
+            numbers.setdefault(condition, []).append(count)
+    for condition, found in numbers.items():
+        found.sort()
+        if len(found) > 1 and found not in (list(range(len(found))), list(range(1, len(found) + 1))):
+            raise RecordError(
+                f"{condition}: files whose names differ only by a number at the end are taken for repeats, and these"
+                f" are numbered {_listed(found)}, not 1 to {len(found)}. If the number is a setting, give each file a"
+                " column `condition` of its own, and the setting a column; if they are repeats, give all the same"
+                " `condition`, or number them without a gap."
+            )
 
 
 def _csv(file: Path) -> Table:
@@ -200,17 +303,19 @@ def _csv(file: Path) -> Table:
     for mark, what in ((";", "semicolons"), ("\t", "tabs")):
         if len(names) == 1 and mark in names[0]:
             raise RecordError(f"{file.name} separates its columns by {what}: separate them by commas.")
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
     if not rows:
         raise RecordError(f"{file.name} has no rows below the names of its columns.")
+    widths = {len(row) for _, row in rows}
     for line, row in rows:
         if len(row) != len(names):
-            raise RecordError(f"{file.name}, line {line}: {len(row)} values for {len(names)} columns.")
+            above = len(widths) == 1 or max(widths) > len(names)
+            preamble = " If the names stand further down, remove the lines above them." if above else ""
+            raise RecordError(f"{file.name}, line {line}: {len(row)} values for {len(names)} columns.{preamble}")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
     lines, cells = [line for line, _ in rows], zip(*(row for _, row in rows), strict=True)
     columns = {name: _typed(column, file, lines, name) for name, column in zip(names, cells, strict=True)}
-    condition = re.sub(r"[ _-]?\d+$", "", file.stem) or file.stem
-    return _table({"condition": condition} | columns, file.stem)
+    return _table({"condition": _stem(file.stem)[0]} | columns, file.stem)
 
 
 def _lines(file: Path) -> list[tuple[int, list[str]]]:
@@ -219,15 +324,37 @@ def _lines(file: Path) -> list[tuple[int, list[str]]]:
         with file.open(newline="", encoding="utf-8-sig") as lines:  # a spreadsheet begins its files with a mark
             reader = csv.reader(lines, skipinitialspace=True)
             written = [(reader.line_num, row) for row in reader if "".join(row)]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordError(f"{file.name} is not a table of text in UTF-8: {error}") from None
-    found = [(line, row) for line, row in written if not row[0].startswith("#")]
+    except UnicodeDecodeError:
+        raise RecordError(_encoding(file)) from None
+    except csv.Error as error:
+        raise RecordError(f"{file.name} is no table of text: {error}") from None
+    width = max((len(row) for _, row in written if not row[0].startswith("#")), default=0)
+    found = [(line, row) for line, row in written if not _is_remark(row, width)]
     if not found:
         raise RecordError(f"{file.name} is empty.")
     first, cells = found[0]
     if all(_number(value) is not None for cell in cells for value in cell.split()):
         return [_names_in_remark([row for line, row in written if line < first], cells, file, first), *found]
     return found
+
+
+def _encoding(file: Path) -> str:
+    """Where a file stops to be UTF-8, and what to do."""
+    raw = file.read_bytes()
+    try:
+        raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        found = f"byte 0x{raw[error.start]:02x} is not UTF-8"
+    return (
+        f"{file.name}, line {line}: {found}; save it as UTF-8 text (what begins with 0xff or 0xfe is UTF-16, as"
+        " spreadsheets write it), or read it with pandas, read_csv(..., encoding=...), and give the table."
+    )
+
+
+def _is_remark(row: Sequence[str], width: int) -> bool:
+    """Not what a spreadsheet writes where it has no number (#N/A, #VALUE!), which is a row like the others."""
+    return row[0].startswith("#") and not (len(row) == width > 1 and re.fullmatch(r"#[A-Z/0-9]+[!?]?", row[0].strip()))
 
 
 def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path, line: int) -> tuple[int, list[str]]:
@@ -243,26 +370,23 @@ def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path,
 
 
 def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:
-    """Numbers, NaN where a cell is empty; or text, of labels and where there is no number."""
+    """Numbers, NaN where a cell is empty, 1 and 0 where it is true or false; of labels it may be text."""
     values = [_number(cell) for cell in cells]
     if None not in values:
         return np.array(values)
-    at = values.index(None)
-    where = f"{file.name}, line {lines[at]}, column {name}: {cells[at]!r}"
     if name in _LABELS:
         return np.array(cells)
+    at = values.index(None)
+    where = f"{file.name}, line {lines[at]}, column {name}: {cells[at]!r}"
     if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cells[at]):
         raise RecordError(f"{where} has a decimal comma: write numbers with a point.")
     if not any(value is not None and np.isfinite(value) for value in values):
-        return np.array(cells)
+        raise RecordError(f"{where} is text, not a number: write numbers, or leave the column out.")
     raise RecordError(f"{where} is not a number.")
 
 
 def _number(cell: str) -> float | None:
-    try:
-        return float(cell) if cell.strip() else np.nan
-    except ValueError:
-        return None
+    return _of_cell(cell)
 
 
 # -- one long record ------------------------------------------------------------------------------------------

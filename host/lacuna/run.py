@@ -112,7 +112,9 @@ def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     run = record.payload.run if record.payload else record
     theta = {p.name: p.value for p in (*system.parameters, *system.nuisances(record))}
     try:
-        found = system.simulate(run, system.values(theta))
+        found = system.simulated_whole(run, system.values(theta))
+    except MisuseError:
+        raise
     except Exception as error:
         raise MisuseError(f"trial {record.name}: the model raises {type(error).__name__}: {error}") from error
     if isinstance(found, Mapping):

@@ -132,7 +132,7 @@ class Record:
     missing. `time_s` has shape (n,). Trials with an equal `condition` are repeats of one another: the noise
     floor comes from them. `session_order` is the trial's position in the day, None if not known. `inputs`: quantities
     that were applied rather than predicted, by name: arrays of shape (n,) and single values. `payload` is for the
-    system's own use.
+    system's own use. `clock`: the name that the times had where they were read.
     """
 
     name: str
@@ -143,6 +143,7 @@ class Record:
     session_order: int | None = None
     payload: Any = None
     inputs: Mapping[str, Any] = field(default_factory=dict)
+    clock: str = ""
 
     def __getitem__(self, name: str) -> Any:
         """An input or else a measured channel; KeyError says what there is."""

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from lacuna.check.model import initial, predicted
-from lacuna.check.numbers import SAME, differ, spread
+from lacuna.check.numbers import SAME, differ, listed, spread
 from lacuna.errors import MisuseError
 from lacuna.system import Channels, Record, System, groups_of_repeats
 
 _OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
+_GOOD_PART = 0.25  # of a channel's spread, RMS, that repeats differ by
+_FAR_MORE = 20.0  # times their own fast noise
 _UNLIKE = 10.0  # times what repeats differ by as a rule, RMS: one that is as far from all others was recorded otherwise
 
 
@@ -81,6 +83,34 @@ def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
         for k, (group, differences) in enumerate(zip(members, apart, strict=True)):
             elsewhere = [value for j, d in enumerate(apart) if j != k for value in _pairs(d)]
             yield from _unlike(group, channel, differences, float(np.median(elsewhere)) if elsewhere else 0.0)
+
+
+def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[str]:
+    """A warning of the worst group of repeats that differ by a good part of their range, and far more than each is
+    noisy, where nothing is declared to vary from run to run: a setting that is part of their names, say."""
+    found = []
+    for group in groups_of_repeats(trials):
+        if len(group) < 2 or any(system.nuisances(trial) for trial in group):
+            continue
+        for channel in group[0].channels:
+            between = float(np.median(_pairs(_apart(group, channel))))
+            within = float(np.median([_fast_noise(trial.channels[channel]) for trial in group]))
+            size = max(spread(trial.channels[channel]) for trial in group)
+            if between > max(_GOOD_PART * size, _FAR_MORE * within):
+                found.append((between / size, between, within, channel, group))
+    if found:
+        _, between, within, channel, group = max(found, key=lambda one: one[0])
+        yield (
+            f"{listed([trial.name for trial in group])} are taken for repeats, but differ in {channel} by {between:.3g}"
+            f" (RMS), where each scatters by {within:.2g}: if something was set otherwise in them, give each its own"
+            " condition. What repeats differ by is taken for noise."
+        )
+
+
+def _fast_noise(column: np.ndarray) -> float:
+    """What is noise from sample to sample, by second differences."""
+    known = column[np.isfinite(column)]
+    return float(np.median(np.abs(np.diff(known, 2))) / (0.6745 * np.sqrt(6.0))) if len(known) > 2 else 0.0
 
 
 def not_declared(trials: Sequence[Record]) -> Iterator[str]:

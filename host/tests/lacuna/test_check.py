@@ -293,11 +293,11 @@ def test_refuses_regressors_that_are_no_samples():
         check(with_records(single, heater.records(2)))
 
 
-def test_words_among_the_inputs_do_no_harm():
+def test_refuses_words_among_the_inputs():
     given = heater.records(2)
-    for one in given.values():
-        one["note"] = np.full(len(one["time_s"]), "windy")
-    check(with_records(heater.system(), given))
+    given["steps_4W_1"]["note"] = np.full(len(given["steps_4W_1"]["time_s"]), "windy")
+    with pytest.raises(RecordError, match=r"record steps_4W_1, sample 0: column note .*windy.*leave the column out"):
+        check(with_records(heater.system(), given))
 
 
 def test_refuses_a_csv_that_is_no_table(tmp_path):
@@ -394,3 +394,86 @@ def test_warns_of_an_input_with_a_gap():
     said = check(with_records(heater.system(), given))
     assert len(said) >= len(given)
     assert all("input outside_C: no number at sample 7" in sentence for sentence in said[: len(given)])
+
+
+# -- clocks, repeats and arrays ---------------------------------------------------------------------------------
+
+
+def counted(name, factor=1000.0):
+    """The records with their times under another name, multiplied."""
+    found = heater.records(2)
+    for one in found.values():
+        one[name] = one.pop("time_s") * factor
+    return found
+
+
+def test_milliseconds_for_seconds_are_pointed_out():
+    said = check(with_records(heater.system(), counted("time")))
+    assert any("samples are 500 s apart, and the longest time of the model is 12 s" in one for one in said)
+    assert any("call it time_ms" in one for one in said)
+    for name, factor in (("time", 1.0), ("time_ms", 1000.0)):
+        assert not check(with_records(heater.system(), counted(name, factor)))
+
+
+def test_milliseconds_are_pointed_out_where_no_parameter_is_a_time():
+    records = {f"{k}": {"time": np.arange(0, 2000, 10), "y": DRAW.standard_normal(200)} for k in range(4)}
+    system = lacuna.System(lambda record, theta: theta.gain * record.time_s, [Parameter("gain", "", 1.0, 0.0, 2.0)])
+    (said,) = check(with_records(system, records))
+    assert "10 s apart, all of them whole numbers" in said
+
+
+def test_which_of_two_clocks_was_taken_is_said():
+    given = heater.records(2)
+    for one in given.values():
+        one["t"] = np.arange(len(one["time_s"]))
+    said = check(with_records(heater.system(), given))
+    assert any("times were taken from its column time_s; t is an input" in one for one in said)
+
+
+def test_repeats_that_differ_by_a_setting_are_pointed_out():
+    system = lacuna.System(lambda record, theta: theta.gain * record.time_s, [Parameter("gain", "", 1.0, 0.0, 9.0)])
+
+    def days(gains):
+        return {
+            f"{k}": {"time_s": T, "y": g * T + 0.01 * DRAW.standard_normal(101), "condition": "pull"}
+            for k, g in enumerate(gains)
+        }
+
+    (said,) = check(with_records(system, days((1.0, 2.0, 3.0))))
+    assert "0, 1, 2 are taken for repeats, but differ in y by" in said
+    assert not check(with_records(system, days((1.0, 1.02, 0.99))))
+
+
+@pytest.mark.parametrize("column", ["power_W", "temperature_K", "time_s"])
+def test_a_model_that_writes_into_what_it_is_given_is_told_the_column(column):
+    def careless(record, theta):
+        found = {"temperature_K": theta.gain_K_W * record["power_W"]}
+        samples = record.time_s if column == "time_s" else record[column]
+        samples *= 2.0
+        return found
+
+    given = heater.records(2)
+    before = {name: {key: np.copy(values) for key, values in one.items()} for name, one in given.items()}
+    system = lacuna.System(careless, heater.PARAMETERS, outputs="temperature_K")
+    with pytest.raises(MisuseError, match=f"simulate writes into {column}.*copy"):
+        check(with_records(system, given))
+    for name, one in before.items():
+        for key, values in one.items():
+            assert np.array_equal(given[name][key], values)
+
+
+def test_a_model_may_return_one_array_again_and_again():
+    """Nor do threads of a search write into it at a time."""
+    kept = np.empty(len(heater.TIME_S))
+
+    def thrifty(record, theta):
+        kept[:] = heater.simulate(record, theta)["temperature_K"]
+        return kept
+
+    given = heater.records(2, sensor_lag__lag_s=6.0)
+    found = []
+    for one in (heater.simulate, thrifty):
+        system = lacuna.System(one, heater.PARAMETERS, _all(), outputs="temperature_K")
+        found.append(lacuna.diagnose(system, given, progress=False))
+    assert found[0].record["verdict"] == found[1].record["verdict"] == "identified"
+    assert found[0].theta == found[1].theta

@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from lacuna.decimals import decimal
 from lacuna.records import RecordError, Table, read, segments, windows
 
 ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
@@ -49,10 +52,11 @@ def test_numbers_without_names_are_refused_with_how_to_write_them(tmp_path, rema
         read(write(tmp_path, "a.csv", text))
 
 
-def test_an_empty_cell_is_a_missing_sample_and_a_column_of_words_an_input(tmp_path):
-    (one,) = read(write(tmp_path, "a.csv", "time_s,y,who\n0,1,Ann\n1,,Bob\n"))
+def test_an_empty_cell_is_a_missing_sample_and_words_are_no_input(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", "time_s,y\n0,1\n1,\n"))
     assert np.isnan(one.columns["y"]).tolist() == [False, True]
-    assert one.columns["who"].tolist() == ["Ann", "Bob"]
+    with pytest.raises(RecordError, match=r"a\.csv, line 2, column who: 'Ann' is text.*leave the column out"):
+        read(write(tmp_path, "a.csv", "time_s,y,who\n0,1,Ann\n1,,Bob\n"))
 
 
 @pytest.mark.parametrize(
@@ -107,3 +111,152 @@ def test_parts_of_several_runs_go_together_by_the_runs_names():
 def test_arrays_without_times_are_one_record_without_times():
     with pytest.raises(RecordError, match="a record of y, u has no times: give a column time_s"):
         read({"y": np.zeros(9), "u": np.zeros(9)})
+
+
+# -- numbers ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cell", ["1_5", "１５", "٣", "0x10", "1e5_0", "५"])
+def test_only_plain_decimals_are_numbers(tmp_path, cell):
+    with pytest.raises(RecordError, match=r"a\.csv, line 3, column y: .* is not a number"):
+        read(write(tmp_path, "a.csv", f"time_s,y\n0,1\n1,{cell}\n", encoding="utf-8"))
+    with pytest.raises(RecordError, match="record record 1, sample 1: column y is not all numbers"):
+        read({"time_s": [0.0, 1.0], "y": ["1", cell]})
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_any_decimal_reads_back_as_python_wrote_it(value):
+    assert decimal(repr(value)) == value == decimal(f" {value!r}\t")
+
+
+@given(st.text(max_size=8))
+def test_what_is_no_plain_decimal_is_no_number(text):
+    assert decimal(text) is None or set(text.strip(" \t")) <= set("0123456789+-.eE")
+
+
+def test_truths_are_one_and_zero_and_other_text_is_refused_by_its_cell(tmp_path):
+    (one,) = read(write(tmp_path, "a.csv", "time_s,y,valve\n0,1,True\n1,2,False\n2,3,true\n"))
+    assert one.columns["valve"].tolist() == [1.0, 0.0, 1.0]
+    (one,) = read({"time_s": [0.0, 1.0], "y": [1.0, 2.0], "valve": np.array([True, False]), "on": ["True", "False"]})
+    assert one.columns["valve"].tolist() == one.columns["on"].tolist() == [1.0, 0.0]
+    assert one.columns["valve"].dtype == float
+    with pytest.raises(RecordError, match=r"a\.csv, line 3, column valve: 'open' is"):
+        read(write(tmp_path, "a.csv", "time_s,y,valve\n0,1,0\n1,2,open\n"))
+    with pytest.raises(RecordError, match=r"line 2, column force: '1,000.5' is"):
+        read(write(tmp_path, "a.csv", 'time_s,y,force\n0,1,"1,000.5"\n1,2,"1,200.5"\n'))
+    with pytest.raises(RecordError, match=r"sample 0: column force is not all numbers: .*1,000\.5"):
+        read({"time_s": [0.0, 1.0], "y": [1.0, 2.0], "force": ["1,000.5", "2"]})
+
+
+def test_what_a_spreadsheet_could_not_compute_is_no_remark(tmp_path):
+    with pytest.raises(RecordError, match=r"a\.csv, line 3, column time_s: '#N/A' is not a number"):
+        read(write(tmp_path, "a.csv", "time_s,y\n0,1\n#N/A,2\n2,3\n"))
+    with pytest.raises(RecordError, match=r"line 3, column time_s: '#DIV/0!'"):
+        read(write(tmp_path, "a.csv", "time_s,y\n0,1\n#DIV/0!,2\n2,3\n"))
+
+
+# -- names of files ----------------------------------------------------------------------------------------------
+
+
+def numbered(folder, stem, numbers):
+    for number in numbers:
+        write(folder, f"{stem}_{number}.csv", f"time_s,y\n{ROWS}\n")
+    return folder
+
+
+@pytest.mark.parametrize("numbers", [(4, 5, 6, 7, 8), (1, 2, 4), (10, 20), (0, 2)])
+def test_numbers_that_do_not_count_repeats_may_be_settings(tmp_path, numbers):
+    said = rf"step: .*numbered {numbers[0]}, .*not 1 to {len(numbers)}.*column `condition`"
+    with pytest.raises(RecordError, match=said):
+        read(numbered(tmp_path, "step", numbers))
+
+
+@pytest.mark.parametrize("numbers", [("1", "2", "3"), ("0", "1"), ("01", "02"), ("7",)])
+def test_numbers_that_count_make_repeats(tmp_path, numbers):
+    assert {table.labels["condition"] for table in read(numbered(tmp_path, "step", numbers))} == {"step"}
+
+
+def test_a_column_says_what_numbers_are(tmp_path):
+    for bar in (4, 6):
+        rows = "\n".join(f"{k},{k * k},{bar} bar" for k in range(10))
+        write(tmp_path, f"step_{bar}.csv", f"time_s,y,condition\n{rows}\n")
+    assert [table.labels["condition"] for table in read(tmp_path)] == ["4 bar", "6 bar"]
+
+
+def test_what_systems_and_office_programs_leave_is_no_record(tmp_path):
+    numbered(tmp_path, "step", (1, 2))
+    for stray in ("._step_1.csv", ".~lock.step_1.csv#", "~$step_1.csv", ".DS_Store", "Thumbs.db"):
+        (tmp_path / stray).write_bytes(b"\x00\x05\x16\x07")
+    assert [table.name for table in read(tmp_path)] == ["step_1", "step_2"]
+
+
+# -- messages ------------------------------------------------------------------------------------------------------
+
+
+def test_lines_above_the_names_are_called_that(tmp_path):
+    with pytest.raises(RecordError, match=r"line 3: 3 values for 2 columns\. If the names stand further down, remove"):
+        read(write(tmp_path, "a.csv", "Test,today\nUnits,mm\ntime_s,y,u\n0,1,2\n"))
+
+
+def test_another_encoding_is_named_with_its_line(tmp_path):
+    (tmp_path / "a.csv").write_bytes("time_s,y\n0,1\n1,2µ\n".encode("latin-1"))
+    with pytest.raises(RecordError, match=r"a\.csv, line 3: byte 0xb5 is not UTF-8; save it as UTF-8"):
+        read(tmp_path)
+
+
+def test_many_columns_are_not_all_listed():
+    (one,) = read({"time_s": np.arange(9.0)} | {f"c{k}": np.arange(9.0) for k in range(150)})
+    with pytest.raises(RecordError, match=r"it has c0, .*c7 and 142 more"):
+        one.record(["y"])
+
+
+# -- arrays and tables -----------------------------------------------------------------------------------------------
+
+
+def test_what_is_masked_is_missing():
+    force = np.ma.array([1.0, 99.0, 3.0], mask=[False, True, False])
+    count = np.ma.array([1, 99, 3], mask=[False, True, False])
+    (one,) = read({"time_s": np.arange(3.0), "y": force, "n": count})
+    for column in one.columns.values():
+        assert np.isnan(column).tolist() == [False, True, False]
+    assert np.isnan(one.record(["y"]).channels["y"]).tolist() == [False, True, False]
+
+
+def test_missing_labels_are_asked_for():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"time_s": [0.0, 1.0, 0.0, 1.0], "y": [1.0, 2.0, 3.0, 4.0]})
+    with pytest.raises(RecordError, match=r"row 3 .*has no name"):
+        read(table.assign(name=["a", "a", "b", None]))
+    for missing in (None, float("nan"), pandas.NA):
+        with pytest.raises(RecordError, match="record a, sample 1: its condition is missing"):
+            read(table[:2].assign(name="a", condition=["warm", missing]))
+
+
+def test_times_of_a_zone_are_times():
+    pandas = pytest.importorskip("pandas")
+    when = pandas.date_range("2026-11-25 10:00", periods=3, freq="500ms", tz="Europe/Berlin")
+    table = pandas.DataFrame({"y": [1.0, 2.0, 3.0]})
+    for dated in (table.assign(time=when), table.set_index(when), table.assign(time=when.tz_convert(None))):
+        assert read(dated)[0].time_s.tolist() == [0.0, 0.5, 1.0]
+    (one,) = read({"time": when.to_pydatetime(), "y": np.arange(3.0)})
+    assert one.time_s.tolist() == [0.0, 0.5, 1.0]
+
+
+def test_a_time_that_says_milliseconds_is_taken_for_that():
+    (one,) = read({"time_ms": np.array([0, 10, 70]), "y": np.arange(3.0)})
+    assert one.time_s.tolist() == [0.0, 0.01, 0.07]
+    assert one.clock == "time_ms"
+
+
+def test_columns_are_the_records_own_and_may_be_written_into():
+    pandas = pytest.importorskip("pandas")
+    mine = np.arange(9.0)
+    mine.flags.writeable = False
+    (one,) = read({"time_s": mine, "y": mine, "u": mine})
+    for column in (one.time_s, one.columns["y"], one.record(["y"]).channels["y"], one.record(["y"]).inputs["u"]):
+        assert column.flags.writeable
+        assert not np.shares_memory(column, mine)
+    table = pandas.DataFrame({"time_s": np.arange(9.0), "y": np.arange(9.0)})
+    (one,) = read(table)
+    one.columns["y"][:] = -1.0
+    assert table["y"].tolist() == list(range(9))
