@@ -124,8 +124,20 @@ def _report(console, measured, found, json: Path | None, model: Path | None, pag
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:
-        write_page(diagnosis_page(measured.name, record, labels), page)
+        write_page(diagnosis_page(measured.name, record, labels, _curves(found, labels)), page)
         console.print(f"report: {page}", highlight=False)
+
+
+def _curves(found, labels):
+    """Held-out trials as measured, and as the base model and the completed one predict them."""
+    from bifa.report.compared_curves import compared_curves
+    from bifa.report.evidence import BASE, COMPLETED
+    from lacuna.estimation.fit import evaluate_on
+
+    trials = found.split.held_out
+    models = {BASE: found.base} | ({} if found.verdict == "none" else {COMPLETED: found.final})
+    predictions = {name: evaluate_on(fit, trials).predictions() for name, fit in models.items()}
+    return compared_curves(trials, predictions, labels)
 
 
 def _rigs(measured, port: str | None, console, watch: Path | None, progress):

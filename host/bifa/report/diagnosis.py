@@ -12,10 +12,13 @@ from bifa.report.words import (
     effect_words,
     experiment_words,
     gait_words,
+    parameter_words,
+    plain,
     quantity,
     spoken,
     unit_of,
 )
+from bifa.robot.parameters import BASE_PARAMETERS
 from lacuna.report.sentence import own_form
 from lacuna.report.sentence import verdict_sentence as engine_sentence
 
@@ -24,6 +27,9 @@ COMPLETED_MODEL = "The completed model includes the effects that were found, and
 RMS = "Errors are measured minus predicted, as root mean square (RMS)."
 RESIDUAL = "A residual is the measurement minus the prediction."
 NOISE_FLOOR = "The noise floor is how much runs of the same condition differ: no model can predict better."
+LOWERED = (
+    "Where a named effect explains part of that (a ripple, with another phase in every run), the floor is lowered."
+)
 HELD_OUT = "Held-out trials were measured, but neither model was fitted to them."
 
 Labels = Mapping[str, str]
@@ -36,14 +42,17 @@ def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remaind
     )
 
 
-def diagnosis_page(name: str, record: Mapping[str, Any], labels: Labels | None = None) -> Page:
-    """The page for a record of `bifa diagnose --json`; `labels`: what trials are called, by file."""
+def diagnosis_page(
+    name: str, record: Mapping[str, Any], labels: Labels | None = None, curves: Sequence[Section] = ()
+) -> Page:
+    """The page for a record of `bifa diagnose --json`; `labels`: what trials are called, by file; `curves`: sections
+    with what was measured beside what the models predict."""
     effects = record["effects"]
     return Page(
         f"Diagnosis of {name}",
         verdict_sentence(record["verdict"], effects, record["remainder"]),
-        lacking(record, labels) + further(record, labels),
-        (f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {HELD_OUT}",),
+        [*lacking(record, labels), *further(record, labels), *curves],
+        (f"{BASE_MODEL} {COMPLETED_MODEL} {RMS} {NOISE_FLOOR} {LOWERED} {HELD_OUT}",),
         (noise_table(record["error"]),),
     )
 
@@ -86,6 +95,8 @@ def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Sec
         sections.append(Section("Learnt from the data", said, charts=[learnt_chart(c) for c in record["learnt"]]))
     if record["effects"]:
         sections.append(Section("What the named effects leave", (spoken(record["remainder"]["text"], labels),)))
+    if base := base_table(record):
+        sections.append(Section("Parameters of the base model", tables=(base,)))
     if tried := nearest_table(record):
         sections.append(Section("Also tried", tables=(tried,)))
     if record["warnings"]:
@@ -112,6 +123,16 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
             rows.append(row + ([quantity(true[key], unit, 3) if key in true else "absent"] if truth else []))
     columns = ["", "found", "90 % interval", *(["sealed value"] if truth is not None else [])]
     return Table(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
+
+
+def base_table(record: Mapping[str, Any]) -> Table | None:
+    """The base model's parameters, fitted in company of the named effects; none where the data remain unexplained."""
+    rows = []
+    for name, one in record["base_parameters"].items():
+        if name in BASE_PARAMETERS:  # not the coefficients of a curve's shape
+            ends = "" if None in one["interval_90"] else " to ".join(plain(end, 4) for end in one["interval_90"])
+            rows.append((parameter_words(name), plain(one["value"], 4), ends, BASE_PARAMETERS[name].unit))
+    return Table(("", "value", "90 % interval", "unit"), rows) if rows else None
 
 
 def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:

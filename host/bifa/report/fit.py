@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from bifa.identify.identification import Identification
-from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
-from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
+from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
 from bifa.report.identification_remarks import AS_NOISE, remarks
@@ -20,11 +17,11 @@ from bifa.report.words import (
     spoken,
     unit_of,
 )
-from lacuna.system import Channels, Record
 
-MEASURED = "measured"
-_TITLES = {STATIC: "Static loading", STEP: "Step responses", ANCHOR: "Anchor pulls", WALK: "Walks"}
-_KEYS = (Key(MEASURED, "measured"), Key(BASE, "before", "dashed"))
+_OF_REPEATS = (
+    "Here it holds all that differs from run to run, also what an effect would explain (a ripple, its phase another in "
+    "every run); a diagnosis takes that out of it, so that its ratios are larger."
+)
 
 
 def fit_page(found: Identification) -> Page:
@@ -39,17 +36,12 @@ def fit_page(found: Identification) -> Page:
     )
     counted = f"{len(found.intervals)} parameters were fitted to {len(dataset.trials)} trials."
     labels = {trial.file: trial.label for trial in dataset.trials}
-    pairs = list(zip(found.fit.problem.trials, found.fit.predictions(), strict=True))
-    measured = [
-        Section(_TITLES[experiment], charts=[_chart(mine, labels)])
-        for experiment in _TITLES
-        if (mine := _first_runs([pair for pair in pairs if pair[0].experiment == experiment]))
-    ]
+    curves = compared_curves(found.fit.problem.trials, {BASE: found.fit.predictions()}, labels)
     return Page(
         f"Fit of {dataset.name}",
         f"{says} {counted}",
-        [*parameters_and_remarks(found), *measured],
-        (f"{BASE_MODEL} {RMS} {NOISE_FLOOR}",),
+        [*parameters_and_remarks(found), *curves],
+        (f"{BASE_MODEL} {RMS} {NOISE_FLOOR} {_OF_REPEATS}",),
         (errors_table(found),),
     )
 
@@ -95,49 +87,3 @@ def errors_table(found: Identification) -> Table:
             ]
         )
     return Table(["RMS error", BASE, "noise floor", "ratio"], rows)
-
-
-def _first_runs(pairs: list[tuple[Record, Channels]]) -> list[tuple[Record, Channels]]:
-    """One of each condition: those that follow would lie on it."""
-    first: dict[object, tuple[Record, Channels]] = {}
-    for trial, prediction in pairs:
-        first.setdefault(trial.condition, (trial, prediction))
-    return list(first.values())
-
-
-def _chart(pairs: list[tuple[Record, Channels]], labels: dict[str, str]) -> Chart:
-    columns = [_column(trial, prediction, labels[trial.name]) for trial, prediction in pairs]
-    alt = f"Measured and modelled in {experiment_words(pairs[0][0].experiment)}, and the difference"
-    return Chart(columns, _KEYS, alt, "Below each quantity: measured minus modelled.", height=130)
-
-
-def _column(trial: Record, prediction: Channels, label: str) -> Column:
-    x, over = _abscissa(trial)
-    panels = []
-    for channel, modelled in prediction.items():
-        if channel not in trial.channels:
-            continue
-        measured = np.asarray(trial.channels[channel])
-        both = [
-            Series((MEASURED,), *thinned(x, measured, 300), "measured"),
-            Series((BASE,), *thinned(x, modelled, 300), "before", "dashed"),
-        ]
-        left = Series((MEASURED, BASE), *thinned(x, measured - modelled, 300), "quiet")
-        unit = unit_of(channel)
-        panels.append(Panel(both, over, Axis(f"{_short(channel)}, {unit}")))
-        panels.append(Panel([left], over, Axis(f"off, {unit}"), height=0.55))
-    return Column(panels, label)
-
-
-def _short(channel: str) -> str:
-    words = channel_words(channel)
-    part = words.rpartition(" of the ")[2]
-    return part if part != words else words
-
-
-def _abscissa(trial: Record) -> tuple[np.ndarray, Axis]:
-    if trial.experiment == STATIC:
-        return trial.payload.displacement_m * 1e3, Axis("displacement, mm")
-    if trial.experiment == ANCHOR:
-        return trial.payload.pulled_s * abs(trial.payload.rate_mm_s), Axis("pulled, mm")
-    return trial.time_s, Axis("time, s")

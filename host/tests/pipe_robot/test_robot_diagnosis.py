@@ -45,7 +45,11 @@ def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
     assert found["error"]["after"]["held_out"] < 1.1 * found["error"]["noise_floor"]["held_out"]
     assert "none" in said.splitlines()
     assert "Nothing that matters is missing" in said
-    assert "Nothing that matters is missing" in page.read_text(encoding="utf-8")
+    shown = page.read_text(encoding="utf-8")
+    assert "Nothing that matters is missing" in shown
+    assert "Parameters of the base model" in shown
+    for title in ("Static loading", "Step responses", "Anchor pulls", "Walks"):
+        assert f">{title}</h2>" in shown, "each held-out condition, as measured and as predicted"
     completed = load_model(model)
     assert completed.effects == {}
     assert completed.name == read_dataset(folder).name

@@ -59,6 +59,11 @@ DIAGNOSIS = {
         "text": "Repeats share a residual that the model does not explain: pressure_body_psi in locomotion (0.6 x the "
         "floor).",
     },
+    "base_parameters": {
+        "mu_k": {"value": 0.3812, "interval_90": [0.3795, 0.3829]},
+        "wall_damping_Ns_m": {"value": 20.0, "interval_90": [None, None]},
+        "body_shape_1": {"value": 0.1, "interval_90": [0.0, 0.2]},
+    },
     "nearest": [
         {"effects": ["sensor_position"], "share_of_gap": 0.018},
         {"effects": ["valve_asymmetry", "line_lag"], "share_of_gap": 0.045},

@@ -98,6 +98,12 @@ def test_rounds_that_end_without_a_prediction_say_so(ended, why):
     assert why in section.paragraphs[-1]
 
 
+def test_the_base_model_s_parameters_are_listed_but_not_the_shapes_of_its_curves(html):
+    section = text_of(html[html.index('id="parameters-of-the-base-model"') :].split("</section>")[0])
+    assert "kinetic friction coefficient 0.3812 0.3795 to 0.3829" in section
+    assert "shape" not in section
+
+
 def test_the_seal_is_explained_where_there_is_one(html):
     assert "keeps it sealed" in text_of(html)
     assert "seal" not in text_of(render(sample.page(sealed=False)))
