@@ -43,7 +43,7 @@ def main() -> int:
 
 def merge(figures: dict[str, float], path: Path) -> None:
     """Write `figures` (flat, name -> number) into the JSON file at `path`, keeping those of other benchmarks."""
-    known = json.loads(path.read_text()) if path.exists() else {}
+    known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     unfinished = path.with_suffix(".json.unfinished")
     unfinished.write_text(json.dumps(dict(sorted((known | figures).items())), indent=2) + "\n")
     unfinished.replace(path)

@@ -54,6 +54,6 @@ def _seconds(work) -> float:
 
 
 def _with_csv_module(path: Path) -> np.ndarray:
-    with path.open(newline="") as file:
+    with path.open(encoding="utf-8", newline="") as file:
         _, *rows = csv.reader(file)
     return np.array([[float(field) for field in row] for row in rows])

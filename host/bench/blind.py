@@ -113,7 +113,7 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int)
     spent = os.times()
     processor = spent.user + spent.system + spent.children_user + spent.children_system
     record = as_record(found) | {"processor_seconds": processor, "baselines": baselines(found.search)}
-    verdict.write_text(json.dumps(record))
+    verdict.write_text(json.dumps(record), encoding="utf-8")
 
 
 def baselines(search) -> dict[str, list[str]]:

@@ -79,7 +79,7 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     aside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     try:
         yield aside
-        with aside.open("rb") as file:
+        with aside.open("r+b") as file:  # Windows syncs only what may be written
             os.fsync(file.fileno())
         os.replace(aside, target)
     except OSError as error:

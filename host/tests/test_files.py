@@ -9,7 +9,7 @@ from bifa.files import TargetError, check_targets, write_text, written, written_
 
 
 def full_disk(path: Path) -> None:
-    path.write_text("half of it")
+    path.write_text("half of it", encoding="utf-8")
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
@@ -33,7 +33,7 @@ def test_the_file_beside_has_the_same_suffix_so_that_writers_know_the_format(tmp
 
 def test_an_error_or_ctrl_c_leaves_nothing_half_written(tmp_path):
     def fail(path: Path, error: type) -> None:
-        path.write_text("half")
+        path.write_text("half", encoding="utf-8")
         raise error
 
     for error in (ValueError, KeyboardInterrupt):

@@ -61,7 +61,7 @@ PARTS = (
 
 def declarations(header: Path) -> str:
     """The header as cffi reads it: no comments, no preprocessor lines."""
-    text = re.sub(r"//[^\n]*", "", header.read_text())
+    text = re.sub(r"//[^\n]*", "", header.read_text(encoding="utf-8"))
     return "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("#"))
 
 

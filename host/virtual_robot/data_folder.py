@@ -39,7 +39,7 @@ def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     line = ",".join(f"%.{n}f" for n in digits) + "\n"
     rows = np.column_stack(list(columns.values()))
     text = (line * len(rows)) % tuple(rows.ravel())
-    path.write_text(",".join(columns) + "\n" + text)
+    path.write_text(",".join(columns) + "\n" + text, encoding="utf-8")
 
 
 def _digits(column: str) -> int:

@@ -11,7 +11,6 @@ import contextlib
 import os
 import select
 import time
-import tty
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,6 +33,10 @@ def serve(
 ) -> None:
     """Serve until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path, `on_status` a dict four times a
     second; `link` is a symbolic link kept to the pty meanwhile."""
+    if not hasattr(os, "openpty"):
+        raise VirtualRobotError("a pseudo-terminal needs Linux or macOS")
+    import tty  # there is none on Windows
+
     if link is not None:
         _check_link(link)
     master, slave = os.openpty()

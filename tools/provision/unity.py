@@ -77,7 +77,7 @@ def extract(archives: list[Path], destination: Path) -> None:
 
 
 def _version(header: Path) -> str:
-    found = dict(re.findall(r"#define UNITY_VERSION_(MAJOR|MINOR|BUILD)\s+(\d+)", header.read_text()))
+    found = dict(re.findall(r"#define UNITY_VERSION_(MAJOR|MINOR|BUILD)\s+(\d+)", header.read_text(encoding="utf-8")))
     if len(found) == 3:
         return f"{found['MAJOR']}.{found['MINOR']}.{found['BUILD']}"
     return "2.4.3"  # the last release before unity.h began to state its version

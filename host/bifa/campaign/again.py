@@ -61,7 +61,7 @@ class Round:
 
 def read_rounds(file: Path) -> list[dict]:
     """The rounds as `again` wrote them; StageError where an earlier version did, which kept less."""
-    rounds = json.loads(file.read_text())
+    rounds = json.loads(file.read_text(encoding="utf-8"))
     known = {field.name for field in fields(Round)}
     if not rounds or any(known - set(one) for one in rounds):
         raise StageError(f"{file} is of an earlier version: walk the rounds again with --rerun again")

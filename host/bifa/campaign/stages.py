@@ -203,7 +203,7 @@ def _other_inputs(begun: Mapping, asked: Mapping) -> list[str]:
 
 def _read_asked(path: Path) -> dict:
     """Empty where an earlier version of bifa, or an interruption at the very beginning, left none."""
-    return dict(json.loads(path.read_text())) if path.exists() else {}
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
 
 def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping) -> dict[str, str]:

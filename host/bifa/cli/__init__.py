@@ -4,6 +4,7 @@ Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, s
 """
 
 import importlib
+import io
 import pkgutil
 import sys
 from typing import Annotated
@@ -59,6 +60,7 @@ for _module in sorted(module.name for module in pkgutil.iter_modules(__path__) i
 
 def main() -> None:
     """Run the command; an expected error ends in one clear sentence and exit status 2."""
+    _print_anything()
     try:
         app()
     except Exception as error:
@@ -67,3 +69,10 @@ def main() -> None:
             raise
         typer.echo(f"error: {printable(str(error))}", err=True)
         sys.exit(2)
+
+
+def _print_anything() -> None:
+    """What is redirected on Windows is encoded in an old code page: a Greek letter must not end a command there."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # not None, as without a console, nor what a program put there
+            stream.reconfigure(errors="replace")

@@ -7,11 +7,12 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option, stoppable
+from bifa.computer import EXAMPLE_PORT
 
-EPILOG = """Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
+EPILOG = f"""Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
 bifa campaign --rerun diagnose   |
-bifa campaign --port /dev/ttyACM0 --watch records --out out/monday   |
-bifa campaign --port /dev/ttyACM0 --known head_mass_kg=0.182 --out out/monday"""
+bifa campaign --port {EXAMPLE_PORT} --watch records --out out/monday   |
+bifa campaign --port {EXAMPLE_PORT} --known head_mass_kg=0.182 --out out/monday"""
 
 
 def register(app: typer.Typer) -> None:

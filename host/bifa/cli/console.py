@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import PORT
+from bifa.computer import EXAMPLE_PORT
 
-EPILOG = (
-    """Examples:  bifa console   |   bifa console --port virtual   |   echo show | bifa console --port /dev/ttyACM0"""
-)
+EPILOG = f"""Examples:  bifa console   |   bifa console --port virtual   |
+echo show | bifa console --port {EXAMPLE_PORT}"""
 
 
 def register(app: typer.Typer) -> None:

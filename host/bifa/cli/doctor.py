@@ -5,8 +5,9 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import port_option
+from bifa.computer import EXAMPLE_PORT
 
-EXAMPLES = "Examples:  bifa doctor   |   bifa doctor --port /dev/ttyACM0   |   bifa doctor --port virtual"
+EXAMPLES = f"Examples:  bifa doctor   |   bifa doctor --port {EXAMPLE_PORT}   |   bifa doctor --port virtual"
 
 
 def register(app: typer.Typer) -> None:

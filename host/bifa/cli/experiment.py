@@ -8,11 +8,12 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import KNOWN, PORT, PROFILE, WATCH, Profile, file_option, stoppable
+from bifa.computer import EXAMPLE_PORT
 
-EPILOG = """Examples:  bifa experiment all --port virtual --out out/bench   |
+EPILOG = f"""Examples:  bifa experiment all --port virtual --out out/bench   |
 bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
 bifa experiment locomotion --inclination 10 --port virtual --out out/uphill   |
-bifa experiment step_response --port /dev/ttyACM0 --watch records --out out/steps   |
+bifa experiment step_response --port {EXAMPLE_PORT} --watch records --out out/steps   |
 bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 8.5 --out out/pull"""
 
 

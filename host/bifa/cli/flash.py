@@ -5,8 +5,9 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import port_option
+from bifa.computer import EXAMPLE_PORT
 
-EXAMPLES = "Examples:  bifa flash   |   bifa flash --port /dev/ttyACM0   |   bifa flash --build-only"
+EXAMPLES = f"Examples:  bifa flash   |   bifa flash --port {EXAMPLE_PORT}   |   bifa flash --build-only"
 
 
 def register(app: typer.Typer) -> None:

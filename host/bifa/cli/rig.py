@@ -49,12 +49,15 @@ def register(app: typer.Typer) -> None:
 
         Opening the port resets the board, as with a real Uno. 250000 baud; any serial program will do.
         """
+        import os
         import signal
 
         from bifa.files import check_targets
         from bifa.rig import open_rig
         from bifa.screen import Console
 
+        if not hasattr(os, "openpty"):
+            raise RigOptionError("bifa rig serves a pseudo-terminal, which needs Linux or macOS (on Windows: WSL)")
         for ending in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C
         check_targets(eeprom)

@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import PORT
+from bifa.computer import EXAMPLE_PORT
 
-EPILOG = """Examples:  bifa upload gait.toml   |   bifa upload gait.toml --save fast --run   |
-bifa upload gait.toml --run --seconds 60 --port /dev/ttyACM0"""
+EPILOG = f"""Examples:  bifa upload gait.toml   |   bifa upload gait.toml --save fast --run   |
+bifa upload gait.toml --run --seconds 60 --port {EXAMPLE_PORT}"""
 
 
 def register(app: typer.Typer) -> None:

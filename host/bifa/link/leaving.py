@@ -56,7 +56,7 @@ def enter(robot: Robot) -> None:
     """
     if not _inside and threading.current_thread() is threading.main_thread():
         for name, act in _ACTS.items():
-            number = getattr(signal, name, None)  # Windows has the first two
+            number = getattr(signal, name, None)  # Windows has the first two, and SIGBREAK
             if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 _earlier_handlers[number] = signal.signal(number, act)
         _earlier_hook.append(sys.unraisablehook)
@@ -125,7 +125,7 @@ def _stop_all() -> None:
             robot.send_stop()
 
 
-_ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGTSTP": _suspend}
+_ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGBREAK": _end, "SIGTSTP": _suspend}
 
 
 def _orphaned(number: int, frame) -> None:

@@ -161,7 +161,7 @@ def _telemetry_file(path: Path) -> Iterator[TextIO]:
     """A new file; on a full disk it ends with its last whole line, and RecordError says so."""
     file = None
     try:
-        with path.open("x", newline="") as file:
+        with path.open("x", encoding="utf-8", newline="") as file:
             yield file
     except GONE:  # the port, of which the file knows nothing
         raise

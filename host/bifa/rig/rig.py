@@ -1,5 +1,6 @@
 """What is at the other end of `--port`: an Uno on a serial port, or a whole rig that a package offers by name."""
 
+import re
 from collections.abc import Mapping
 from importlib.metadata import entry_points
 from types import MappingProxyType
@@ -88,7 +89,7 @@ def is_offered(port: str | None) -> bool:
 def check_port(port: str | None) -> None:
     """Raise RigError where `port` cannot be one, before anything slow is done."""
     rigs = entry_points(group=ENTRY_POINTS).names
-    if port is not None and port not in rigs and "/" not in port and not port.upper().startswith("COM"):
+    if port is not None and port not in rigs and not re.search(r"[/\\]|^COM", port, re.IGNORECASE):
         raise RigError(f"{port!r} is neither a rig (available: {', '.join(sorted(rigs)) or 'none'}) nor a device")
 
 

@@ -5,6 +5,7 @@ import time
 
 import serial
 
+from bifa.computer import PORT_QUESTIONS
 from bifa.link.transport import PortGoneError
 
 BAUD = 250_000
@@ -20,10 +21,7 @@ class SerialTransport:
         try:
             self._port = serial.Serial(device, BAUD, timeout=0, write_timeout=2.0, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortGoneError(
-                f"cannot open {device}: {error}; is it plugged in, is another program using it, "
-                "and may you use serial ports (group dialout)?"
-            ) from error
+            raise PortGoneError(f"cannot open {device}: {error}; {PORT_QUESTIONS}") from error
 
     def write(self, data: bytes) -> None:
         """See Transport."""

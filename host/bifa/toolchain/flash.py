@@ -9,6 +9,7 @@ from pathlib import Path
 
 import serial
 
+from bifa.computer import PORT_BUSY, PORT_QUESTIONS, PORT_REFUSED
 from bifa.rig import find_port
 from bifa.toolchain.errors import ToolchainError
 from bifa.toolchain.project import ENVIRONMENT, image_path, platformio_program
@@ -19,8 +20,8 @@ LINES_KEPT = 12
 REMEDIES = (
     (r"not in sync|not responding", "no bootloader answers on {port}: is it the Uno? Close other programs that use "
      "the port, press its reset button just as the upload begins, or try another cable"),
-    (r"permission denied", "{port} may not be opened: sudo usermod -aG dialout $USER, then log in again"),
-    (r"device or resource busy", "{port} is in use: close the serial monitor or the other program"),
+    (r"permission denied|access is denied", PORT_REFUSED),
+    (r"device or resource busy", PORT_BUSY),
     (r"HTTPClientError|InternetConnectionError", "PlatformIO lacks a package and cannot download it: run `make setup`"),
 )  # fmt: skip
 
@@ -39,11 +40,11 @@ def _open_once(port: str) -> None:
     except (serial.SerialException, OSError) as error:
         reason = {
             errno.ENOENT: f"there is no port {port}; `bifa doctor` lists the ports",
-            errno.EACCES: REMEDIES[1][1].format(port=port),
-            errno.EBUSY: REMEDIES[2][1].format(port=port),
-            errno.EAGAIN: REMEDIES[2][1].format(port=port),
+            errno.EACCES: PORT_REFUSED.format(port=port),
+            errno.EBUSY: PORT_BUSY.format(port=port),
+            errno.EAGAIN: PORT_BUSY.format(port=port),
         }.get(getattr(error, "errno", None))
-        raise ToolchainError(reason or f"{port} does not open: {error}") from error
+        raise ToolchainError(reason or f"{port} does not open: {error}; {PORT_QUESTIONS}") from error
 
 
 def build_image(project: Path, on_line: Callable[[str], None]) -> Path:
@@ -62,7 +63,13 @@ def _run_platformio(project: Path, arguments: list[str], port: str, on_line: Cal
     command = [platformio_program(), *arguments]
     last: deque[str] = deque(maxlen=LINES_KEPT)
     with subprocess.Popen(
-        command, cwd=project, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command,
+        cwd=project,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
     ) as process:
         try:
             for line in process.stdout:

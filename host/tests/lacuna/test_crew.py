@@ -92,7 +92,7 @@ Crew(lambda _: None, forks=True).map("trying", [("one",), ("two",)], job, [(1,),
 
 def _alive(pid: int) -> bool:
     try:
-        with open(f"/proc/{pid}/stat") as stat:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as stat:
             return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
     except FileNotFoundError:
         return False

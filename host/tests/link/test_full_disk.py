@@ -20,7 +20,7 @@ def bifa(*arguments: str) -> list[str]:
 def test_output_onto_a_full_disk_ends_in_a_sentence_with_valves_off(uno, gait, command):
     arguments = {"console": ["console"], "upload": ["upload", gait, "--run"], "monitor": ["monitor", "--run"]}[command]
     for_long = [] if command == "console" else ["--seconds", "1"]
-    with FULL.open("w") as full:
+    with FULL.open("w", encoding="utf-8") as full:
         ended = subprocess.run(
             bifa(*arguments, *for_long, "--port", uno.device),
             input="run\nshow\n",

@@ -137,7 +137,7 @@ def test_leaving_turns_the_valves_off(console, uno, leave):
 
 
 def is_suspended(console: Terminal) -> bool:
-    stat = Path(f"/proc/{console.program.pid}/stat").read_text()
+    stat = Path(f"/proc/{console.program.pid}/stat").read_text(encoding="utf-8")
     return stat.rpartition(")")[2].split()[0] == "T"
 
 
