@@ -12,6 +12,7 @@ import math
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,7 @@ def open_rig(
 ) -> VirtualRig:
     """A virtual bench whose board has just been powered.
 
-    `firmware`: an ELF image (default: the one that `pio run -e uno` builds). `profile`: "ideal" (the paper's
+    `firmware`: an image, ELF or HEX (default: the one that `pio run -e uno` builds). `profile`: "ideal" (the paper's
     equations and white sensor noise), "realistic" (the same with run-to-run spread, coloured noise, clocks that
     drift and come in steps) or "worn" (beyond the paper's equations in several ways). `seed`: noise, clocks and
     run-to-run variation. `effects`: `{"hysteresis": {"force_N": 4.0}}`, several at once. `sealed`: a seed that
@@ -229,7 +230,7 @@ def open_rig(
         inside |= drawn
         numbers |= own
     numbers |= plant_parameters(inside) | dict(parameters or {})
-    image = Path(firmware) if firmware is not None else FIRMWARE
+    image = Path(firmware) if firmware is not None else _default_image()
     if not image.is_file():
         raise FirmwareError(image)
     uno = Uno(image, eeprom=Path(eeprom) if eeprom is not None else None, keep_events=keep_events)
@@ -242,6 +243,12 @@ def open_rig(
     instruments = Instruments(world, plant, bench.noise, bench.wobble, random, bench.clock_resolution_s)
     instruments.mount("locomotion")
     return VirtualRig(uno, plant, world, instruments, bench.bootloader_s, inside, seed)
+
+
+def _default_image() -> Path:
+    """The one built in this checkout, else one that an installed package offers as an entry point of `bifa.images`."""
+    offered = () if FIRMWARE.is_file() else (entry.load()() for entry in entry_points(group="bifa.images"))
+    return next((path for path in offered if path), FIRMWARE)
 
 
 _profile = profile  # open_rig has a parameter of that name

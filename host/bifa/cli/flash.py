@@ -1,5 +1,7 @@
-"""`bifa flash`: build the firmware, write it to the Uno, and check that it answers."""
+"""`bifa flash`: write the firmware to the Uno, and check that it answers."""
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,9 +20,10 @@ def register(app: typer.Typer) -> None:
 def flash(
     port: Annotated[str | None, port_option("The Uno's serial port; detected if left out.")] = None,
     build_only: Annotated[bool, typer.Option("--build-only", help="Build the image, write nothing.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show PlatformIO's whole output.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the tools' whole output.")] = False,
 ) -> None:
-    """Build the firmware with PlatformIO, write it to the Uno, and check that it answers.
+    """Write the firmware to the Uno, and check that it answers: in a clone of the repository the one that PlatformIO
+    builds there, elsewhere the one that belongs to this installation, by avrdude.
 
     Vent the supplies first: while the bootloader runs, the valve pins float, and only the gates' pull-downs
     keep the valves off.
@@ -28,20 +31,21 @@ def flash(
     from bifa.link import Uno
     from bifa.rig import open_rig
     from bifa.screen import Console
-    from bifa.toolchain import build_image, choose_port, project_folder, upload_image
+    from bifa.toolchain import build_image, choose_port, find_project, project_folder
 
     console = Console()
     show = console.out if verbose else _ignore
-    project = project_folder()
+    project = project_folder() if build_only else find_project()
     chosen = None if build_only else choose_port(port)
-    with console.status("building"):
-        image = build_image(project, show)
-    console.print(f"built {image.relative_to(project)}", highlight=False)
+    if project is not None:
+        with console.status("building"):
+            image = build_image(project, show)
+        console.print(f"built {image.relative_to(project)}", highlight=False)
     if chosen is None:
         return
     with console.status(f"writing to {chosen}"):
         try:
-            upload_image(project, chosen, show)
+            _write(project, chosen, show)
         except KeyboardInterrupt:
             console.print("[red]interrupted:[/red] the Uno may hold half an image; run `bifa flash` again")
             raise
@@ -50,5 +54,15 @@ def flash(
     console.print(f"firmware {hello.firmware} answers on {chosen}", highlight=False)
 
 
+def _write(project: Path | None, port: str, show: Callable[[str], None]) -> None:
+    from bifa.firmware import carried_image
+    from bifa.toolchain import upload_image, write_with_avrdude
+
+    if project is not None:
+        upload_image(project, port, show)
+    else:
+        write_with_avrdude(carried_image(), port, show)
+
+
 def _ignore(_: str) -> None:
-    """PlatformIO's output is shown only when it fails."""
+    """The tools' output is shown only when they fail."""

@@ -11,11 +11,13 @@ from pathlib import Path
 
 from bifa import __version__
 from bifa.errors import BifaError
+from bifa.firmware import carried_image, image_of
 from bifa.link import Uno
 from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
 from bifa.rig import open_rig
 from bifa.rig.ports import serial_ports
-from bifa.toolchain.project import image_path, platformio_program, project_folder
+from bifa.toolchain.avrdude import avrdude_program
+from bifa.toolchain.project import find_project, image_path, platformio_program, project_folder
 
 OK, MISSING, OPTIONAL = "ok", "missing", "optional"
 
@@ -33,9 +35,13 @@ class Check:
 def run_checks(port: str | None) -> Iterator[Check]:
     """Make every check; the board's last, because opening its port resets it."""
     yield Check("bifa", OK, f"bifa {__version__}, Python {sys.version.split()[0]}")
-    yield _guarded("PlatformIO", _platformio)
-    yield _guarded("PlatformIO's packages", _packages)
-    yield _guarded("firmware image", _image)
+    if find_project() is not None:
+        yield _guarded("PlatformIO", _platformio)
+        yield _guarded("PlatformIO's packages", _packages)
+        yield _guarded("firmware image", _image)
+    else:
+        yield _guarded("avrdude", lambda what: Check(what, OK, str(avrdude_program())))
+        yield _guarded("firmware image", _carried)
     yield _guarded("virtual robot", _virtual_rig)
     yield _guarded("serial ports", _ports)
     for program, purpose in OPTIONAL_TOOLS:
@@ -77,6 +83,10 @@ def _image(what: str) -> Check:
     if _newest(project / "firmware", project / "lib") > image.stat().st_mtime:
         return Check(what, OPTIONAL, "older than its sources", "run `pio run -e uno`")
     return Check(what, OK, str(image.relative_to(project)))
+
+
+def _carried(what: str) -> Check:
+    return Check(what, OK, f"version {image_of(carried_image()).version}, carried by this installation")
 
 
 def _newest(*folders: Path) -> float:

@@ -1,9 +1,6 @@
 """Build the image and write it to the board, through PlatformIO."""
 
 import errno
-import re
-import subprocess
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,17 +10,7 @@ from bifa.computer import PORT_BUSY, PORT_QUESTIONS, PORT_REFUSED
 from bifa.rig import find_port
 from bifa.toolchain.errors import ToolchainError
 from bifa.toolchain.project import ENVIRONMENT, image_path, platformio_program
-
-LINES_KEPT = 12
-
-# What PlatformIO, avrdude or the system say -> what to do about it; `{port}` is filled in.
-REMEDIES = (
-    (r"not in sync|not responding", "no bootloader answers on {port}: is it the Uno? Close other programs that use "
-     "the port, press its reset button just as the upload begins, or try another cable"),
-    (r"permission denied|access is denied", PORT_REFUSED),
-    (r"device or resource busy", PORT_BUSY),
-    (r"HTTPClientError|InternetConnectionError", "PlatformIO lacks a package and cannot download it: run `make setup`"),
-)  # fmt: skip
+from bifa.toolchain.run import run
 
 
 def choose_port(port: str | None) -> str:
@@ -60,31 +47,4 @@ def upload_image(project: Path, port: str, on_line: Callable[[str], None]) -> No
 
 
 def _run_platformio(project: Path, arguments: list[str], port: str, on_line: Callable[[str], None]) -> None:
-    command = [platformio_program(), *arguments]
-    last: deque[str] = deque(maxlen=LINES_KEPT)
-    with subprocess.Popen(
-        command,
-        cwd=project,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-    ) as process:
-        try:
-            for line in process.stdout:
-                last.append(line.rstrip())
-                on_line(line.rstrip())
-        except KeyboardInterrupt:
-            process.wait()
-            raise
-    if process.returncode:
-        raise ToolchainError(_sentence(list(last), port))
-
-
-def _sentence(lines: list[str], port: str) -> str:
-    output = "\n".join(lines)
-    for pattern, remedy in REMEDIES:
-        if re.search(pattern, output, re.IGNORECASE):
-            return remedy.format(port=port or "the port")
-    return f"PlatformIO failed; its last lines:\n{output}"
+    run([platformio_program(), *arguments], project, port, on_line, name="PlatformIO")

@@ -10,12 +10,19 @@ from bifa.toolchain.errors import ToolchainError
 ENVIRONMENT = "uno"
 
 
-def project_folder() -> Path:
-    """Return the clone this package belongs to, else the one around the working directory."""
+def find_project() -> Path | None:
+    """Return the clone this package belongs to, else the one around the working directory, if there is one."""
     here = Path.cwd()
     for folder in (Path(bifa.__file__).resolve().parents[2], here, *here.parents):
         if (folder / "platformio.ini").is_file() and (folder / "firmware").is_dir():
             return folder
+    return None
+
+
+def project_folder() -> Path:
+    """Return the clone, which must be there."""
+    if folder := find_project():
+        return folder
     raise ToolchainError("no platformio.ini and firmware/ here; run this in a clone of the repository")
 
 

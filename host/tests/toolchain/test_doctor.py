@@ -77,3 +77,12 @@ def test_the_virtual_board_is_asked_who_it_is():
     finding = checks._board("board", "virtual")
     assert finding.state == OK
     assert finding.found.startswith("firmware ")
+
+
+def test_without_a_checkout_it_looks_for_avrdude_and_the_image_carried(monkeypatch):
+    monkeypatch.setattr(checks, "find_project", lambda: None)
+    found = {check.what: check for check in checks.run_checks(None)}
+    assert "PlatformIO" not in found
+    assert found["firmware image"].state == MISSING
+    assert "carries no firmware" in found["firmware image"].remedy
+    assert found["avrdude"].state in (OK, MISSING)

@@ -193,7 +193,7 @@ def test_an_image_that_is_not_one_is_refused(tmp_path):
     with pytest.raises(FirmwareError, match="pio run -e uno"):
         Uno(text)
     text.write_text("no ELF")
-    with pytest.raises(FirmwareError, match="not an AVR ELF image"):
+    with pytest.raises(FirmwareError, match="not an AVR image"):
         Uno(text)
 
 

@@ -9,6 +9,7 @@
 #include "board.h"
 #include "sim_core.h"
 #include "sim_elf.h"
+#include "sim_hex.h"
 
 #define INTERRUPT_ENTRY_CYCLES 4  // datasheet 7.7.1; libsimavr charges none
 #define WAKE_UP_CYCLES 4          // and four more out of sleep
@@ -165,17 +166,28 @@ static void append_io(avr_t *avr, avr_io_t *io) {
   io->next = NULL;
 }
 
-Uno *uno_new(const char *elf_path, char *error, int error_size) {
+static bool ends_in(const char *text, const char *end) {
+  size_t length = strlen(text), of_end = strlen(end);
+  return length >= of_end && strcmp(text + length - of_end, end) == 0;
+}
+
+static bool read_image(const char *path, elf_firmware_t *firmware) {
+  memset(firmware, 0, sizeof *firmware);
+  if (!ends_in(path, ".hex")) return elf_read_firmware(path, firmware) == 0 && firmware->flashsize > 0;
+  firmware->flash = read_ihex_file(path, &firmware->flashsize, &firmware->flashbase);
+  return firmware->flash != NULL && firmware->flashsize > 0;
+}
+
+Uno *uno_new(const char *path, char *error, int error_size) {
   avr_global_logger_set(quiet_logger);
   elf_firmware_t firmware;
-  memset(&firmware, 0, sizeof firmware);
-  if (elf_read_firmware(elf_path, &firmware) != 0 || firmware.flashsize == 0) {
-    snprintf(error, error_size, "%s is not an AVR ELF image", elf_path);
+  if (!read_image(path, &firmware)) {
+    snprintf(error, error_size, "%s is not an AVR image, ELF or HEX", path);
     return NULL;
   }
   avr_t *avr = avr_make_mcu_by_name("atmega328p");
   if (avr == NULL || firmware.flashbase + firmware.flashsize > 0x8000) {
-    snprintf(error, error_size, "%s does not fit an ATmega328P", elf_path);
+    snprintf(error, error_size, "%s does not fit an ATmega328P", path);
     return NULL;
   }
   Uno *uno = calloc(1, sizeof *uno);

@@ -42,7 +42,7 @@ typedef struct UnoStatus {
   int32_t crashed;
 } UnoStatus;
 
-Uno *uno_new(const char *elf_path, char *error, int error_size);
+Uno *uno_new(const char *path, char *error, int error_size);
 void uno_free(Uno *uno);
 void uno_connect(Uno *uno, const UnoWorld *world);
 

@@ -1,0 +1,116 @@
+"""`bifa flash` without a checkout: the image that the package carries, checked, and written by avrdude alone."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from bifa import firmware
+from bifa.cli import app
+from bifa.firmware import ImageError, carried_image, image_of, write_image
+from bifa.link.table import TABLE_HASH
+from bifa.toolchain import ToolchainError, avrdude
+from virtual_robot.rig import open_rig
+
+BUILT = Path(__file__).parents[3] / ".pio" / "build" / "uno" / "firmware.hex"
+
+
+@pytest.fixture
+def package(tmp_path) -> Path:
+    """A folder as that of bifa.firmware in a wheel."""
+    folder = tmp_path / "site-packages" / "bifa" / "firmware"
+    folder.mkdir(parents=True)
+    write_image(BUILT, folder)
+    return folder
+
+
+@pytest.fixture
+def writes(tmp_path, monkeypatch) -> Path:
+    """A program in avrdude's place, alone on PATH: it keeps its arguments and the file that it is given to write."""
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    program = folder / "avrdude"
+    program.write_text(f'#!/bin/sh\necho "$@" > {folder}/arguments\n/bin/cp uno.hex {folder}/written.hex\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
+    return folder
+
+
+@pytest.fixture
+def no_checkout(monkeypatch, package):
+    """The command as an installed package runs it."""
+    monkeypatch.setattr("bifa.toolchain.find_project", lambda: None)
+    monkeypatch.setattr("bifa.toolchain.choose_port", lambda port: port)
+    monkeypatch.setattr(firmware, "carried_image", lambda: carried_image(package))
+
+
+def test_the_image_that_is_written_runs_in_the_chip_and_answers(monkeypatch, no_checkout, writes):
+    monkeypatch.setattr("bifa.rig.open_rig", lambda port: open_rig(firmware=writes / "written.hex"))
+    done = CliRunner().invoke(app, ["flash", "--port", "/dev/ttyACM0"])
+    assert done.exit_code == 0, done.output
+    assert "answers on /dev/ttyACM0" in done.output
+    assert (writes / "arguments").read_text() == (
+        "-p atmega328p -c arduino -P /dev/ttyACM0 -b 115200 -D -U flash:w:uno.hex:i\n"
+    )
+
+
+def test_a_failing_avrdude_ends_in_a_sentence(no_checkout, writes):
+    (writes / "avrdude").write_text("#!/bin/sh\necho 'stk500_recv(): programmer is not responding'\nexit 1\n")
+    done = CliRunner().invoke(app, ["flash", "--port", "/dev/ttyACM0"])
+    assert isinstance(done.exception, ToolchainError)
+    assert "no bootloader answers on /dev/ttyACM0" in str(done.exception)
+
+
+def test_without_avrdude_the_sentence_says_how_to_get_it(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ToolchainError, match="avrdude"):
+        avrdude.avrdude_program()
+
+
+@pytest.mark.skipif(not shutil.which("avrdude"), reason="no avrdude to ask")
+def test_avrdude_itself_understands_the_command(package, tmp_path):
+    """It gets as far as opening the port, which is not there."""
+    with pytest.raises(ToolchainError, match=r"not-there|can't open"):
+        avrdude.write_with_avrdude(carried_image(package), os.fspath(tmp_path / "not-there"), lambda line: None)
+
+
+def test_an_image_knows_itself():
+    assert image_of(BUILT).table == f"{TABLE_HASH:08x}"
+
+
+@pytest.mark.parametrize("at", [0, 1000, -3], ids=["its start", "in the middle", "its end"])
+def test_a_damaged_image_is_not_written(package, at):
+    hex_file = package / "uno.hex"
+    text = bytearray(hex_file.read_bytes())
+    text[at] = ord("0") if text[at] != ord("0") else ord("1")
+    hex_file.write_bytes(text)
+    with pytest.raises(ImageError, match="damaged"):
+        carried_image(package)
+
+
+def test_another_image_in_its_place_is_not_written(package):
+    head = package / "uno.toml"
+    head.write_text(head.read_text().replace('sha256 = "', 'sha256 = "0'))
+    with pytest.raises(ImageError, match="damaged"):
+        carried_image(package)
+
+
+def test_an_image_of_other_tables_is_neither_taken_up_nor_written(package, monkeypatch, tmp_path):
+    monkeypatch.setattr("bifa.firmware.image.TABLE_HASH", TABLE_HASH ^ 1)
+    with pytest.raises(ImageError, match="build the firmware again"):
+        carried_image(package)
+    with pytest.raises(ImageError, match="build the firmware again"):
+        write_image(BUILT, tmp_path)
+
+
+def test_what_is_no_image_of_bifa_is_refused(tmp_path):
+    (tmp_path / "blink.hex").write_text(":0400000001020304F2\n:00000001FF\n")
+    with pytest.raises(ImageError, match="no firmware of bifa"):
+        image_of(tmp_path / "blink.hex")
+
+
+def test_a_package_without_an_image_says_so(tmp_path):
+    with pytest.raises(ImageError, match="carries no firmware"):
+        carried_image(tmp_path)
