@@ -21,6 +21,7 @@ help:
 	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
 	echo "make blind    diagnosis of sealed data sets: rates against what is required and baselines (ARGS='--help')"
 	echo "make lint     formatters and static checks; make format applies the formatters"
+	echo "make wheels   sdists and wheels of the three packages, into dist/"
 	echo "make setup    only install what is needed: Debian packages, .venv, PlatformIO's packages"
 	echo "make lock     resolve host/requirements.in anew"
 	echo "make clean    remove what was built; make distclean removes .venv and .platformio as well"
@@ -123,12 +124,15 @@ $(if $(wildcard .platformio/provisioned.json),,$(shell rm -f $(stamps)/platformi
 
 # --- Housekeeping ---
 
-.PHONY: lock clean distclean
+.PHONY: lock wheels clean distclean
 lock: $(python)
 	@$(bin)/python tools/lock.py
 
+wheels: $(python) $(stamps)/firmware
+	@$(bin)/python tools/wheels.py $(ARGS)
+
 clean:
-	@rm -rf .pio build out bench.json host/build host/*.egg-info host/lacuna/*.egg-info host/virtual_robot/*.egg-info compile_commands.json
+	@rm -rf .pio build dist out bench.json host/build host/*/build host/*.egg-info host/lacuna/*.egg-info host/virtual_robot/*.egg-info compile_commands.json
 	find host tools schema -name __pycache__ -prune -exec rm -rf {} +
 	find host/virtual_robot -name '*.so' -delete
 	rm -rf .ruff_cache host/.pytest_cache host/.ruff_cache host/.hypothesis host/.import_linter_cache

@@ -199,6 +199,21 @@ def session(lab: Lab, path, repeats: int = 3, walks: int = 2) -> Dataset:
     return Dataset(path=path, name="independent laboratory", known=known, trials=trials)
 
 
+def small_session(lab: Lab) -> Dataset:
+    """Enough to determine everything, twice each, and short: the suite has to end."""
+    trials = []
+    for repeat in (1, 2):
+        for which in ("large", "small"):
+            trials += [lab.static(which, p, rate_mm_s=4.0, repeat=repeat) for p in (0.0, 8.0)]
+            trials += [lab.step(which, p, repeat=repeat) for p in (6.5, 8.5)]
+        trials += [lab.anchor(p, repeat=repeat) for p in (0.0, 4.0, 8.5)]
+        trials += [lab.walk(BASELINE, 12.0, repeat=repeat)]
+    trials = tuple(replace(t, file=f"{i:02d}.csv", session_order=i) for i, t in enumerate(trials))
+    known = {"head_mass_kg": lab.head_mass, "tail_mass_kg": lab.tail_mass}
+    known |= {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
+    return Dataset(path=None, name="small session", known=known, trials=trials)
+
+
 def _trial(experiment, columns, **labels) -> Trial:
     fields = {
         "file": "",

@@ -65,7 +65,7 @@ def declarations(header: Path) -> str:
     return "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("#"))
 
 
-def compile_part(part: Part) -> None:
+def compile_part(part: Part, target: Path) -> None:
     ffi = FFI()
     ffi.cdef(declarations(part.folder / part.header))
     ffi.set_source(
@@ -89,9 +89,9 @@ def compile_part(part: Part) -> None:
     )
     with tempfile.TemporaryDirectory() as scratch:
         built = Path(ffi.compile(tmpdir=scratch, verbose=False))
-        new = part.built.with_suffix(".new")
+        new = target.with_suffix(".new")
         new.write_bytes(built.read_bytes())
-        new.replace(part.built)  # at once: a running process keeps the object it has loaded
+        new.replace(target)  # at once: a running process keeps the object it has loaded
 
 
 def main(names: list[str]) -> int:
@@ -100,7 +100,7 @@ def main(names: list[str]) -> int:
             continue
         if not part.is_fresh():
             print(f"compiling virtual_robot/{part.name}", flush=True)
-            compile_part(part)
+            compile_part(part, part.built)
     return 0
 
 

@@ -6,7 +6,7 @@ from io import StringIO
 
 import numpy as np
 import pytest
-from independent_lab import BASELINE, Lab, session
+from independent_lab import Lab, session, small_session
 from rich.console import Console
 from scipy.stats import binom
 
@@ -22,21 +22,6 @@ from bifa.report.terminal import print_sections, print_table
 from bifa.robot import load_model, save_model
 
 _DAYS = 8
-
-
-def small_session(lab: Lab) -> Dataset:
-    """Enough to determine everything, twice each, and short: the suite has to end."""
-    trials = []
-    for repeat in (1, 2):
-        for which in ("large", "small"):
-            trials += [lab.static(which, p, rate_mm_s=4.0, repeat=repeat) for p in (0.0, 8.0)]
-            trials += [lab.step(which, p, repeat=repeat) for p in (6.5, 8.5)]
-        trials += [lab.anchor(p, repeat=repeat) for p in (0.0, 4.0, 8.5)]
-        trials += [lab.walk(BASELINE, 12.0, repeat=repeat)]
-    trials = tuple(replace(t, file=f"{i:02d}.csv", session_order=i) for i, t in enumerate(trials))
-    known = {"head_mass_kg": lab.head_mass, "tail_mass_kg": lab.tail_mass}
-    known |= {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
-    return Dataset(path=None, name="small session", known=known, trials=trials)
 
 
 def truth_of(lab: Lab) -> dict[str, float]:

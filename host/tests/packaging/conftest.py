@@ -1,0 +1,33 @@
+"""Wheels of the three packages, and whether what they depend on can be installed."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "tools"))
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory) -> dict[str, Path]:
+    """Package -> its wheel, built from its sdist."""
+    import wheels
+
+    image = wheels.IMAGE if wheels.IMAGE.is_file() else None
+    paths = wheels.build(tmp_path_factory.mktemp("dist"), wheels.PACKAGES, image, isolated=False)
+    return {path.name.split("-")[0]: path for path in paths if path.suffix == ".whl"}
+
+
+@pytest.fixture(scope="session")
+def index() -> None:
+    """Skips where no package index answers."""
+    asked = [sys.executable, "-m", "pip", "index", "versions", "threadpoolctl"]
+    if subprocess.run(asked, capture_output=True, check=False).returncode:
+        pytest.skip("no package index answers, from which to install what the wheels depend on")

@@ -1,0 +1,123 @@
+"""What a stranger installs: wheels built from the sdists, outside the checkout. An editable installation hides what
+these lack."""
+
+import os
+import re
+import subprocess
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from independent_lab import Lab, small_session
+from stranger import Stranger, lowest
+
+from bifa.data import write_dataset
+from bifa.link.table import TABLE_HASH
+from bifa.robot.gait import BASELINE, save_gait
+from virtual_robot.uno import Uno
+
+FOLDERS = {"lacuna_engine": "lacuna", "bifa": "bifa", "virtual_robot": "virtual_robot"}
+NOT_SHIPPED = {"LICENSE", "README.md", "pyproject.toml", "setup.py"}
+IMPORT_ALL = """
+import importlib, pkgutil, sys
+package = importlib.import_module(sys.argv[1])
+assert "site-packages" in package.__file__, package.__file__
+for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+"""
+PAGE_S = 0.005  # the step of the page's simulate
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_wheel_holds_every_file_of_its_package_and_the_licence(root, built, name):
+    folder = FOLDERS[name]
+    listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard", folder]
+    files = subprocess.run(listed, cwd=root / "host", check=True, capture_output=True, text=True).stdout.split()
+    with zipfile.ZipFile(built[name]) as archive:
+        held = set(archive.namelist())
+    expected = {file for file in files if Path(file).name not in NOT_SHIPPED and (root / "host" / file).is_file()}
+    assert expected - held == set()
+    assert [file for file in held if file.endswith(".dist-info/licenses/LICENSE")]
+    beside = {file for file in held - expected if ".dist-info/" not in file}
+    assert all(file.endswith((".so", ".pyd")) for file in beside), beside
+
+
+@pytest.mark.parametrize("folder", ["host", "host/lacuna"])
+def test_the_licence_of_a_package_is_that_of_the_project(root, folder):
+    assert (root / folder / "LICENSE").read_text() == (root / "LICENSE").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("versions", ["oldest", "newest"])
+def test_the_wheels_work_in_an_empty_environment(root, built, index, tmp_path, versions):
+    """The engine first, by itself; then the robot's packages beside it."""
+    stranger = Stranger(tmp_path)
+    engine, *robots = (built[name] for name in FOLDERS)
+    pinned = lowest([engine, *robots], "numpy", "scipy", "numba", "matplotlib") if versions == "oldest" else []
+    stranger.install(engine, *(pin for pin in pinned if not pin.startswith("numba")))
+    stranger.run("python", "-c", IMPORT_ALL, "lacuna")
+    ten_minutes(root, stranger)
+    stranger.install(*robots, *pinned)
+    for package in ("bifa", "virtual_robot"):
+        stranger.run("python", "-c", IMPORT_ALL, package)
+    commands_of_bifa(stranger)
+    if os.name == "posix":
+        flashed(stranger)
+
+
+def ten_minutes(root: Path, stranger: Stranger) -> None:
+    """The page's example as it stands, to its verdict and its report."""
+    page = (root / "docs" / "adding-your-own-system.md").read_text()
+    code = re.search(r"## Ten minutes.*?```python\n(.*?)```", page, re.DOTALL)[1]
+    assert 'verdict.report("report.html")' in page
+    (stranger.here / "page.py").write_text(code + 'verdict.report("report.html")\n')
+    (stranger.here / "records").mkdir()
+    draw = np.random.default_rng(4)
+    for height_N in (1.0, 2.0, 3.0, 4.0):
+        for repeat in (1, 2, 3):
+            file = stranger.here / "records" / f"push {height_N:.0f} N_{repeat}.csv"
+            np.savetxt(file, pushes(height_N, draw), delimiter=",", header="time_s,force_N,position_mm")
+    assert "identified" in (said := stranger.run("python", "page.py")), said
+    assert "coulomb" in said
+    assert "coulomb" in (stranger.here / "report.html").read_text(encoding="utf-8")
+
+
+def pushes(height_N: float, draw: np.random.Generator) -> np.ndarray:
+    """Columns of one record: a mass on a spring with dry friction, pushed to and fro."""
+    time_s = PAGE_S * np.arange(400)
+    force_N = height_N * np.sin(2 * np.pi * time_s) * (time_s < 1.5)
+    position_m, speed_m_s, found = 0.0, 0.0, []
+    for force in force_N:
+        found.append(1e3 * position_m)
+        friction = 2.0 * speed_m_s + 0.4 * np.tanh(speed_m_s / 2e-3)
+        speed_m_s += PAGE_S * (force - 50.0 * position_m - friction) / 1.2
+        position_m += PAGE_S * speed_m_s
+    return np.column_stack([time_s, force_N, np.array(found) + 0.05 * draw.standard_normal(len(found))])
+
+
+def commands_of_bifa(stranger: Stranger) -> None:
+    """A small data set checked and fitted, its model walked, the library listed."""
+    write_dataset(stranger.here / "data", small_session(Lab().with_seed(3)))
+    save_gait(stranger.here / "gait.toml", BASELINE)
+    assert "24 trials" in stranger.run("bifa", "check", "data")
+    stranger.run("bifa", "fit", "data", "--out", "model.toml", "--report", "fit.html")
+    assert "RMS" in (stranger.here / "fit.html").read_text(encoding="utf-8")
+    assert "mm/s" in stranger.run("bifa", "simulate", "--model", "model.toml", "--gait", "gait.toml")
+    assert "robust" in stranger.run("bifa", "gaits")
+
+
+def flashed(stranger: Stranger) -> None:
+    """A program in avrdude's place keeps what it is given to write, and the simulated chip runs that. The board that
+    answers is the virtual robot, which runs the image that the wheel carries."""
+    stranger.add_program("avrdude", f'#!/bin/sh\ncp uno.hex "{stranger.here}/written.hex"\n')
+    board = stranger.here / "board"
+    assert "carried by this installation" in stranger.run("bifa", "doctor")
+    with stranger.running("bifa", "rig", "--link", board, until=board.exists):
+        assert "answers on" in stranger.run("bifa", "flash", "--port", board)
+    uno = Uno(stranger.here / "written.hex")
+    uno.send(b"version\n")
+    uno.run_for(0.5)
+    assert f"table {TABLE_HASH:08x}".encode() in uno.receive()
+    uno.close()
