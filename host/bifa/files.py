@@ -9,6 +9,14 @@ from pathlib import Path
 
 from bifa.errors import BifaError
 
+_STRAYS = ("Thumbs.db", "desktop.ini", "Icon\r")
+
+
+def is_stray(name: str) -> bool:
+    """Whether an operating system, an editor or an office program leaves files of this name behind, unasked:
+    .DS_Store, ._x.csv, .~lock.x.csv#, ~$x.xlsx, Thumbs.db."""
+    return name.startswith((".", "~$")) or name in _STRAYS
+
 
 class TargetError(BifaError):
     """A file cannot be written where it was asked for; the text says why."""

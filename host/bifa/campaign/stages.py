@@ -15,8 +15,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bifa
+from bifa.data.layout import RAW, TABLE_FILE
 from bifa.errors import BifaError
-from bifa.files import write_text
+from bifa.files import is_stray, write_text
+from bifa.toml import parse_toml
 
 PROVENANCE = "provenance.json"
 _SCRATCH = ".scratch"
@@ -37,8 +39,8 @@ class Stage:
     settings: whatever else decides the result (seed, gait, port); plain JSON.
     resumes: `run` goes on with what an interrupted run left in `outputs`, which is then kept; it writes none of `makes`
     before it is complete, and is not called where all are there.
-    by_hand: a real robot was measured for hours to make it. It is not run again for another version of bifa, with
-    other settings only on request, and what it made before is kept beside the new.
+    by_hand: a real robot was measured for hours to make it. It is not run again for another version of bifa; with
+    other settings, or where what it made has been changed, only on request; and what it made before is kept beside.
     """
 
     name: str
@@ -52,16 +54,33 @@ class Stage:
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file, or of a folder's files with their names, in order."""
+    """SHA-256 of a file, or of a folder's files with their names, in order: of a data set those that it lists, with the
+    instruments' own records of them; nowhere what an operating system or an office program leaves behind."""
     total = hashlib.sha256()
     if path.is_dir():
-        for file in sorted(p for p in path.rglob("*") if p.is_file()):
+        for file in sorted(_that_count(path)):
             total.update(f"{file.relative_to(path).as_posix()}\0{digest(file)}\n".encode())
     else:
         with path.open("rb") as stream:
             while block := stream.read(1 << 20):
                 total.update(block)
     return total.hexdigest()
+
+
+def _that_count(folder: Path) -> list[Path]:
+    files = [path for path in folder.rglob("*") if path.is_file() and not is_stray(path.name)]
+    try:
+        listed = [trial["file"] for trial in parse_toml((folder / TABLE_FILE).read_text("utf-8"))["trial"]]
+    except (OSError, ValueError, KeyError, TypeError):  # no data set, or one that is read, and refused, elsewhere
+        return files
+    raw = tuple(Path(file).stem for file in listed)
+    return [
+        path
+        for path in files
+        if (name := path.relative_to(folder).as_posix()) == TABLE_FILE
+        or name in listed
+        or (path.parent.name == RAW and path.name.startswith(raw))
+    ]
 
 
 def check_folder(folder: Path) -> None:
@@ -133,7 +152,8 @@ def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool
     if record is None:
         return False
     made = record.get("artefacts", {})
-    intact = all((folder / name).exists() and made.get(name) == digest(folder / name) for name in stage.makes)
+    other = [n for n in stage.makes if not (folder / n).exists() or made.get(n) != digest(folder / n)]
+    intact = not other
     if not stage.by_hand:
         return intact and all(record.get(key) == value for key, value in asked.items())
     if intact and (differing := _differing(record.get("settings", {}), asked["settings"])):
@@ -141,7 +161,13 @@ def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool
             f"{', '.join(stage.makes)} in {folder} was measured with {', '.join(differing)}: run with the same, "
             f"name another folder, or measure again with --rerun {stage.name}"
         )
-    return intact and record.get("inputs") == asked["inputs"]
+    same_inputs = record.get("inputs") == asked["inputs"]
+    if other and same_inputs and not _unfinished(folder, stage).exists():
+        raise StageError(
+            f"{', '.join(other)} in {folder} is not what the stage {stage.name} measured (a file was changed, or is"
+            f" gone): put it back, or measure again with --rerun {stage.name}"
+        )
+    return intact and same_inputs
 
 
 def _differing(old: Mapping, new: Mapping) -> list[str]:
@@ -158,7 +184,7 @@ def _differing(old: Mapping, new: Mapping) -> list[str]:
 def _run(folder: Path, stage: Stage, asked: dict, records: dict) -> None:
     """Run the stage and move what it makes to its place. On record first: an interruption between the two then leaves
     nothing in the folder that is not on record, and the digests say that it is not yet what they promise."""
-    scratch = folder / (f".{stage.name}-unfinished" if stage.resumes else _SCRATCH)
+    scratch = _unfinished(folder, stage)
     begun = _resumed(scratch, stage, asked)
     scratch.mkdir(exist_ok=stage.resumes)
     done = False
@@ -174,6 +200,10 @@ def _run(folder: Path, stage: Stage, asked: dict, records: dict) -> None:
     finally:
         if done or not stage.resumes:
             shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _unfinished(folder: Path, stage: Stage) -> Path:
+    return folder / (f".{stage.name}-unfinished" if stage.resumes else _SCRATCH)
 
 
 def _resumed(scratch: Path, stage: Stage, asked: dict) -> dict:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 FORMAT = 1
 TABLE_FILE = "dataset.toml"
+RAW = "raw"  # folder in a data set: the instruments' files as they came
 ACTUATORS = ("large", "small")
 DIRECTIONS = ("forward", "backward")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from bifa.data import DatasetWriter, Trial
 from bifa.data.check import check_trial
 from bifa.data.lag import misfit_of
+from bifa.data.layout import RAW
 from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, Uno
 from bifa.measure.desk import Desk
@@ -21,7 +22,6 @@ from bifa.measure.recording import idle
 from bifa.measure.sketch import sketch
 from bifa.mistakes import mistakes_in
 
-RAW = "raw"  # folder in a data set: the instruments' files as they came
 _REPEAT = ("r", "repeat")
 _LOOK_S = 0.25
 

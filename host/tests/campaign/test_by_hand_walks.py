@@ -15,7 +15,8 @@ from bifa.campaign.bench import Bench
 from bifa.campaign.loop import Effort, campaign
 from bifa.campaign.stages import run_stages
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
-from bifa.measure.by_hand import RAW, ByHand
+from bifa.data.layout import RAW
+from bifa.measure.by_hand import ByHand
 from bifa.measure.desk import Desk
 from bifa.measure.plan import BRISK
 from bifa.robot import nominal, save_model

@@ -1,12 +1,14 @@
 """A campaign's stages: made once, resumed, rerun alone, never half-written."""
 
+import hashlib
 import json
+import shutil
 from dataclasses import replace
 
 import pytest
 
 from bifa.campaign import stages
-from bifa.campaign.stages import PROVENANCE, Stage, StageError, run_stages
+from bifa.campaign.stages import PROVENANCE, Stage, StageError, digest, run_stages
 
 
 def copier(name, needs, makes, log, text="x", settings=None):
@@ -260,3 +262,59 @@ def test_what_was_kept_before_is_never_replaced_though_some_of_it_is_gone(tmp_pa
         "data.earlier-2": "2",
         "data.earlier-3": "3",
     }
+
+
+def measured(text="1,2\n"):
+    """A stage that measures a data set of one trial, with the instrument's own record of it."""
+
+    def run(inputs, outputs):
+        folder = outputs / "data"
+        (folder / "raw").mkdir(parents=True)
+        (folder / "dataset.toml").write_text('format = 1\n[[trial]]\nfile = "one.csv"\n')
+        (folder / "one.csv").write_text(text)
+        (folder / "raw" / "one.csv").write_text("as it came")
+
+    return Stage("measure", "m", (), ("data",), run, by_hand=True)
+
+
+STRAYS = (".DS_Store", "Thumbs.db", ".~lock.one.csv#", "._one.csv", "~$one.xlsx", "raw/.DS_Store", "notes.txt")
+
+
+@pytest.mark.parametrize("stray", STRAYS)
+def test_a_stray_file_among_what_was_measured_measures_nothing_again(tmp_path, stray):
+    ran = []
+    run_stages(tmp_path, [measured()])
+    (tmp_path / "data" / stray).write_text("left behind")
+    run_stages(tmp_path, [measured("another day\n")], on_end=lambda stage, again: ran.append(again))
+    assert ran == [False]
+
+
+@pytest.mark.parametrize("file", ["one.csv", "dataset.toml", "raw/one.csv"])
+def test_where_what_was_measured_differs_the_robot_does_not_move_unasked(tmp_path, file):
+    run_stages(tmp_path, [measured()])
+    for spoil in (
+        lambda path: path.write_text('format = 1\n[[trial]]\nfile = "two.csv"\n'),
+        lambda path: path.unlink(),
+    ):
+        spoil(tmp_path / "data" / file)
+        with pytest.raises(StageError, match=r"data in .* is not what .*measured .*--rerun measure"):
+            run_stages(tmp_path, [measured("another day\n")])
+    run_stages(tmp_path, [measured("another day\n")], rerun=["measure"])
+    assert (tmp_path / "data" / "one.csv").read_text() == "another day\n"
+    assert (tmp_path / "data.earlier-1").exists()
+
+
+def test_what_was_measured_and_is_gone_altogether_is_asked_for(tmp_path):
+    run_stages(tmp_path, [measured()])
+    shutil.rmtree(tmp_path / "data")
+    with pytest.raises(StageError, match="--rerun measure"):
+        run_stages(tmp_path, [measured()])
+
+
+def test_what_an_earlier_version_recorded_of_a_data_set_still_holds(tmp_path):
+    """Its digest was over all files of the folder."""
+    run_stages(tmp_path, [measured()])
+    total = hashlib.sha256()
+    for name in ("dataset.toml", "one.csv", "raw/one.csv"):
+        total.update(f"{name}\0{hashlib.sha256((tmp_path / 'data' / name).read_bytes()).hexdigest()}\n".encode())
+    assert digest(tmp_path / "data") == total.hexdigest()

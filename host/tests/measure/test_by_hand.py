@@ -5,7 +5,8 @@ import pytest
 
 from bifa.data import read_dataset
 from bifa.data.check import check_trial
-from bifa.measure.by_hand import RAW, ByHand
+from bifa.data.layout import RAW
+from bifa.measure.by_hand import ByHand
 from bifa.measure.desk import Desk
 from bifa.measure.plan import BRISK, PlannedTrial
 from bifa.measure.session import run_session
