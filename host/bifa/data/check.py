@@ -9,6 +9,7 @@ import numpy as np
 from .dataset import Dataset, Trial
 from .lag import displacement_lag, misfit, shift_of_all
 from .layout import EXPERIMENTS, is_command
+from .lost import codes, held
 
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
 ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, where 10-90 % of the supply spans 30 psi
@@ -111,12 +112,34 @@ def _spikes(trial: Trial) -> Iterator[Finding]:
             yield Finding("spike", text, trial.file, _line(rows[0]), name)
 
 
+def _no_value(trial: Trial) -> Iterator[Finding]:
+    for name, values in trial.columns.items():
+        rows = np.flatnonzero(codes(values)) if name != "time_s" else np.array([])
+        if rows.size:
+            text = f"{rows.size} samples read {values[rows[0]]:g}, which stands for no value: record it again"
+            yield Finding("no value", text, trial.file, _line(rows[0]), name)
+
+
+def _held_marker(trial: Trial) -> Iterator[Finding]:
+    if trial.experiment not in ("step_response", "locomotion"):
+        return  # a cross-head may well rest
+    for name, values in trial.columns.items():
+        rows = np.flatnonzero(held(values)) if name.startswith("displacement") else np.array([])
+        if rows.size:
+            text = f"{rows.size} samples repeat the one before and then jump: a marker was lost, and held or set to 0"
+            yield Finding("held", text, trial.file, _line(rows[0]), name)
+
+
 def _clock(trial: Trial) -> Iterator[Finding]:
     step = np.diff(trial.time_s)
     nominal = 1.0 / trial.nominal_rate_hz
     median = float(np.median(step))
     if abs(median / nominal - 1) > 0.05:
         text = f"sampled at {1 / median:.1f} Hz where the format says {trial.nominal_rate_hz:g} Hz"
+        yield Finding("rate", text, trial.file, column="time_s")
+    camera_hz = trial.extra.get("camera_rate_hz")
+    if isinstance(camera_hz, int | float) and camera_hz < 0.95 * trial.nominal_rate_hz:
+        text = f"the camera recorded {camera_hz:g} samples a second where the format says {trial.nominal_rate_hz:g} Hz"
         yield Finding("rate", text, trial.file, column="time_s")
     rows = np.flatnonzero(step > 1.5 * median)
     if rows.size:
@@ -213,6 +236,8 @@ TRIAL_CHECKS: tuple[Callable[[Trial], Iterator[Finding]], ...] = (
     _clipped_instrument,
     _stuck_channel,
     _spikes,
+    _no_value,
+    _held_marker,
     _clock,
     _no_motion,
     _no_command,

@@ -11,6 +11,7 @@ from math import fsum
 
 import numpy as np
 
+from bifa.data.lost import held
 from bifa.errors import BifaError
 from bifa.link.uno import MARK_PAUSE
 
@@ -19,6 +20,8 @@ MAX_RMS_S = 2e-3
 MAX_DRIFT = 0.01  # the Uno's resonator is good to 0.5 %
 _OFF_GRID = 0.4  # periods by which an edge may miss its place
 _FOLLOW = 0.2  # share of an edge's deviation that the next is expected to have
+SLOWEST_S = 0.0205  # between samples of a camera: 50 a second
+LONGEST_GAP_S = 0.035  # between samples that are followed by a curve: two of a hundred a second are missing
 _RESTART_PERIODS = 5  # a restart takes the bootloader's second; lost edges do not come in such numbers
 
 
@@ -71,10 +74,17 @@ def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndar
 def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """What a camera saw at other times, shape of `time_s`; up to two samples beside its record, the first or the last.
 
-    A snap-through lasts a few samples: a cubic through them follows it, a straight line would not. Raises
-    AlignmentError where the record begins later or ends earlier.
+    A snap-through lasts a few samples: a cubic through them follows it, a straight line would not, and across more of
+    them nothing does: what is not there is not made up. Raises AlignmentError where the record begins later or ends
+    earlier, has a hole (rows or values missing, a marker held or set to zero), or too few samples a second.
     """
+    measured = np.isfinite(values)
+    measured[measured] = ~held(values[measured])
+    if measured.sum() < 4:
+        raise AlignmentError(f"the instrument's record has {int(measured.sum())} values: nothing to follow; repeat")
+    instrument_s, values = instrument_s[measured], values[measured]
     away_s = 2 * np.median(np.diff(instrument_s))
+    _refuse_holes(instrument_s, time_s)
     late_s, early_s = instrument_s[0] - time_s[0], time_s[-1] - instrument_s[-1]
     if max(late_s, early_s) > away_s:
         what = f"begins {late_s:.2f} s too late" if late_s > away_s else f"ends {early_s:.2f} s too early"
@@ -82,6 +92,31 @@ def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) 
     from scipy.interpolate import CubicSpline  # slow to import
 
     return CubicSpline(instrument_s, values)(np.clip(time_s, instrument_s[0], instrument_s[-1]))
+
+
+def camera_rate(instrument_s: np.ndarray) -> dict[str, float]:
+    """What a trial notes of its camera: its samples are then taken at the Uno's."""
+    return {"camera_rate_hz": round(float(1.0 / np.median(np.diff(instrument_s))), 1)}
+
+
+def _refuse_holes(instrument_s: np.ndarray, time_s: np.ndarray) -> None:
+    period_s = float(np.median(np.diff(instrument_s)))
+    if period_s > SLOWEST_S:
+        raise AlignmentError(
+            f"the camera recorded {1.0 / period_s:.3g} samples a second: a snap-through lasts about 50 ms, so that at "
+            f"least 50 are needed, better 100; set its rate, and repeat"
+        )
+    steps = np.diff(instrument_s)
+    within = (instrument_s[1:] > time_s[0]) & (instrument_s[:-1] < time_s[-1])
+    wide = np.flatnonzero(within & (steps > max(LONGEST_GAP_S, 2.5 * period_s)))
+    if len(wide):
+        worst = wide[np.argmax(steps[wide])]
+        raise AlignmentError(
+            f"the instrument's record has {len(wide)} hole{'s' if len(wide) > 1 else ''}, the longest of "
+            f"{steps[worst]:.2f} s at {instrument_s[worst] - time_s[0]:.2f} s of the trial (about "
+            f"{round(steps[worst] / period_s) - 1} samples: rows missing, or a marker lost): what is missing is not "
+            "made up; repeat"
+        )
 
 
 def _gaps(sync_s: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from bifa.data import Trial
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.units import set_point_psi
-from bifa.measure.alignment import AlignmentError, resampled
+from bifa.measure.alignment import AlignmentError, camera_rate, resampled
 from bifa.measure.locomotion import noted, record_walk
 from bifa.measure.plan import PULL_MM, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, idle, instruments_of, mount
@@ -120,7 +120,7 @@ def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
     }
     switches = [up_s - time_s[0], up_s - time_s[0] + STEP_DOWN_S - STEP_UP_S]
     known = {"switch_time_s": [float(t) for t in switches], "switch_error_s": error_s}
-    return columns, noted(tape.clock) | known, tape.lost_samples
+    return columns, noted(tape.clock) | known | camera_rate(tape.instrument_s), tape.lost_samples
 
 
 def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):

@@ -19,11 +19,20 @@ import numpy as np
 
 from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
 from bifa.data.layout import TABLE_FILE
+from bifa.data.lost import codes
 from bifa.data.write import add_trial
 from bifa.errors import BifaError
 from bifa.link.table import CHAMBERS
 from bifa.link.uno import PRESSURES_AFTER_S
-from bifa.measure.alignment import AlignmentError, ClockLine, align, align_after_restart, resampled
+from bifa.measure.alignment import (
+    LONGEST_GAP_S,
+    AlignmentError,
+    ClockLine,
+    align,
+    align_after_restart,
+    camera_rate,
+    resampled,
+)
 from bifa.measure.experiments import CHAMBER_OF
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.locomotion import noted
@@ -61,10 +70,12 @@ def import_trial(
     uno = _read_telemetry(_telemetry_file(telemetry), planned)
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
-    columns = _assemble(measured, clock.to_uno(measured.pop("time_s")), uno, planned, instrument)
+    instrument_s = clock.to_uno(measured.pop("time_s"))
+    columns = _assemble(measured, instrument_s, uno, planned, instrument)
+    camera = camera_rate(instrument_s) if planned.experiment in ("step_response", "locomotion") else {}
     if recorded is not None:
         planned = _next_repeat(recorded, planned)
-    trial = planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S})
+    trial = planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S} | camera)
     if recorded is None:
         name = f"{planned.experiment} from {instrument.name}"
         return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
@@ -102,12 +113,23 @@ def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np
     columns, edges = _whole(path, ("time_s", *channels)), _whole(sync_file(path), ("sync_time_s",))
     _refuse_falling(path, columns, "time_s")
     _refuse_falling(sync_file(path), edges, "sync_time_s")
+    _refuse_codes(path, columns, channels)
     if _HEAD in channels and _TAIL in columns:
         if np.isnan(columns[_TAIL]).all():
             del columns[_TAIL]
         else:
             _refuse_gaps(path, columns, (_TAIL,), _LOST)
     return columns, edges["sync_time_s"]
+
+
+def _refuse_codes(path: Path, columns: dict[str, np.ndarray], channels: tuple[str, ...]) -> None:
+    for name in (*channels, *((_TAIL,) if _TAIL in columns else ())):
+        if (coded := codes(columns[name])).any():
+            row = int(np.flatnonzero(coded)[0])
+            raise InstrumentFileError(
+                f"{path}, line {row + 2}, column {name}: {columns[name][row]:g} stands for no value (a lost marker?); "
+                "fill the gap by the instrument's own means, or record again"
+            )
 
 
 def sync_file(path: Path) -> Path:
@@ -255,6 +277,7 @@ def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instru
     keep = overlap & (instrument_s >= first) & (instrument_s <= last)
     chamber = CHAMBER_OF.get(planned.actuator, "head")  # a pull has no actuator: it is of the head
     time_s = instrument_s[keep]
+    _refuse_silence(uno["time_s"], time_s)
     return {
         "time_s": time_s - time_s[0],
         "displacement_mm": measured["displacement_mm"][keep],
@@ -272,6 +295,7 @@ def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path
     if not keep.any():
         raise InstrumentFileError(f"{instrument} does not cover the time in which the valves were commanded")
     time_s = uno["time_s"][keep]
+    _refuse_silence(uno["time_s"], time_s)
     columns = {"time_s": time_s - time_s[0]}
     for chamber, command in zip(chambers, commands, strict=True):
         suffix = "" if step else f"_{chamber}"
@@ -279,5 +303,20 @@ def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path
         columns[f"pressure{suffix}_psi"] = uno[f"pressure_{chamber}_psi"][keep]
     for name in ("displacement_mm",) if step else ("displacement_head_mm", "displacement_tail_mm"):
         if name in measured:
-            columns[name] = resampled(time_s, instrument_s, measured[name])
+            try:
+                columns[name] = resampled(time_s, instrument_s, measured[name])
+            except AlignmentError as error:
+                raise InstrumentFileError(f"{instrument}, column {name}: {error}") from None
     return columns
+
+
+def _refuse_silence(uno_s: np.ndarray, time_s: np.ndarray) -> None:
+    """Nothing is made up for samples of the Uno that were lost."""
+    steps = np.diff(uno_s)
+    silent = np.flatnonzero((steps > LONGEST_GAP_S) & (uno_s[1:] > time_s[0]) & (uno_s[:-1] < time_s[-1]))
+    if len(silent):
+        worst = silent[np.argmax(steps[silent])]
+        raise InstrumentFileError(
+            f"the telemetry has a hole of {steps[worst]:.2f} s at {uno_s[worst]:.2f} s on the Uno's clock, within the "
+            "trial: samples were lost on the link; check the cable, and record again"
+        )

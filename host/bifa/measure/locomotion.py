@@ -8,7 +8,7 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
-from bifa.measure.alignment import ClockLine, resampled
+from bifa.measure.alignment import ClockLine, camera_rate, resampled
 from bifa.measure.recording import LEAD_S, Recording, mount
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
@@ -24,15 +24,20 @@ class RecordedWalk:
     columns: dict[str, np.ndarray]
     clock: ClockLine
     lost_samples: int
+    camera: dict[str, float]
 
     @property
     def extra(self) -> dict[str, float]:
         """What a trial notes of its recording."""
-        return noted(self.clock) | {
-            "switch_error_s": TICK_S / 2,
-            "command_age_s": PRESSURES_AFTER_S,
-            "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
-        }
+        return (
+            noted(self.clock)
+            | self.camera
+            | {
+                "switch_error_s": TICK_S / 2,
+                "command_age_s": PRESSURES_AFTER_S,
+                "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
+            }
+        )
 
 
 def noted(clock: ClockLine) -> dict[str, float]:
@@ -59,7 +64,9 @@ def record_walk(
         tape.wait(LEAD_S, report=False)
         uno.run()
         tape.wait(cycles * gait.period_s + LEAD_S)
-    return RecordedWalk(_columns(tape, gait.period_s, cycles), tape.clock, tape.lost_samples)
+    return RecordedWalk(
+        _columns(tape, gait.period_s, cycles), tape.clock, tape.lost_samples, camera_rate(tape.instrument_s)
+    )
 
 
 def _columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from bifa.cli import app
 from bifa.data import EXPERIMENTS, Dataset, write_dataset
-from bifa.data.check import check_dataset
+from bifa.data.check import check_dataset, check_trial
 from bifa.files import TargetError
 
 from .data_sets import make_dataset, make_trial
@@ -46,6 +46,17 @@ def put(start, stop, value):
     return change
 
 
+def held_over(values, start, stop):
+    values[start:stop] = values[start - 1]
+    values[stop:] += 3.0
+    return values
+
+
+def test_a_slow_camera_is_pointed_out_though_its_samples_are_taken_at_the_unos():
+    trial = replace(make_trial("step_response", 1), extra={"camera_rate_hz": 60.0})
+    assert "the camera recorded 60 samples a second" in " ".join(map(str, check_trial(trial)))
+
+
 def test_a_sound_data_set_has_no_findings():
     assert check_dataset(sound()) == []
 
@@ -67,6 +78,9 @@ def test_a_sound_data_set_has_no_findings():
         ("locomotion_2.csv", "time_s", lambda x: x + 0.055 * (np.arange(40) >= 10), "clock jump", 12),
         ("locomotion_2.csv", "time_s", lambda x: x - 0.008 * (np.arange(40) >= 10), "clock jump", 12),
         ("static_loading_1.csv", "time_s", lambda x: x * 1.3, "rate", None),
+        ("static_loading_1.csv", "force_N", put(11, 14, -999.0), "no value", 13),
+        ("step_response_1.csv", "displacement_mm", put(20, 26, 0.0), "held", 22),
+        ("locomotion_1.csv", "displacement_head_mm", lambda x: held_over(x, 20, 26), "held", 22),
     ],
 )
 def test_a_fault_is_found_where_it_is(file, column, change, kind, line):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bifa.link.uno import MARK_PAUSE
-from bifa.measure.alignment import AlignmentError, align, align_after_restart, resampled
+from bifa.measure.alignment import AlignmentError, align, align_after_restart, camera_rate, resampled
 
 PERIOD_S = 0.01
 MARKED = 4711
@@ -131,3 +131,53 @@ def test_a_record_that_does_not_cover_the_experiment_is_not_completed(first_s, l
         resampled(np.arange(0.0, 1.0, 0.01), camera_s, np.sin(camera_s))
     within = np.arange(first_s - 0.015, last_s, 0.01)
     assert resampled(within, camera_s, np.sin(camera_s)) == pytest.approx(np.sin(within), abs=0.02)
+
+
+# -- what is missing is not made up ----------------------------------------------------------------------------
+
+UNO_S = np.arange(0.0, 8.0, 0.01)
+CAMERA_S = np.arange(-0.1, 8.1, 0.01) + 0.003
+NOISE_MM = 0.02 * np.random.default_rng(2).standard_normal(len(CAMERA_S))
+
+
+def snapped(time_s):
+    """A snap-through of 40 mm in 50 ms at 3.4 s."""
+    return 20.0 * (1.0 + np.tanh((time_s - 3.4) / 0.012))
+
+
+SEEN_MM = snapped(CAMERA_S) + NOISE_MM
+
+
+@given(first=st.integers(20, 780), length=st.integers(1, 200))
+def test_rows_that_are_missing_are_followed_over_two_and_refused_beyond(first, length):
+    keep = np.ones(len(CAMERA_S), bool)
+    keep[first : first + length] = False
+    within = CAMERA_S[first - 1] < UNO_S[-1]
+    if length > 2 and within and first + length < len(keep):
+        with pytest.raises(AlignmentError, match=r"hole.*not made up; repeat|ends .* too early"):
+            resampled(UNO_S, CAMERA_S[keep], SEEN_MM[keep])
+    elif length <= 2:
+        found = resampled(UNO_S, CAMERA_S[keep], SEEN_MM[keep])
+        assert np.abs(found - snapped(UNO_S)).max() < 8.0
+
+
+@pytest.mark.parametrize("lost", [np.nan, 0.0, "held"])
+def test_a_lost_marker_is_a_hole_whatever_the_camera_wrote(lost):
+    values = SEEN_MM.copy()
+    values[330:380] = values[329] if lost == "held" else lost
+    values[600:630] = values[599] if lost == "held" else lost
+    with pytest.raises(AlignmentError, match=r"2 holes|1 hole"):
+        resampled(UNO_S, CAMERA_S, values)
+
+
+def test_a_camera_at_rest_or_a_coarse_one_repeats_values_and_loses_nothing():
+    for values in (np.round(SEEN_MM, 1), np.where(CAMERA_S < 3.3, 0.0, SEEN_MM)):
+        assert np.isfinite(resampled(UNO_S, CAMERA_S, values)).all()
+
+
+@pytest.mark.parametrize("rate_hz", [2.0, 10.0, 30.0, 45.0])
+def test_a_slow_camera_is_refused(rate_hz):
+    camera_s = np.arange(-0.6, 8.6, 1.0 / rate_hz)
+    with pytest.raises(AlignmentError, match=f"{rate_hz:g} samples a second.*at least 50"):
+        resampled(UNO_S, camera_s, snapped(camera_s))
+    assert camera_rate(camera_s) == {"camera_rate_hz": rate_hz}

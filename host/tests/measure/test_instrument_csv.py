@@ -254,3 +254,33 @@ def test_a_record_is_not_added_again_with_other_pressures(files):
     path.write_text(path.read_text().replace("8.500000", "8.400000"))
     with pytest.raises(InstrumentFileError, match="already"):
         import_trial(files / "pull.csv", files, PULL, files / "out", add=True)
+
+
+def test_a_hole_in_the_telemetry_is_not_filled(files):
+    lines = (files / "telemetry_1.csv").read_text().splitlines()
+    kept = [line for line in lines if not line[0].isdigit() or not 4.5 < float(line.split(",")[0]) < 6.5]
+    (files / "telemetry_1.csv").write_text("\n".join(kept))
+    with pytest.raises(InstrumentFileError, match=r"the telemetry has a hole of 2\.00 s at 4\.50 s"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_rows_of_a_camera_that_are_missing_are_named_with_file_and_column(files):
+    camera = np.arange(-2.0, 7.9, 0.01)
+    camera = camera[(camera < 3.2) | (camera > 3.7)]
+    write(files / "cam.csv", {"time_s": own(camera), "displacement_mm": 50.0 * (camera > 3.45)})
+    (files / "pull.sync.csv").rename(files / "cam.sync.csv")
+    header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
+    text = "\n".join([f"{header},command_body", *(f"{row},{float(row[:4]) >= 2.5:d}" for row in rows)])
+    (files / "telemetry_1.csv").write_text(text)
+    with pytest.raises(InstrumentFileError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not made up"):
+        import_trial(files / "cam.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
+
+
+@pytest.mark.parametrize("code", ["-999", "9999.0"])
+def test_a_code_for_no_value_is_no_value(files, code):
+    lines = (files / "pull.csv").read_text().splitlines()
+    time_s, _, force = lines[40].split(",")
+    (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{code},{force}", *lines[41:]]))
+    with pytest.raises(InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ stands for no"):
+        import_trial(files / "pull.csv", files, PULL, files / "out")

@@ -1,0 +1,38 @@
+"""Numbers that nobody measured: a marker held, or set to zero, while it was out of sight; a code for "no value"."""
+
+import numpy as np
+
+_CODES = (999.0, 9999.0, 99999.0, 999999.0)  # of either sign, as exporters write where they have no value
+_HELD = 3  # equal samples in a row; two may be chance
+_RARELY = 0.05  # of neighbouring samples that are equal elsewhere: a coarser instrument, or one that rests, repeats
+_JUMP_MM = 1.0  # with which a held marker is found again, where it had been moving
+_FAR_MM = 5.0  # no motion there and back again
+
+
+def codes(values: np.ndarray) -> np.ndarray:
+    """Which samples stand for no value: a code of its own kind among other values, shape (n,)."""
+    found = np.isin(np.abs(values), _CODES)
+    return found if not found.all() else np.zeros(len(values), bool)
+
+
+def held(values_mm: np.ndarray) -> np.ndarray:
+    """Which samples of a tracked displacement repeat the one before because the marker was lost, shape (n,): it was
+    elsewhere before, or when it was found again. At rest a sample may repeat, and nothing is lost."""
+    found = np.zeros(len(values_mm), bool)
+    same = np.diff(values_mm) == 0.0
+    for first, last in _runs(same):
+        entry = abs(values_mm[first] - values_mm[first - 1]) if first else 0.0
+        leave = abs(values_mm[last + 1] - values_mm[last]) if last + 1 < len(values_mm) else 0.0
+        elsewhere = same.sum() - (last - first) <= _RARELY * len(same)
+        if min(entry, leave) > _FAR_MM:  # set to a number of its own: nothing of it was measured
+            found[first : last + 1] = True
+        elif elsewhere and max(entry, leave) > _JUMP_MM:
+            found[first + 1 : last + 1] = True
+    return found
+
+
+def _runs(same: np.ndarray) -> list[tuple[int, int]]:
+    """First and last sample of each run of equal ones, of `_HELD` or more."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], same.astype(np.int8), [0]))))
+    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(first, last) for first, last in runs if last - first + 1 >= _HELD]
