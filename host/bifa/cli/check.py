@@ -56,6 +56,13 @@ def register(app: typer.Typer) -> None:
             raise typer.Exit(1)
 
 
+def warn_of_units(console, dataset) -> None:
+    """What a fit would stumble over, or make a diagnosis of."""
+    from bifa.mistakes import find_mistakes
+
+    _print_findings(console, [finding for finding in find_mistakes(dataset) if finding.kind == "unit"])
+
+
 def _print_findings(console, findings) -> None:
     from rich.text import Text
 

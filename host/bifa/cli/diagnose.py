@@ -9,6 +9,7 @@ import typer
 
 from bifa import cluster
 from bifa.cli._options import DATASET, WATCH, file_option, port_option
+from bifa.cli.check import warn_of_units
 
 
 def register(app: typer.Typer) -> None:
@@ -65,6 +66,7 @@ def diagnose(
     console = Console()
     good_enough = accuracies(matters or ())
     measured = read_dataset(dataset)
+    warn_of_units(console, measured)
     beside = named(dataset)
     folder = beside.with_name(f"{beside.name}-resolved") if resolve else None
     if folder is not None:

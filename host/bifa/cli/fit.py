@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from bifa.cli._options import DATASET, PICTURES, file_option
+from bifa.cli.check import warn_of_units
 
 EPILOG = """Examples:  bifa fit out/bench --out model.toml   |
 bifa fit out/bench --out model.toml --report fit.html --pictures out/pictures"""
@@ -46,6 +47,7 @@ def fit(
 
     console = Console()
     measured = read_dataset(dataset)
+    warn_of_units(console, measured)
     begun = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:

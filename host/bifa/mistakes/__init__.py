@@ -14,6 +14,7 @@ from .known import check_known
 from .loadings import check_anchor_pull, check_static_loading
 from .repeats import check_repeats
 from .steps import check_step_response
+from .units import check_strokes, check_units
 from .walks import check_walk
 
 __all__ = ["find_mistakes", "mistakes_in"]
@@ -28,14 +29,15 @@ _CHECKS = {
 def mistakes_in(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
     """What was mistaken in one trial, as it seems; `walks`, others of the day, may have the gait that it was."""
     if trial.experiment == "locomotion":
-        return list(check_walk(trial, walks))
-    return list(_CHECKS[trial.experiment](trial))
+        return [*check_walk(trial, walks), *check_units(trial)]
+    return [*_CHECKS[trial.experiment](trial), *check_units(trial)]
 
 
 def find_mistakes(dataset: Dataset) -> list[Finding]:
     """What was mistaken in a data set, as it seems: what is known beforehand, single trials, odd repeats."""
     walks = dataset.of("locomotion")
     found = [finding for trial in dataset.trials for finding in mistakes_in(trial, walks)]
+    found += check_strokes(dataset, {finding.file for finding in found if finding.kind == "unit"})
     files = {finding.file for finding in found}
     odd = list(check_repeats(dataset, files))
     copies = check_copies(dataset, {file for finding in odd for file in (finding.file, *finding.files)})

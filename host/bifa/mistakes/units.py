@@ -1,0 +1,159 @@
+"""Displacement and force in another unit, or in each other's columns: by what else is known of the same motion.
+
+The cross-head's declared speed, the pressure times the area, and the other instrument's stroke each tell the scale.
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.data import Dataset, Trial
+from bifa.data.check import Finding
+from bifa.robot.parameters import BASE_PARAMETERS
+
+_MM = {"cm": 10.0, "in": 25.4, "m": 1000.0, "um": 1e-3}  # in mm
+_N = {"lbf": 4.448222, "kgf": 9.80665, "kN": 1000.0, "mN": 1e-3}  # in N
+_SPEED = (0.8, 1.25)  # of the declared rate; healthy: 0.99 to 1.01
+_OVER_S = 0.5  # a speed is taken over so long
+_AREA = 2.5  # times outside what is plausible; healthy: within 1.0 of it, and pounds 4.4 times outside
+_PRESSED_PSI = 3.0  # from here on area times pressure outweighs the spring in the mean force
+_HELD_PSI = 5.0  # from here on an anchor holds
+_SNAP, _SNAP_S = (
+    0.35,
+    0.06,
+)  # of the range, within so long; healthy: 0.5 and more where it snaps, 0.15 where it does not
+_SMALLER, _LARGER = 0.2, 2.2  # of the cross-head's stroke; healthy: 1.1 to 1.5, drawn in by vacuum and pressed out
+_PULL_N = (2.0, 150.0)  # of an anchor that holds, the median; healthy: 15 to 31, and 4 where it does not
+_LONGEST_MM = 200.0  # that a body is at its longest more than at its shortest; healthy: 60 to 70
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Of an actuator, far outside what any of its kind has: range of a static loading's displacement and force."""
+
+    stroke_mm: tuple[float, float]
+    force_N: tuple[float, float]
+    area: str
+
+
+_KINDS = {
+    "large": _Kind((30.0, 110.0), (28.0, 250.0), "body_area_N_psi"),  # healthy: 52 to 54 mm, 63 to 87 N
+    "small": _Kind((15.0, 60.0), (6.5, 60.0), "small_area_N_psi"),  # healthy: 29 to 30 mm, 14 to 20 N
+}
+
+
+def check_units(trial: Trial) -> Iterator[Finding]:
+    """One finding a column that cannot be in the unit of its name."""
+    if trial.experiment in ("static_loading", "anchor_pull"):
+        yield from _speed(trial)
+        yield from _force(trial)
+    elif trial.experiment == "locomotion" and "displacement_tail_mm" in trial.columns:
+        long_mm = float(np.ptp(_length_mm(trial)))
+        if long_mm > _LONGEST_MM:
+            text = f"the body's length changes by {long_mm:.4g} mm, where some 60 is possible"
+            yield Finding("unit", text + _or_else(long_mm, 60.0, _MM), trial.file, column="displacement_head_mm")
+
+
+def check_strokes(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[Finding]:
+    """The camera's stroke against the cross-head's, of the same actuator; `besides`: files that are wrong already."""
+    strokes = {}
+    for actuator in _KINDS:
+        found = [_stroke_mm(t) for t in dataset.of("static_loading", actuator) if t.file not in besides]
+        if found:
+            strokes[actuator] = float(np.median(found))
+    for trial in dataset.trials:
+        actuator, seen_mm, column = _seen(trial)
+        if actuator not in strokes or trial.file in besides:
+            continue
+        moved_mm = float(np.ptp(seen_mm))
+        share = moved_mm / strokes[actuator]
+        if share > _LARGER or (share < _SMALLER and _snaps(trial.time_s, seen_mm)):
+            text = (
+                f"moves by {moved_mm:.3g} mm, and in the testing machine by {strokes[actuator]:.3g} mm"
+                f"{_or_else(moved_mm, 1.2 * strokes[actuator], _MM)}"
+            )
+            yield Finding("unit", text, trial.file, column=column)
+
+
+def _seen(trial: Trial) -> tuple[str | None, np.ndarray, str]:
+    """Which actuator a camera saw, its length [mm], and by which column. Without a tail a walk tells no length."""
+    if trial.experiment == "step_response":
+        return trial.actuator, trial.columns["displacement_mm"], "displacement_mm"
+    if trial.experiment == "locomotion" and "displacement_tail_mm" in trial.columns:
+        return "large", _length_mm(trial), "displacement_head_mm"
+    return None, np.zeros(1), ""
+
+
+def _snaps(time_s: np.ndarray, length_mm: np.ndarray) -> bool:
+    """Whether it goes a good part of its way within moments, in whatever unit; filling alone takes a second."""
+    step = max(1, round(_SNAP_S / float(np.median(np.diff(time_s)))))
+    return bool(np.abs(length_mm[step:] - length_mm[:-step]).max() > _SNAP * np.ptp(length_mm) > 0.0)
+
+
+def _stroke_mm(trial: Trial) -> float:
+    return float(np.ptp(trial.columns["displacement_mm"]))
+
+
+def _length_mm(trial: Trial) -> np.ndarray:
+    return trial.columns["displacement_head_mm"] - trial.columns["displacement_tail_mm"]
+
+
+def _speed(trial: Trial) -> Iterator[Finding]:
+    """Where the declared rate and the measured one differ, or the actuator cannot have gone so far."""
+    speed_mm_s = _speed_mm_s(trial)
+    low, high = _KINDS[trial.actuator].stroke_mm if trial.actuator else (0.0, np.inf)
+    moved_mm = _stroke_mm(trial)
+    if speed_mm_s is not None and not _SPEED[0] < speed_mm_s / trial.rate_mm_s < _SPEED[1]:
+        text = (
+            f"moves at {speed_mm_s:.3g} mm/s where rate_mm_s = {trial.rate_mm_s:g}"
+            f"{_or_else(speed_mm_s, trial.rate_mm_s, _MM, 0.1)}"
+        )
+        yield Finding("unit", text, trial.file, column="displacement_mm")
+    elif moved_mm > high or 0.0 < moved_mm < 0.3 * low:  # a part of the stroke may have been all that was wanted
+        text = f"moves by {moved_mm:.3g} mm, where the actuator's stroke is {low:g} to {high:g} mm"
+        yield Finding("unit", text + _or_else(moved_mm, 0.5 * (low + high), _MM), trial.file, column="displacement_mm")
+
+
+def _speed_mm_s(trial: Trial) -> float | None:
+    """The median while it moves; None where it hardly does."""
+    time_s, place_mm = trial.time_s, trial.columns["displacement_mm"]
+    step = max(1, round(_OVER_S / float(np.median(np.diff(time_s)))))
+    if len(time_s) <= 2 * step:
+        return None
+    speed = np.abs(place_mm[step:] - place_mm[:-step]) / (time_s[step:] - time_s[:-step])
+    return float(np.median(speed[speed >= 0.5 * speed.max()])) if speed.max() > 0.0 else None
+
+
+def _force(trial: Trial) -> Iterator[Finding]:
+    """Where the spring's force, area times pressure, or what an anchor holds is out of all proportion."""
+    force_N = trial.columns["force_N"]
+    for seen, (low, high), what in _forces(trial, force_N):
+        if not low <= seen <= high:
+            text = f"{what} {seen:.3g}, where {low:.3g} to {high:.3g} is possible"
+            yield Finding("unit", text + _or_else(seen, np.sqrt(low * high), _N), trial.file, column="force_N")
+            return
+
+
+def _forces(trial: Trial, force_N: np.ndarray) -> Iterator[tuple[float, tuple[float, float], str]]:
+    pressed = trial.pressure_psi or 0.0
+    if trial.experiment == "anchor_pull":
+        if pressed >= _HELD_PSI:
+            yield abs(float(np.median(force_N))), _PULL_N, "N that the anchor holds:"
+        return
+    kind = _KINDS[trial.actuator]
+    whole = _stroke_mm(trial) >= kind.stroke_mm[0]
+    if whole:
+        yield float(np.ptp(force_N)), kind.force_N, "N from the least to the most:"
+    if whole and abs(pressed) >= _PRESSED_PSI:
+        low, high = BASE_PARAMETERS[kind.area].plausible
+        area = abs(float(np.mean(force_N)) / pressed)
+        yield area, (low / _AREA, high * _AREA), "N per psi, mean force by pressure:"
+
+
+def _or_else(seen: float, expected: float, units: Mapping[str, float], within: float = 0.5) -> str:
+    """In which unit it would be right, if in one; and what to do."""
+    for unit, size in units.items():
+        if abs(np.log(seen * size / expected)) < within if seen > 0.0 else False:
+            return f": is it in {unit}? Declare the unit of the export, or multiply by {size:g}"
+    return ": check its unit, and that columns are not exchanged"
