@@ -36,12 +36,35 @@
     const c = contrast(rgba(node instanceof SVGElement ? style.fill : style.color), behind(node));
     if (c < 4.5) found.push(`contrast ${c.toFixed(2)}: ${name(node)}`);
   }
-  for (const path of document.querySelectorAll(".plot .scatterlayer path.js-line, .plot .scatterlayer path.js-fill, .keys i, .motion rect[class]")) {
+  for (const path of document.querySelectorAll(".keys i, .motion rect[class]")) {
     const style = getComputedStyle(path);
-    const colour = path.matches(".keys i") ? style.color : path.matches(".js-line") ? style.stroke : style.fill;
+    const colour = path.matches(".keys i") ? style.color : style.fill;
     if (rgba(colour)[3] < 255) continue;
     const c = contrast(rgba(colour), behind(path.parentElement));
     if (c < 3) found.push(`contrast ${c.toFixed(2)}: ${colour} ${path.className.baseVal || path.className}`);
+  }
+
+  // The same of what the plots letter and draw.
+  for (const plot of document.querySelectorAll(".plot")) for (const chart of plot.charts) {
+    const { ctx, width, height } = chart, ground = behind(chart.canvas), words = [];
+    for (const scale of Object.values(chart.scales).filter((one) => one.options.ticks.display)) for (const { label, font, textOffset, options } of scale.getLabelItems(chart.chartArea)) {
+      if (!label) continue;
+      ctx.font = font.string;
+      const wide = ctx.measureText(label).width, [x, y] = options.translation;
+      const from = options.textAlign === "right" ? x - wide : options.textAlign === "left" ? x : x - wide / 2;
+      words.push({ label, from, to: from + wide, top: y + textOffset - font.size / 2, size: font.size });
+      if (from < -1 || from + wide > width + 1 || y > height) found.push(`cut off in a plot: ${label}`);
+      if (font.size < 10.5) found.push(`only ${font.size} px in a plot: ${label}`);
+      const c = contrast(rgba(options.color), ground);
+      if (c < 4.5) found.push(`contrast ${c.toFixed(2)} in a plot: ${label}`);
+    }
+    words.forEach((a, i) => words.slice(i + 1).forEach((b) => {
+      if (Math.min(a.to, b.to) - Math.max(a.from, b.from) > 1 && Math.abs(a.top - b.top) < a.size - 3) found.push(`${a.label} lies over ${b.label} in a plot`);
+    }));
+    for (const { borderColor, label } of chart.data.datasets) {
+      const c = contrast(rgba(borderColor), ground);
+      if (c < 3) found.push(`contrast ${c.toFixed(2)}: ${borderColor} of ${label}`);
+    }
   }
   return found;
 }

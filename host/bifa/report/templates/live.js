@@ -123,27 +123,50 @@
     if (report.position_mm) { speedBox.textContent = speed(); document.getElementById("path-key").hidden = false; }
   };
 
-  const draw = () => {
-    if (!window.Plotly) return; // it is large and comes last: the page is connected, and Stop works, before it is there
+  // A panel for pressures, valves and, where it is seen, the head's position; made when there is something to draw.
+  let panels = [];
+  const panel = (height, label, y, curves, isLast) => {
     const colours = dark.matches ? palettes.dark : palettes.light;
-    const line = (name, x, y, axis, shape = "linear") => ({ type: "scatter", mode: "lines", name, x, y, yaxis: axis, line: { color: colours[name] || colours.ink, width: 1.6, shape }, hoverinfo: "skip" });
+    const canvas = plot.appendChild(document.createElement("div")).appendChild(document.createElement("canvas"));
+    Object.assign(canvas.parentElement.style, { height: `${height}px`, position: "relative" });
+    const axis = (text, rest) => ({ type: "linear", title: { display: Boolean(text), text, color: colours.ink }, grid: { color: colours.grid }, border: { color: colours.quiet }, ...rest });
+    return new Chart(canvas, {
+      type: "scatter",
+      data: { datasets: curves.map(([name, points, stepped]) => ({ points, data: [], showLine: true, pointRadius: 0, borderWidth: 1.6, borderColor: colours[name] || colours.ink, stepped })) },
+      options: {
+        animation: false, maintainAspectRatio: false, events: [], layout: { autoPadding: false, padding: { right: 10, top: 6 } },
+        plugins: { legend: { display: false }, tooltip: { enabled: false } },
+        scales: {
+          x: axis(isLast ? "time of the Uno, s" : "", { ticks: { display: isLast, includeBounds: false, color: colours.ink } }),
+          y: axis(label, { ...y, ticks: { color: colours.ink, includeBounds: false, maxTicksLimit: 6, ...y.ticks }, afterFit: (scale) => { scale.width = 74; } }),
+        },
+      },
+    });
+  };
+  const setPanels = () => {
+    for (const one of panels) one.destroy();
+    plot.replaceChildren();
+    const withPath = path.t.length > 0, traced = (part, stepped) => chambers.map((name) => [name, () => [times, traces[name][part]], stepped]);
+    const places = chambers.map((name, i) => [1.2 * i + 0.4, name]);
+    panels = [
+      panel(200, "psi", { min: -15, max: 15 }, traced("psi", false), false),
+      panel(withPath ? 90 : 120, "valves", { min: -0.2, max: 3.4, afterBuildTicks: (scale) => { scale.ticks = places.map(([value]) => ({ value })); }, ticks: { callback: (value) => places.find(([place]) => place === value)[1] } }, traced("valves", true), !withPath),
+      ...(withPath ? [panel(140, "mm", {}, [["ink", () => [path.t, path.mm], false]], true)] : []),
+    ];
+  };
+
+  const draw = () => {
+    if (!window.Chart) return; // it comes last: the page is connected, and Stop works, before it is there
+    if (panels.length !== (path.t.length ? 3 : 2)) setPanels();
     const now = times.length ? times[times.length - 1] : 0;
-    const axis = (text, domain, rest) => ({ title: { text, standoff: 10 }, domain, gridcolor: colours.grid, zeroline: false, linecolor: colours.quiet, showline: true, fixedrange: true, automargin: true, ...rest });
-    const withPath = path.t.length > 0;
-    const parts = withPath ? [[0.62, 1], [0.38, 0.58], [0, 0.33]] : [[0.36, 1], [0, 0.3]];
-    const data = chambers.flatMap((name) => [line(name, times, traces[name].psi, "y"), line(name, times, traces[name].valves, "y2", "hv")]);
-    if (withPath) data.push(line("head's position", path.t, path.mm, "y3"));
-    Plotly.react(plot, data, {
-      height: withPath ? 430 : 320, margin: { l: 74, r: 8, t: 6, b: 40 }, showlegend: false,
-      paper_bgcolor: colours.paper, plot_bgcolor: colours.paper, font: { color: colours.ink, size: 12, family: "system-ui, sans-serif" },
-      width: Math.floor(plot.parentElement.getBoundingClientRect().width),
-      xaxis: { title: { text: "time of the Uno, s" }, range: [now - SHOWN_S, now], gridcolor: colours.grid, zeroline: false, fixedrange: true, anchor: withPath ? "y3" : "y2" },
-      yaxis: axis("psi", parts[0], { range: [-15, 12] }),
-      yaxis2: axis("valves", parts[1], { range: [-0.2, 3.4], tickvals: chambers.map((_, i) => 1.2 * i + 0.4), ticktext: chambers, showgrid: false }),
-      ...(withPath ? { yaxis3: axis("mm", parts[2]) } : {}),
-    }, { displayModeBar: false, staticPlot: true });
+    for (const one of panels) {
+      for (const curve of one.data.datasets) { const [x, y] = curve.points(); curve.data = x.map((t, i) => ({ x: t, y: y[i] })); }
+      Object.assign(one.options.scales.x, { min: now - SHOWN_S, max: now });
+      one.update("none");
+    }
     if (times.length) document.documentElement.dataset.drawn = times.length;
   };
+  dark.addEventListener("change", () => { panels = []; plot.replaceChildren(); });
 
   let fresh = false;
   const connect = () => {
