@@ -31,7 +31,9 @@ class PtyUno:
         os.set_blocking(self.master, False)
         while not self._ended.is_set():
             with contextlib.suppress(OSError):
-                self.board.write(os.read(self.master, 4096))
+                data = os.read(self.master, 4096)
+                self.on_heard(data)
+                self.board.write(data)
                 self.heard_s = self.board.now()
             self.board.sleep(STEP_S)
             if self.board.valves:
@@ -40,6 +42,9 @@ class PtyUno:
             with contextlib.suppress(BlockingIOError):  # nobody reads: a real port would lose bytes as well
                 os.write(self.master, data)
             self._ended.wait(STEP_S)
+
+    def on_heard(self, data: bytes) -> None:
+        """Called with what comes, as it comes."""
 
     def wait(self, duration_s: float) -> None:
         """Until so much of the board's own time has passed."""

@@ -75,8 +75,10 @@ def _fly(rig, console, port: int, model, seconds: float | None, begin) -> None:
     from bifa.live.web.server import LivePage, served
     from bifa.report.live_page import live_page
 
-    pilot = Pilot(Uno(rig.transport, rig.clock), rig.clock, getattr(rig.instruments, "position_mm", None))
+    pilot = Pilot()
     page = LivePage(pilot, live_page(), model)
+    pilot.is_watched = page.is_watched
+    position_mm = getattr(rig.instruments, "position_mm", None)
     with served(page, port) as address:
         console.print(f"page: {address.url}   (Ctrl-C ends it, and the robot stops)", highlight=False, soft_wrap=True)
-        pilot.fly(page.tell, seconds, begin)
+        pilot.fly(Uno(rig.transport, rig.clock), rig.clock, page.tell, seconds, begin, position_mm)

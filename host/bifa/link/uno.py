@@ -160,6 +160,11 @@ class Uno:
         """All parameters, read from the Uno."""
         return {name: from_wire(name, value) for name, value in self._read_set()[0].items()}
 
+    def parameters_and_pending(self) -> tuple[dict[str, float], bool]:
+        """As parameters(); and whether a walking robot takes them only at its next cycle."""
+        values, is_pending = self._read_set()
+        return {name: from_wire(name, value) for name, value in values.items()}, is_pending
+
     def get(self, name: str) -> float:
         """One parameter, read from the Uno."""
         index_of(name)

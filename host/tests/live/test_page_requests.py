@@ -1,23 +1,28 @@
 """What the live page's server makes of requests that its page would not send."""
 
 import http.client
-import json
+import socket
+import time
 from concurrent.futures import Future
 
 import pytest
+from wsproto.events import BytesMessage, TextMessage
 
+from bifa.live.web.gate import LARGEST_MESSAGE, MOST_STRANGERS
 from bifa.live.web.server import LivePage, served
 from bifa.robot import nominal
+from bifa.robot.gait import BASELINE
+from harness.web_socket import WebSocket
 
 
 class Stopping:
     """A pilot that only counts its stops."""
 
     def __init__(self) -> None:
-        self.stops = 0
+        self.stops = []
 
-    def stop(self) -> Future:
-        self.stops += 1
+    def stop(self, by: str) -> Future:
+        self.stops.append(by)
         done: Future = Future()
         done.set_result(None)
         return done
@@ -25,62 +30,194 @@ class Stopping:
 
 @pytest.fixture
 def live():
-    return LivePage(Stopping(), "<!doctype html>", nominal())
+    return LivePage(Stopping(), "<!doctype html>" + "x" * 12_000_000, nominal())
 
 
 @pytest.fixture
-def post(live):
-    """Post a body; the status and the answer."""
+def port(live):
     with served(live) as address:
-
-        def posted(name: str, body: str):
-            connection = http.client.HTTPConnection("127.0.0.1", address.port, timeout=20)
-            connection.request("POST", f"/{name}", body, {"Authorization": f"Bearer {live.token}"})
-            answer = connection.getresponse()
-            found = answer.status, json.loads(answer.read())
-            connection.close()
-            return found
-
-        yield posted
+        yield address.port
 
 
-@pytest.mark.parametrize("body", ["[]", "5", "null", "true", '"stop"', "{", "[" * 100_000, "\xff"])
-@pytest.mark.parametrize("name", ["closing", "predict"])
-def test_what_is_no_object_is_refused(post, live, name, body):
-    status, answer = post(name, body)
-    assert status == 400
-    assert "JSON" in answer["error"]
-    assert live.stops_when_closed
+@pytest.fixture
+def page(live, port):
+    """Open a page; with the token unless another is given."""
+    opened = []
+
+    def open_page(token=live.token, **headers):
+        opened.append(WebSocket(port, token, **headers))
+        return opened[-1]
+
+    yield open_page
+    for one in opened:
+        one.close()
+
+
+def posted(port: int, name: str, body: str = "", **headers: str) -> int:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.request("POST", f"/{name}", body, headers)
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+@pytest.mark.parametrize("text", ["[]", "5", "null", "true", '"stop"', "{", "[" * 4_000, "{}", '{"do": "stop"}'])
+def test_what_is_no_request_ends_its_page(page, live, text):
+    one = page()
+    one.state()
+    one.send(TextMessage(text))
+    assert [message for message in one.messages(5) if "id" in message] == []
+    assert "that is no request" in one.closed.reason
+    assert live._pilot.stops == []
+
+
+def test_bytes_end_their_page_and_do_nothing(page, live):
+    one = page()
+    one.state()
+    one.send(BytesMessage(b'{"id": 1, "do": "stop"}'))
+    assert list(one.messages(5)) == []
+    assert live._pilot.stops == []
 
 
 @pytest.mark.parametrize("stop", ["false", 0, None, []])
-def test_only_a_truth_value_decides_what_closing_does(post, live, stop):
-    status, answer = post("closing", json.dumps({"stop": stop}))
-    assert (status, live.stops_when_closed) == (400, True)
-    assert "true or false" in answer["error"]
-    assert post("closing", '{"stop": false}')[0] == 200
-    assert not live.stops_when_closed
+def test_only_a_truth_value_decides_what_closing_does(page, live, stop):
+    one = page()
+    assert "true or false" in one.answer(one.ask("closing", stop=stop))["error"]
+    assert live.state.content["stops_when_closed"]
+    assert "goes on" in one.answer(one.ask("closing", stop=False))["said"]
+    assert not live.state.content["stops_when_closed"]
 
 
 @pytest.mark.parametrize("gait", [None, [], {}, {"period_s": 4}])
-def test_what_is_no_gait_is_refused(post, gait):
-    status, answer = post("predict", json.dumps({"gait": gait}))
-    assert status == 400
-    assert "a gait has period_s" in answer["error"]
+def test_what_is_no_gait_is_refused(page, gait):
+    one = page()
+    assert "a gait has period_s" in one.answer(one.ask("draft", gait=gait))["error"]
+
+
+def test_what_is_not_known_is_refused_with_what_there_is(page):
+    one = page()
+    assert "run, clear, apply" in one.answer(one.ask("dance"))["error"]
 
 
 @pytest.mark.parametrize("body", ["", "{}", "[]", "{", "[" * 100_000])
-def test_a_stop_stops_whatever_comes_with_it(post, live, body):
-    assert post("stop", body)[0] == 200
-    assert live._pilot.stops == 1
+def test_a_stop_stops_whatever_comes_with_it(port, live, body):
+    assert posted(port, "stop", body) == 200
+    assert len(live._pilot.stops) == 1
+
+
+@pytest.mark.parametrize("token", [None, "of-an-earlier-server"])
+def test_a_stop_needs_no_token_and_all_else_does(page, port, live, token):
+    one = page(token)
+    you = one.state()["you"]
+    assert (you["is_owner"], you["is_stale"]) == (False, token is not None)
+    for name in ("run", "apply", "save", "clear", "load", "closing", "draft"):
+        assert "open the page by the address" in one.answer(one.ask(name, stop=False, gait={}))["error"]
+    assert live._pilot.stops == []
+    assert "confirms" in one.answer(one.ask("stop"))["said"]
+    assert posted(port, "stop") == 200
+    assert len(live._pilot.stops) == 2
+
+
+def test_a_page_from_elsewhere_is_not_heard(page, port, live):
+    one = page(live.token, Origin="http://evil.example")
+    assert list(one.messages(5)) == []
+    assert one.closed is not None
+    assert posted(port, "stop", Host="evil.example") == 400
+    assert live._pilot.stops == []
+
+
+def test_a_message_that_is_too_long_ends_its_page_alone(page):
+    one, other = page(), page()
+    one.state()
+    one.send(TextMessage("x" * (LARGEST_MESSAGE + 1)))
+    assert list(one.messages(5)) == []
+    assert other.state()["robot"] == "connecting"
+
+
+def test_strangers_make_room_for_whoever_comes(port, page):
+    owner = page()
+    owner.state()
+    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MOST_STRANGERS)]
+    try:
+        begun_s = time.monotonic()
+        assert posted(port, "stop") == 200
+        assert time.monotonic() - begun_s < 4.0, "before the strangers' own time is over"
+        assert owner.answer(owner.ask("stop"))["said"]
+        gone = [one for one in idle if _is_closed(one)]
+        assert len(idle) - len(gone) <= MOST_STRANGERS
+    finally:
+        for one in idle:
+            one.close()
+
+
+def test_who_never_ends_his_headers_is_left_after_a_while(port):
+    with socket.create_connection(("127.0.0.1", port), timeout=20) as slow:
+        slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+        begun_s = time.monotonic()
+        assert _is_closed(slow, 15.0)
+        assert 3.0 < time.monotonic() - begun_s < 12.0
+
+
+def test_who_does_not_read_the_page_does_not_make_the_server_hold_it(port, live):
+    """The page goes out in pieces as it is read: what waits for a reader who never reads is a piece or two."""
+    with socket.create_connection(("127.0.0.1", port), timeout=20) as slow:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        time.sleep(0.5)
+        [transport] = live.gate._strangers
+        assert transport.get_write_buffer_size() < 300_000
+        assert posted(port, "stop") == 200
 
 
 def test_a_page_may_come_while_the_last_reports_are_waited_for(live):
-    class Page:
+    class Messages:
         def empty(self) -> bool:
-            live._watchers.add(Page())  # as another thread does
+            live._pages.add(Slow())  # as another thread does
             return True
 
-    live._watchers.add(Page())
+    class Slow:
+        messages = Messages()
+
+    live._pages.add(Slow())
     live.flush(0.1)
-    assert len(live._watchers) > 1
+    assert len(live._pages) > 1
+
+
+def test_every_page_is_told_the_same(live, page):
+    one, other = page(), page(None)
+    seen = one.state(), other.state()
+    live.tell({"robot": "idle", "parameters": nominal_gait(), "presets": {"baseline": False}}, [sample(1.0)])
+    live.tell({"robot": "idle"}, [sample(1.1)])
+    states = [watcher.until(lambda state: state["prediction"]) for watcher in (one, other)]
+    assert seen[0]["you"]["number"] != seen[1]["you"]["number"]
+    assert states[0] == states[1]
+    assert states[0]["draft"]["gait"] == nominal_gait()
+    late = page()
+    message = next(late.messages())
+    assert message["whole"]
+    assert [round(one["t"], 1) for one in message["samples"]] == [1.0, 1.1]
+    assert message["version"] == live.state.version
+    one.ask("draft", gait=nominal_gait() | {"period_s": 4.0})
+    shown = other.until(lambda state: state["prediction"]["gait"]["period_s"] == 4.0)
+    assert shown["draft"]["gait"]["period_s"] == 4.0
+    assert shown["draft"]["by"] == seen[0]["you"]["number"]
+
+
+def nominal_gait() -> dict[str, float]:
+    return BASELINE.as_dict()
+
+
+def sample(t: float) -> dict:
+    return {"t": t, "psi": (0.0, 0.0, 0.0), "valves": ("off", "off", "off")}
+
+
+def _is_closed(one: socket.socket, timeout_s: float = 0.2) -> bool:
+    one.settimeout(timeout_s)
+    try:
+        while one.recv(65536):
+            pass
+        return True
+    except TimeoutError:
+        return False
+    except ConnectionError:
+        return True

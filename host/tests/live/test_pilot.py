@@ -1,22 +1,25 @@
 """Who talks to the robot: requests of other threads, and a stop that comes before all of them."""
 
+import threading
+from contextlib import nullcontext
+
 import pytest
 
-from bifa.link import PortGoneError, Uno
-from bifa.live.web.pilot import NobodyThereError, Pilot
+from bifa.link import PortGoneError, StillMovingError, Uno, frames
+from bifa.live.web.pilot import BusyError, NobodyThereError, Pilot
 from harness.board import Board
 
 
 def flown(during, seconds=0.5, begin=lambda uno: None):
     """A flight of the Uno's own code; `during(pilot, report)` is called with every report. Reports, and the board."""
     board, reports = Board(), []
-    pilot = Pilot(Uno(board, board), board)
+    pilot = Pilot()
 
-    def tell(report):
-        reports.append(report)
+    def tell(report, samples):
+        reports.append(report | {"samples": samples})
         during(pilot, report)
 
-    pilot.fly(tell, seconds, begin)
+    pilot.fly(Uno(board, board), board, tell, seconds, begin)
     return pilot, reports, board
 
 
@@ -34,7 +37,7 @@ def test_what_is_asked_is_done_and_answered():
 def test_reports_show_pressures_valves_and_phases():
     _, reports, _ = flown(lambda pilot, report: None, begin=lambda uno: uno.run())
     last = reports[-1]
-    assert last["state"] == "running"
+    assert last["robot"] == "running"
     assert {chamber["valves"] for chamber in last["chambers"].values()} <= {"positive", "vacuum", "off"}
     assert any(chamber["valves"] != "off" for chamber in last["chambers"].values())
     assert sum(len(report["samples"]) for report in reports) >= 5
@@ -45,34 +48,34 @@ def test_a_stop_comes_before_what_was_asked_and_is_confirmed():
     asked = []
 
     def during(pilot, report):
-        if report["state"] == "running" and not asked:
+        if report.get("robot") == "running" and not asked:
             asked.extend([pilot.ask(lambda uno: uno.run()), pilot.stop()])
 
     _, reports, board = flown(during, 1.0, begin=lambda uno: uno.run())
     run, stop = asked
     assert run.cancelled()
     assert stop.result(0) is None
-    assert reports[-1]["state"] == "stopped"
+    assert reports[-1]["robot"] == "stopped"
+    assert reports[-1]["stopped"] | {"at": ""} == {"by": "a page", "at": "", "is_confirmed": True, "why": ""}
     assert board.valves == 0
 
 
 def test_a_stop_that_finds_the_port_gone_leaves_nobody_waiting():
     board, asked = Board(), []
     uno = Uno(board, board)
-    pilot = Pilot(uno, board)
+    pilot = Pilot()
 
     def gone() -> None:
         raise PortGoneError("/dev/robot is gone")
 
-    def during(report):
+    def during(report, samples):
         if not asked:
             asked.append(pilot.ask(lambda uno: uno.run()))
             uno.send_stop = gone
-            with pytest.raises(PortGoneError):
-                pilot.stop()
+            pilot.stop()
             del uno.send_stop
 
-    pilot.fly(during, 0.5)
+    pilot.fly(uno, board, during, 0.5)
     assert asked[0].cancelled()
 
 
@@ -94,3 +97,108 @@ def test_afterwards_nothing_is_taken_any_more():
     assert board.valves == 0
     with pytest.raises(NobodyThereError, match="ended"):
         pilot.ask(lambda uno: uno.run()).result(0)
+
+
+def test_nothing_is_heaped_up_before_the_robot_and_its_own_time_is_kept():
+    asked = []
+
+    def during(pilot, report):
+        asked.extend(pilot.ask(lambda uno: uno.get("period_s")) for _ in range(100))
+
+    _, _, board = flown(during, 2.0)
+    assert 2.0 <= board.now() < 4.0, "asked without end, it still lands"
+    refused = [future for future in asked if isinstance(future.exception(0), BusyError)]
+    assert refused, "the hundredth is told at once that it comes too late"
+
+
+def test_a_stop_waits_for_nobody_who_writes():
+    """One thread sits in a write that does not come to its end (a jammed port); the stop goes out all the same."""
+    sent, stuck = threading.Event(), threading.Event()
+    pilot = Pilot()
+    board = Board()
+    uno = Uno(board, board)
+    uno.send_stop = sent.set
+
+    def jammed(uno):
+        stuck.set()
+        assert sent.wait(20), "the stop waited"
+
+    def press() -> None:
+        assert stuck.wait(20)
+        pilot.stop()
+
+    def during(report, samples):
+        if not stuck.is_set():
+            pilot.ask(jammed)
+
+    presser = threading.Thread(target=press)
+    presser.start()
+    pilot.fly(uno, board, during, 0.5)
+    presser.join()
+    assert sent.is_set()
+
+
+class Deaf:
+    """A board as transport to which no stop comes through, and whose valves stay on."""
+
+    def __init__(self, board: Board) -> None:
+        self._board, self.is_deaf = board, False
+        self.read = board.read
+
+    def write(self, data: bytes) -> None:
+        if not (self.is_deaf and data == frames.STOP):
+            self._board.write(data)
+
+
+@pytest.mark.parametrize("is_watched", [True, False])
+def test_a_stop_that_is_not_confirmed_ends_the_flight_loudly_where_nobody_watches(is_watched):
+    board, asked, reports = Board(), [], []
+    line = Deaf(board)
+    pilot = Pilot()
+    pilot.is_watched = lambda: is_watched
+
+    def during(report, samples):
+        reports.append(report)
+        if report.get("robot") == "running" and not asked:
+            line.is_deaf = True
+            asked.append(pilot.stop("the last page was closed"))
+
+    flying = nullcontext() if is_watched else pytest.raises(StillMovingError, match="MAY STILL BE MOVING")
+    with flying:
+        pilot.fly(Uno(line, board), board, _hearing_again(during, line, is_watched), 12.0, lambda uno: uno.run())
+    assert isinstance(asked[0].exception(0), StillMovingError)
+    if is_watched:
+        assert any(report.get("stopped") and report["stopped"]["is_confirmed"] is False for report in reports)
+        assert board.valves == 0
+    else:
+        assert "MAY STILL BE MOVING" in reports[-1]["gone"]
+
+
+def _hearing_again(during, line, is_watched):
+    """A robot that is watched hears again once its deafness has been told, so that it can be landed."""
+
+    def tell(report, samples):
+        during(report, samples)
+        if is_watched and report.get("stopped") and report["stopped"]["is_confirmed"] is False:
+            line.is_deaf = False
+
+    return tell
+
+
+def test_why_a_robot_stopped_that_nobody_here_stopped_is_told():
+    def during(pilot, report):
+        if report.get("robot") == "running":
+            boards[0].write(b"!")
+
+    boards = []
+    board, reports = Board(), []
+    boards.append(board)
+    pilot = Pilot()
+
+    def tell(report, samples):
+        reports.append(report)
+        during(pilot, report)
+
+    pilot.fly(Uno(board, board), board, tell, 0.6, lambda uno: uno.run())
+    assert reports[-1]["robot"] == "stopped"
+    assert "at the Uno" in reports[-1]["stopped"]["why"]

@@ -2,83 +2,141 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Any
 
 from bifa.errors import BifaError
-from bifa.link import Clock, LinkError, Sample, Uno
+from bifa.link import Clock, LinkError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS
+from bifa.live.cycle_speed import CycleSpeed
 from bifa.live.latest import Latest
 from bifa.live.pace import Pace
 
 REPORT_S = 0.1
+MOST_ASKED = 16
+MOVING = ("running", "holding")
 _LOOK_S = 0.02  # how long a request may wait for the robot's samples
 _EVERY_NTH = 5  # sample is shown: 20 a second
+_BETWEEN_STOPS_S = 0.02  # so that whoever stops again and again leaves room on the line for the answer
 
-Told = Callable[[dict[str, Any]], None]
+Tell = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
 
 class NobodyThereError(BifaError):
     """The robot is gone, or has not come yet."""
 
 
+class BusyError(BifaError):
+    """More is asked than can be done soon."""
+
+
+class Stopper:
+    """Sends stops from a thread of its own, which does nothing else, and so waits for nobody."""
+
+    def __init__(self, send: Callable[[], None]) -> None:
+        self._send, self._wanted, self._ended = send, threading.Event(), False
+        threading.Thread(target=self._run, daemon=True, name="stopper").start()
+
+    def stop(self) -> None:
+        """Send one, now; from any thread."""
+        self._wanted.set()
+
+    def end(self) -> None:
+        """No more are sent."""
+        self._ended = True
+        self._wanted.set()
+
+    def _run(self) -> None:
+        while self._wanted.wait() and not self._ended:
+            self._wanted.clear()
+            with contextlib.suppress(ConnectionError):  # who talks to the robot finds out as well
+                self._send()
+            time.sleep(_BETWEEN_STOPS_S)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What to do, whether that changes what the robot has, and who waits for it."""
+
+    what: Callable[[Uno], Any]
+    changes: bool
+    future: Future
+
+
 class Pilot:
     """`fly` runs in the main thread, which signals reach; `ask` and `stop` are for all others."""
 
-    def __init__(self, uno: Uno, clock: Clock, position_mm: Callable[[], dict[str, float]] | None = None) -> None:
-        """position_mm: where an instrument sees the ends, if it can be read at any moment."""
-        self._uno, self._clock, self._position_mm = uno, clock, position_mm
-        self._asked: deque[tuple[Callable[[Uno], Any], Future]] = deque()
+    def __init__(self) -> None:
+        self._asked: deque[_Asked] = deque()
+        self._stop: Future | None = None  # asked for, and not yet confirmed
         self._lock = threading.Lock()
-        self._latest = Latest()
+        self._stopper: Stopper | None = None
         self._is_flying = False
-        self._ended = ""
+        self._ended = "the robot has not answered yet"
+        self._stopped: dict[str, Any] | None = None
+        self.is_watched: Callable[[], bool] = lambda: True  # whether anybody would see that a stop failed
 
-    def ask(self, what: Callable[[Uno], Any]) -> Future:
-        """Have `what(uno)` called soon; the future has its result, or what it raised."""
-        return self._queue(what, first=False)
-
-    def stop(self) -> Future:
-        """All valves off, now; whatever was asked before and has not begun is dropped. The result comes when the Uno
-        has said that it is so; StillMovingError if it does not."""
-        with self._lock:
-            dropped = [future for _, future in self._asked]
-            self._asked.clear()
-        try:
-            self._uno.send_stop()
-        finally:
-            for future in dropped:
-                future.cancel()
-        return self._queue(lambda uno: uno.stop(), first=True)
-
-    def _queue(self, what: Callable[[Uno], Any], first: bool) -> Future:
+    def ask(self, what: Callable[[Uno], Any], changes: bool = False) -> Future:
+        """Have `what(uno)` called soon; the future has its result, or what it raised. changes: parameters or presets,
+        which are then told."""
         future: Future = Future()
         with self._lock:
-            if self._is_flying:
-                (self._asked.appendleft if first else self._asked.append)((what, future))
-                return future
-        future.set_exception(NobodyThereError(self._ended or "the robot has not answered yet"))
+            if not self._is_flying:
+                future.set_exception(NobodyThereError(self._ended))
+            elif len(self._asked) >= MOST_ASKED:
+                future.set_exception(BusyError("the robot is busy with what was asked before; try again, or stop it"))
+            else:
+                self._asked.append(_Asked(what, changes, future))
         return future
 
-    def fly(self, tell: Told, duration_s: float | None = None, begin: Callable[[Uno], None] = lambda uno: None) -> None:
+    def stop(self, by: str = "a page") -> Future:
+        """All valves off, now; whatever was asked before and has not begun is dropped. The result comes when the Uno
+        has said that it is so; StillMovingError if it does not. by: who stops, for everybody to read."""
+        if stopper := self._stopper:
+            stopper.stop()
+        with self._lock:
+            dropped = [asked.future for asked in self._asked]
+            self._asked.clear()
+            future = self._stop or Future()
+            if not self._is_flying:
+                future.set_exception(NobodyThereError(self._ended))
+            elif self._stop is None:
+                self._stop = future
+                self._stopped = {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
+        for one in dropped:
+            one.cancel()
+        return future
+
+    def fly(
+        self,
+        uno: Uno,
+        clock: Clock,
+        tell: Tell,
+        duration_s: float | None = None,
+        begin: Callable[[Uno], None] = lambda uno: None,
+        position_mm: Callable[[], dict[str, float]] | None = None,
+    ) -> None:
         """Connect, `begin(uno)`, and tell what happens until Ctrl-C or for `duration_s`; then the robot stands.
 
-        tell: is given a report every REPORT_S, as plain types. Raises LinkError or a ConnectionError when the robot is
-        gone, and tells that first.
+        tell(changes, samples): called every REPORT_S with what is so now and the samples since, as plain types.
+        position_mm: where an instrument sees the ends, if it can be read at any moment. Raises LinkError or a
+        ConnectionError when the robot is gone, or a stop was not confirmed and nobody watches; and tells that first.
         """
+        self._stopper = Stopper(uno.send_stop)
         try:
-            with self._uno as uno:
+            with uno:
                 uno.connect()
-                begin(uno)
-                uno.stream(True)
-                with self._lock:
-                    self._is_flying = True
+                self._take_off()
                 try:
-                    self._follow(uno, tell, duration_s)
+                    begin(uno)
+                    uno.stream(True)
+                    _Flight(self, uno, clock, tell, position_mm).follow(duration_s)
                 except (LinkError, ConnectionError) as error:  # the pages learn of it before the stop is tried
                     self._gone(error, tell)
                     raise
@@ -87,71 +145,170 @@ class Pilot:
         except (LinkError, ConnectionError) as error:
             self._gone(error, tell)
             raise
+        finally:
+            self._stopper.end()
 
-    def _gone(self, error: Exception, tell: Told) -> None:
+    def _gone(self, error: Exception, tell: Tell) -> None:
         self._ended = f"the robot is gone: {error}"
-        tell({"gone": self._ended})
+        tell({"gone": self._ended, "robot": "gone"}, [])
 
-    def _follow(self, uno: Uno, tell: Told, duration_s: float | None) -> None:
-        pace, begun_s = Pace(self._clock), self._clock.now()
-        while duration_s is None or self._clock.now() - begun_s < duration_s:
-            until_s, samples = self._clock.now() + REPORT_S, []
-            while (left_s := until_s - self._clock.now()) > 1e-4:
-                samples += uno.samples(min(left_s, _LOOK_S))
-                self._do_asked(uno)
-            self._latest.take(samples)
-            tell(self._report(uno, samples))
-            pace.wait()
-
-    def _do_asked(self, uno: Uno) -> None:
-        while True:
-            with self._lock:
-                if not self._asked:
-                    return
-                what, future = self._asked.popleft()
-            if not future.set_running_or_notify_cancel():
-                continue
-            try:
-                future.set_result(what(uno))
-            except BifaError as error:  # refused, or not confirmed: whoever asked is told
-                future.set_exception(error)
-            except BaseException as error:
-                future.set_exception(NobodyThereError(str(error) or "bifa monitor has ended"))
-                raise
+    def _take_off(self) -> None:
+        with self._lock:
+            self._is_flying = True
+            self._stopped = None
+            self._ended = "bifa monitor has ended; the robot was stopped"
 
     def _land(self) -> None:
         """Nothing more is done for anybody."""
         with self._lock:
             self._is_flying = False
-            self._ended = self._ended or "bifa monitor has ended; the robot was stopped"
-            left = list(self._asked)
+            left = [asked.future for asked in self._asked] + ([self._stop] if self._stop else [])
             self._asked.clear()
-        for _, future in left:
-            if not future.cancelled():
+            self._stop = None
+        for future in left:
+            if not future.done():
                 future.set_exception(NobodyThereError(self._ended))
 
-    def _report(self, uno: Uno, samples: list[Sample]) -> dict[str, Any]:
+    # -- for the flight ---------------------------------------------------------------------------------------
+
+    def next_asked(self) -> _Asked | None:
+        """What to do next, None for nothing; a stop that is asked for comes first."""
+        with self._lock:
+            if self._stop is not None:
+                return _Asked(self._stop_now, False, self._stop)
+            while self._asked:
+                asked = self._asked.popleft()
+                if asked.future.set_running_or_notify_cancel():
+                    return asked
+            return None
+
+    def _stop_now(self, uno: Uno) -> None:
+        confirmed = False
+        try:
+            uno.stop()
+            confirmed = True
+        finally:
+            with self._lock:
+                self._stop = None
+                self._stopped = {**(self._stopped or {}), "is_confirmed": confirmed, "at": wall_clock()}
+
+    @property
+    def stopped(self) -> dict[str, Any] | None:
+        """By whom, when and why the robot was stopped, and whether it has confirmed; None: it was not."""
+        return self._stopped
+
+    def stopped_by_itself(self, why: str) -> None:
+        """The robot stopped, and nobody here had asked it to."""
+        with self._lock:
+            if self._stop is None:
+                self._stopped = {"by": "", "at": wall_clock(), "is_confirmed": True, "why": why}
+
+    def moves(self) -> None:
+        """The robot moves: what had stopped it is over."""
+        with self._lock:
+            if self._stop is None:
+                self._stopped = None
+
+
+class _Flight:
+    """One flight: looks at the robot, does what is asked, and tells."""
+
+    def __init__(self, pilot: Pilot, uno: Uno, clock: Clock, tell: Tell, position_mm) -> None:
+        self._pilot, self._uno, self._clock, self._tell = pilot, uno, clock, tell
+        self._position_mm = position_mm
+        self._latest, self._speed = Latest(), CycleSpeed()
+        self._state = ""
+        self._learnt: dict[str, Any] = {}
+
+    def follow(self, duration_s: float | None) -> None:
+        """Until `duration_s` is over, or for ever."""
+        self._learn()
+        pace, begun_s = Pace(self._clock), self._clock.now()
+        while duration_s is None or self._clock.now() - begun_s < duration_s:
+            until_s, samples = self._clock.now() + REPORT_S, []
+            while (left_s := until_s - self._clock.now()) > 1e-4:
+                samples += self._uno.samples(min(left_s, _LOOK_S))
+                self._do_next()
+            self._latest.take(samples)
+            self._notice()
+            self._tell(*self._report(samples))
+            pace.wait()
+
+    def _do_next(self) -> None:
+        if not (asked := self._pilot.next_asked()):
+            return
+        try:
+            answer = asked.what(self._uno)
+            if asked.changes:
+                self._learn()
+        except StillMovingError as error:
+            self._tell_now()
+            asked.future.set_exception(error)
+            if not self._pilot.is_watched():
+                raise
+        except BifaError as error:  # refused: whoever asked is told
+            asked.future.set_exception(error)
+        except BaseException as error:
+            asked.future.set_exception(NobodyThereError(str(error) or "bifa monitor has ended"))
+            raise
+        else:
+            self._tell_now()
+            asked.future.set_result(answer)
+
+    def _tell_now(self) -> None:
+        """What has just been done, before whoever asked is answered."""
+        self._tell({"stopped": self._pilot.stopped, **self._learnt}, [])
+
+    def _learn(self) -> None:
+        """What the robot has now, for everybody to see."""
+        parameters, is_pending = self._uno.parameters_and_pending()
+        self._learnt = {"parameters": parameters, "presets": self._uno.presets(), "is_pending": is_pending}
+
+    def _notice(self) -> None:
+        """Why it stopped, if it did so by itself; and whether a set that waited has been taken over."""
+        state = self._latest.sample.state if self._latest.sample else ""
+        if state != self._state:
+            if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:
+                self._pilot.stopped_by_itself(_why(self._uno))
+            elif state in MOVING:
+                self._pilot.moves()
+            self._state = state
+        if self._learnt["is_pending"]:
+            self._learn()
+
+    def _report(self, samples: list[Sample]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+        shown = [_shown(sample) for sample in samples if sample.sequence % _EVERY_NTH == 0]
         report: dict[str, Any] = {
-            "link": uno.counters.text(),
+            "gone": "",
+            "link": self._uno.counters.text(),
             "warning": self._latest.warning,
-            "samples": [_shown(sample) for sample in samples if sample.sequence % _EVERY_NTH == 0],
+            "stopped": self._pilot.stopped,
+            **self._learnt,
         }
         if newest := self._latest.sample:
-            report |= {
-                "state": newest.state,
-                "uno_s": newest.time_us / 1e6,
-                "chambers": {
-                    name: {
-                        "psi": newest.pressure_psi[i],
-                        "valves": newest.connected[i],
-                        "phase_rad": newest.phase_rad[i],
-                    }
-                    for i, name in enumerate(CHAMBERS)
-                },
-            }
+            report |= {"robot": newest.state, "uno_s": newest.time_us / 1e6, "chambers": _chambers(newest)}
             if self._position_mm is not None:
-                report["position_mm"] = self._position_mm()
-        return report
+                position_mm = self._position_mm()
+                is_walking = newest.state == "running"
+                self._speed.take(is_walking, newest.time_us / 1e6, newest.phase_rad[0], position_mm["head"])
+                report |= {"position_mm": position_mm, "speed_mm_s": self._speed.mm_s}
+                if shown:
+                    shown[-1]["mm"] = position_mm["head"]
+        return report, shown
+
+
+def _why(uno: Uno) -> str:
+    status = uno.status()
+    if status.state == "fault":
+        return f"fault {status.fault}: see `status` in bifa console"
+    if status.is_emergency_stop_pressed:
+        return "the emergency stop was pressed"
+    return "it was stopped at the Uno: the emergency stop, or a stop that came over the line"
+
+
+def _chambers(sample: Sample) -> dict[str, dict[str, Any]]:
+    seen = zip(CHAMBERS, sample.pressure_psi, sample.connected, sample.phase_rad, strict=True)
+    return {name: {"psi": psi, "valves": valves, "phase_rad": phase} for name, psi, valves, phase in seen}
 
 
 def _shown(sample: Sample) -> dict[str, Any]:

@@ -1,41 +1,53 @@
-"""The live page's server, on this computer only: anybody here may look, only who has the page's token may write."""
+"""The live page's server, on this computer only: anybody here may look and may stop the robot; for all else it takes
+the page's token.
+
+A page says and hears everything over one websocket, so that a stop never waits behind other requests; it has a path of
+its own to the port besides (bifa.live.web.pilot.Stopper).
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
+import http.client
+import itertools
+import json
 import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import CancelledError
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bifa.errors import BifaError
-from bifa.live.web.pilot import NobodyThereError, Pilot, wall_clock
+from bifa.live.web.gate import ACCEPTED_AT_ONCE, LARGEST_HEADERS, LARGEST_MESSAGE, Gate
+from bifa.live.web.pilot import MOVING, BusyError, NobodyThereError, Pilot, wall_clock
+from bifa.live.web.state import LiveState
 from bifa.ranges import RANGES
 from bifa.robot import Model
 from bifa.robot.gait import GAIT_NAMES, Gait
 from bifa.simulate import speed
 
 HOST = "127.0.0.1"
+PROTOCOL = "bifa"  # of the websocket; the token is offered beside it
 _ANSWER_S = 15.0  # a page waits at most so long for the robot
 _BACK_WITHIN_S = 3.0  # a page that is loaded anew has not been closed
 _HANDED_OVER_S = 0.05
-_WAITING = 64  # reports that a slow page may be behind
+_WAITING = 64  # messages that a slow page may be behind
+_PIECE = 64 * 1024
 
 
 class ServerError(BifaError):
@@ -58,63 +70,105 @@ class Address:
         return f"http://{HOST}:{self.port}/#{self.token}"
 
 
+@dataclass(eq=False)
+class Page:
+    """A page that is open. `is_owner`: it has shown the token."""
+
+    number: int
+    is_owner: bool
+    messages: asyncio.Queue[str] = field(default_factory=lambda: asyncio.Queue(_WAITING))
+    answers: set[asyncio.Task] = field(default_factory=set)
+
+    def tell(self, message: Mapping[str, Any] | str) -> None:
+        """A page that is too slow misses the oldest."""
+        if self.messages.full():
+            self.messages.get_nowait()
+        self.messages.put_nowait(message if isinstance(message, str) else json.dumps(message))
+
+
 class LivePage:
-    """The page, its reports to whoever watches, and what they ask of the robot."""
+    """The page, the state that it shows to whoever watches, and what they ask of the robot."""
 
     def __init__(self, pilot: Pilot, page: str, model: Model) -> None:
         """page: the HTML document; model: what predicts the speeds."""
-        self._pilot, self._page, self._model = pilot, page, model
+        self._pilot, self._page, self._model = pilot, page.encode(), model
         self.token = secrets.token_urlsafe(16)
-        self._watchers: set[asyncio.Queue] = set()
+        self.gate = Gate()
+        self._pages: set[Page] = set()
+        self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._last: dict[str, Any] | None = None
-        self.stops_when_closed = True
+        self._predictor = ThreadPoolExecutor(1, "predictor")
+        self._prediction: asyncio.Task | None = None
+        self.state = LiveState(
+            robot="connecting",
+            gone="",
+            model=model.name,
+            ranges={name: RANGES[name] for name in GAIT_NAMES},
+            stops_when_closed=True,
+            draft=None,
+            prediction=None,
+        )
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """The loop in which the pages are told."""
         self._loop = loop
 
-    def tell(self, report: dict[str, Any]) -> None:
+    def is_watched(self) -> bool:
+        """Whether a page is open whose owner would see what it shows; from any thread."""
+        return any(page.is_owner for page in list(self._pages))
+
+    def tell(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
         """To every page; from any thread."""
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
-                self._loop.call_soon_threadsafe(self._pass_on, report)
+                self._loop.call_soon_threadsafe(self._heard, changes, samples)
 
     def flush(self, timeout_s: float = 1.0) -> None:
         """Wait until every page has been told everything, or `timeout_s`."""
         until_s = time.monotonic() + timeout_s
         time.sleep(_HANDED_OVER_S)
-        while any(not queue.empty() for queue in list(self._watchers)) and time.monotonic() < until_s:
+        while any(not page.messages.empty() for page in list(self._pages)) and time.monotonic() < until_s:
             time.sleep(_HANDED_OVER_S)
-
-    def _pass_on(self, report: dict[str, Any]) -> None:
-        self._last = report
-        for queue in self._watchers:
-            if queue.full():
-                queue.get_nowait()
-            queue.put_nowait(report)
 
     def app(self) -> Starlette:
         """Its routes."""
-        doing = {
-            "predict": self._predict,
-            "run": lambda asked: self._ask(lambda uno: uno.run(), "walking"),
-            "clear": lambda asked: self._ask(lambda uno: uno.clear(), "released: it may walk again"),
-            "apply": self._apply,
-            "save": self._save,
-            "stop": self._stop,
-            "closing": self._closing,
-        }
         return Starlette(
             routes=[
                 Route("/", self._show),
-                Route("/setup", self._setup),
+                Route("/stop", self._stop_by_request, methods=["POST"]),
                 WebSocketRoute("/live", self._live),
-                *(Route(f"/{name}", self._for_the_owner(name, act), methods=["POST"]) for name, act in doing.items()),
             ],
             # a page elsewhere that has got hold of this address by a name of its own is not answered
             middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
         )
+
+    # -- the state --------------------------------------------------------------------------------------------
+
+    def _heard(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
+        """The robot's part of the state."""
+        self._change(changes, samples)
+        if self.state.content["draft"] is None and "parameters" in changes:
+            self._draft(_of_gait(changes["parameters"]), by=0)
+
+    def _change(self, changes: Mapping[str, Any], samples: list[dict[str, Any]] | None = None) -> None:
+        message = json.dumps(self.state.change(changes, samples))
+        for page in self._pages:
+            page.tell(message)
+
+    def _draft(self, gait: dict[str, float], by: int) -> str:
+        """The gait on the sliders, which the robot does not have yet, and what the model makes of it: one at a time,
+        the newest last."""
+        self._change({"draft": {"gait": gait, "by": by}})
+        if self._prediction is None or self._prediction.done():
+            self._prediction = asyncio.ensure_future(self._predict())
+        return ""
+
+    async def _predict(self) -> None:
+        asked = None
+        while asked != (asked := self.state.content["draft"]["gait"]):
+            loop = asyncio.get_running_loop()
+            found = await loop.run_in_executor(self._predictor, _predicted, self._model, Gait(**asked))
+            self._change({"prediction": {**found, "gait": asked}})
 
     # -- looking ----------------------------------------------------------------------------------------------
 
@@ -122,111 +176,174 @@ class LivePage:
         headers = {
             "Content-Security-Policy": "default-src 'self' 'unsafe-inline'; img-src 'self' data:; "
             "frame-ancestors 'none'",
+            "Content-Length": str(len(self._page)),
+            "Connection": "close",  # one request each: nobody has a queue of them here
             "Cache-Control": "no-store",
             "Referrer-Policy": "no-referrer",
         }
-        return HTMLResponse(self._page, headers=headers)
-
-    async def _setup(self, request: Request) -> Response:
-        def asked() -> dict[str, Any]:
-            now = self._pilot.ask(lambda uno: (uno.parameters(), uno.presets())).result(_ANSWER_S)
-            return {"gait": {name: now[0][name] for name in GAIT_NAMES}, "presets": list(now[1])}
-
-        ranges = {name: RANGES[name] for name in GAIT_NAMES}
-        answer = await run_in_threadpool(_answered, asked)
-        return JSONResponse(
-            {**answer[1], "ranges": ranges, "model": self._model.name, "stops_when_closed": self.stops_when_closed},
-            answer[0],
-        )
+        return StreamingResponse(_in_pieces(self._page), media_type="text/html", headers=headers)
 
     async def _live(self, socket: WebSocket) -> None:
         origin = socket.headers.get("origin", "")
-        if origin.partition("://")[2] != socket.headers.get("host"):
+        if origin and origin.partition("://")[2] != socket.headers.get("host"):
             await socket.close(1008)  # a page from elsewhere
             return
-        await socket.accept()
-        queue: asyncio.Queue = asyncio.Queue(_WAITING)
-        if self._last is not None:
-            queue.put_nowait(self._last)
-        self._watchers.add(queue)
-        leaving = asyncio.create_task(_left(socket))
+        given = [name for name in socket.scope["subprotocols"] if name != PROTOCOL]
+        page = Page(next(self._numbers), any(secrets.compare_digest(one, self.token) for one in given))
+        await socket.accept(PROTOCOL if PROTOCOL in socket.scope["subprotocols"] else None)
+        if page.is_owner:
+            self.gate.prove(socket.client)
+        you = {"number": page.number, "is_owner": page.is_owner, "is_stale": bool(given) and not page.is_owner}
+        page.tell({"you": you} | self.state.whole())
+        self._pages.add(page)
+        sending = asyncio.create_task(_send(socket, page))
         try:
-            while not leaving.done():
-                report = asyncio.create_task(queue.get())
-                await asyncio.wait({report, leaving}, return_when=asyncio.FIRST_COMPLETED)
-                if report.done():
-                    await socket.send_json(report.result())
-                else:
-                    report.cancel()
+            while True:
+                self._hear(page, await socket.receive_text())
         except (WebSocketDisconnect, RuntimeError):
             pass
+        except (AskedWrongError, KeyError) as error:  # KeyError: bytes instead of text
+            await _refused(socket, str(error))
         finally:
-            leaving.cancel()
-            self._watchers.discard(queue)
-            if not self._watchers:
+            sending.cancel()
+            self._pages.discard(page)
+            if page.is_owner and not self.is_watched():
                 asyncio.get_running_loop().call_later(_BACK_WITHIN_S, self._closed)
 
     def _closed(self) -> None:
-        """The last page is gone, and nobody has come back."""
-        if self.stops_when_closed and not self._watchers:
-            self._pilot.stop()
+        """The last page is gone, and nobody has come back. A robot that stands is left alone."""
+        moves = self.state.content["robot"] in MOVING
+        if moves and self.state.content["stops_when_closed"] and not self.is_watched():
+            self._pilot.stop("the last page was closed").add_done_callback(_seen)
 
-    # -- writing ----------------------------------------------------------------------------------------------
+    # -- asking -----------------------------------------------------------------------------------------------
 
-    def _for_the_owner(self, name: str, act: Callable[[Mapping[str, Any]], dict[str, Any]]):
-        async def handle(request: Request) -> Response:
-            given = request.headers.get("authorization", "").removeprefix("Bearer ")
-            if not secrets.compare_digest(given.encode(), self.token.encode()):
-                return JSONResponse({"error": "open the page by the address that bifa monitor printed"}, 403)
-            try:  # a stop is one whatever comes with it
-                asked = await request.json() if name != "stop" and await request.body() else {}
-            except (ValueError, RecursionError):
-                return JSONResponse({"error": "that is no JSON"}, 400)
-            if not isinstance(asked, dict):
-                return JSONResponse({"error": "send a JSON object, such as {}"}, 400)
-            status, answer = await run_in_threadpool(_answered, lambda: act(asked))
-            return JSONResponse(answer, status)
-
-        return handle
-
-    def _ask(self, what: Callable, said: str) -> dict[str, Any]:
-        asked = self._pilot.ask(what)
+    def _hear(self, page: Page, text: str) -> None:
+        """One request of a page: {"id": 1, "do": "apply", ...}; the answer has the same id."""
         try:
-            asked.result(_ANSWER_S)
-        except TimeoutError:
-            asked.cancel()  # if it has not begun, it is not done behind the page's back
-            raise
-        return {"said": said}
+            asked = json.loads(text)
+            number, name = asked["id"], asked["do"]
+        except (ValueError, KeyError, TypeError, RecursionError):
+            raise AskedWrongError('that is no request: send {"id": 1, "do": "stop"}') from None
+        if name == "stop":
+            self._answer_later(page, number, self._stop(f"page {page.number}"))
+        elif not page.is_owner:
+            page.tell({"id": number, "error": "open the page by the address that bifa monitor printed"})
+        else:
+            self._do(page, number, name, asked)
 
-    def _predict(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        progress = speed(self._model, _gait(asked))
-        found = {"speed_mm_s": progress.speed_mm_s, "slip_mm": 1e3 * progress.slip_m[-1]}
-        return {name: round(float(value), 2) for name, value in found.items()}
+    def _do(self, page: Page, number: Any, name: str, asked: Mapping[str, Any]) -> None:
+        acts: dict[str, Callable[[], Awaitable[str] | str]] = {
+            "run": lambda: _waited(self._pilot.ask(lambda uno: uno.run()), "walking"),
+            "clear": lambda: _waited(self._pilot.ask(lambda uno: uno.clear()), "released: it may walk again"),
+            "apply": lambda: self._apply(_gait(asked)),
+            "save": lambda: self._save(_gait(asked), str(asked.get("preset", ""))),
+            "load": lambda: self._load(str(asked.get("preset", ""))),
+            "draft": lambda: self._draft(_gait(asked).as_dict(), page.number),
+            "closing": lambda: self._closing(asked),
+        }
+        try:
+            if name not in acts:
+                raise AskedWrongError(f"a page asks for stop, {', '.join(acts)}; not for {name!r}")
+            said = acts[name]()
+        except BifaError as error:
+            page.tell({"id": number, "error": str(error)})
+            return
+        if isinstance(said, str):
+            page.tell({"id": number, "said": said})
+        else:
+            self._answer_later(page, number, said)
 
-    def _apply(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        gait = _gait(asked)
-        return self._ask(lambda uno: uno.upload(gait.as_dict()), "applied; a walking robot takes it at its next cycle")
+    def _answer_later(self, page: Page, number: Any, answer: Awaitable[str]) -> None:
+        async def answering() -> None:
+            page.tell({"id": number, **(await _answered(answer))[1]})
 
-    def _save(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        gait, name = _gait(asked), str(asked.get("preset", ""))
-        return self._ask(lambda uno: uno.upload(gait.as_dict(), save=name), f"saved as {name}")
+        task = asyncio.ensure_future(answering())
+        page.answers.add(task)
+        task.add_done_callback(page.answers.discard)
 
-    def _stop(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        self._pilot.stop().result(_ANSWER_S)
-        return {"said": f"stopped at {wall_clock()}: the Uno confirms that all valves are off"}
+    def _apply(self, gait: Gait) -> Awaitable[str]:
+        done = self._pilot.ask(lambda uno: uno.upload(gait.as_dict()), changes=True)
+        return _waited(done, "applied; a walking robot takes it at its next cycle")
 
-    def _closing(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        stop = asked.get("stop", True)
+    def _save(self, gait: Gait, name: str) -> Awaitable[str]:
+        return _waited(
+            self._pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=name), changes=True), f"saved as {name}"
+        )
+
+    def _load(self, preset: str) -> Awaitable[str]:
+        def load(uno) -> dict[str, float]:
+            uno.load(preset)
+            return uno.parameters()
+
+        loaded = self._pilot.ask(load, changes=True)
+
+        async def shown() -> str:
+            said = await _waited(loaded, f"loaded {preset}; a walking robot takes it at its next cycle")
+            self._draft(_of_gait(loaded.result()), by=0)
+            return said
+
+        return shown()
+
+    def _closing(self, asked: Mapping[str, Any]) -> str:
+        stop = asked.get("stop")
         if not isinstance(stop, bool):
             raise AskedWrongError("stop is true or false")
-        self.stops_when_closed = stop
-        return {"said": f"when this page closes, the robot {'stops' if self.stops_when_closed else 'goes on'}"}
+        self._change({"stops_when_closed": stop})
+        return f"when the last page closes, the robot {'stops' if stop else 'goes on'}"
+
+    def _stop(self, by: str) -> Awaitable[str]:
+        """Sent when this returns; the answer comes when the Uno has confirmed."""
+        future = self._pilot.stop(by)
+
+        async def confirmed() -> str:
+            await asyncio.wait_for(asyncio.shield(asyncio.wrap_future(future)), _ANSWER_S)
+            return f"stopped at {wall_clock()}: the Uno confirms that all valves are off"
+
+        return confirmed()
+
+    async def _stop_by_request(self, request: Request) -> Response:
+        """A stop is one whatever comes with it, and whoever sends it."""
+        status, answer = await _answered(self._stop("a request to /stop"))
+        return JSONResponse(answer, status, {"Connection": "close"})
 
 
-async def _left(socket: WebSocket) -> None:
-    with contextlib.suppress(WebSocketDisconnect):
+async def _in_pieces(content: bytes) -> AsyncIterator[bytes]:
+    """So that a reader who is slow, or never reads, does not have all of it waiting, and many let others in between."""
+    for begin in range(0, len(content), _PIECE):
+        yield content[begin : begin + _PIECE]
+        await asyncio.sleep(0)
+
+
+async def _refused(socket: WebSocket, reason: str) -> None:
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+        await socket.close(1007, reason)
+
+
+async def _send(socket: WebSocket, page: Page) -> None:
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
         while True:
-            await socket.receive_text()
+            await socket.send_text(await page.messages.get())
+
+
+async def _waited(future: Future, said: str) -> str:
+    """What is said when it is done; if it has not begun in time, it is not done behind the page's back."""
+    await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_S)
+    return said
+
+
+def _seen(future: Future) -> None:
+    """Nobody waits for it; the pilot says what went wrong."""
+    if not future.cancelled():
+        future.exception()
+
+
+def _predicted(model: Model, gait: Gait) -> dict[str, Any]:
+    try:
+        progress = speed(model, gait)
+    except BifaError as error:
+        return {"error": str(error)}
+    return {"speed_mm_s": round(float(progress.speed_mm_s), 2), "slip_mm": round(1e3 * float(progress.slip_m[-1]), 2)}
 
 
 def _gait(asked: Mapping[str, Any]) -> Gait:
@@ -236,20 +353,37 @@ def _gait(asked: Mapping[str, Any]) -> Gait:
     return Gait(**given)
 
 
-def _answered(act: Callable[[], dict[str, Any]]) -> tuple[int, dict[str, Any]]:
+def _of_gait(parameters: Mapping[str, float]) -> dict[str, float]:
+    """As sliders show it."""
+    return {name: round(parameters[name], 4) for name in GAIT_NAMES}
+
+
+async def _answered(said: Awaitable[str]) -> tuple[int, dict[str, Any]]:
     """What came of it, with its HTTP status."""
     try:
-        return 200, act()
+        return 200, {"said": await said}
     except AskedWrongError as error:
         return 400, {"error": str(error)}
-    except NobodyThereError as error:
+    except (NobodyThereError, BusyError) as error:
         return 503, {"error": str(error)}
     except BifaError as error:
         return 409, {"error": str(error)}
-    except CancelledError:
+    except (CancelledError, asyncio.CancelledError):
         return 409, {"error": "not done: a stop came first"}
     except TimeoutError:
         return 504, {"error": "the robot does not answer"}
+
+
+def _warm_up(port: int) -> None:
+    """What the first request imports, and what a full collection of garbage goes through, would keep a stop waiting for
+    a tenth of a second."""
+    with contextlib.suppress(OSError, http.client.HTTPException):
+        connection = http.client.HTTPConnection(HOST, port, timeout=10)
+        connection.request("GET", "/")
+        connection.getresponse().read()
+        connection.close()
+    gc.collect()
+    gc.freeze()
 
 
 @contextmanager
@@ -265,7 +399,19 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
             f"port {port} of this computer cannot be opened ({error}); choose another: --web-port"
         ) from None
     config = uvicorn.Config(
-        live.app(), log_level="error", lifespan="off", ws="wsproto", timeout_graceful_shutdown=1, access_log=False
+        live.app(),
+        http=live.gate.http,
+        ws=live.gate.websocket,
+        ws_max_size=LARGEST_MESSAGE,
+        ws_per_message_deflate=False,  # a few bytes would become megabytes
+        h11_max_incomplete_event_size=LARGEST_HEADERS,
+        timeout_keep_alive=2,
+        proxy_headers=False,  # who is connected from where is what the socket says
+        backlog=ACCEPTED_AT_ONCE,
+        log_level="error",
+        lifespan="off",
+        timeout_graceful_shutdown=1,
+        access_log=False,
     )
     server = uvicorn.Server(config)
     started = threading.Event()
@@ -279,7 +425,10 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
     thread.start()
     started.wait()
     try:
-        yield Address(listener.getsockname()[1], live.token)
+        address = Address(listener.getsockname()[1], live.token)
+        _warm_up(address.port)
+        listener.listen()  # the server has set its own backlog, which is how many it accepts at once
+        yield address
     finally:
         live.flush()
         server.should_exit = True

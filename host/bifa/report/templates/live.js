@@ -3,124 +3,154 @@
   const token = location.hash.slice(1);
   const palettes = JSON.parse(document.getElementById("palettes").textContent);
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const [state, said, stop, plot, predicted, speedBox, link, closing, preset] =
-    ["state", "said", "stop", "plot", "predicted", "speed", "link", "closing", "preset"].map((id) => document.getElementById(id));
+  const names = ["state", "clock", "alarm", "said", "stop", "plot", "unsent", "predicted", "speed", "link", "closing", "preset", "presets", "revert"];
+  const [state, clock, alarm, said, stop, plot, unsent, predicted, speedBox, link, closing, preset, presets, revert] =
+    names.map((id) => document.getElementById(id));
   const sliders = [...document.querySelectorAll("input[type=range]")];
   const chambers = [...document.querySelectorAll("[data-chamber]")].map((row) => row.dataset.chamber);
   const SHOWN_S = 20, LEVEL = { vacuum: 0, off: 0.5, positive: 1, both: 1 };
+  const OLD = "bifa monitor does not answer: what is shown is old";
+  const STALE = "This page is of an earlier bifa monitor: open the address that the terminal prints now. Stop works here all the same.";
+  // who listens to a page is told of changes, not ten times a second of what is as it was
+  const tell = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 
-  // --- What is asked of the robot -----------------------------------------------------------------------------
-  const say = (text, wrong = false) => { said.textContent = text; said.classList.toggle("wrong", wrong); };
-  const post = async (name, body = {}) => {
-    let answer, content;
-    try {
-      answer = await fetch(`/${name}`, { method: "POST", headers: { Authorization: `Bearer ${token}` }, body: JSON.stringify(body), keepalive: true });
-      content = await answer.json();
-    } catch { throw new Error("bifa monitor does not answer; it may have ended"); }
-    if (!answer.ok) throw new Error(content.error);
-    return content;
-  };
-  let period = 0; // of the gait that the robot has
+  // --- What is asked of the robot: over one websocket, so that a stop never waits behind other requests ----------
+  let socket = null, you = null, live = null, number = 0;
+  const waiting = new Map();
+  const say = (text, wrong = false) => { tell(said, text); said.classList.toggle("wrong", wrong); };
+  const isOpen = () => socket && socket.readyState === WebSocket.OPEN;
+  const request = (name, body = {}) => new Promise((resolve, reject) => {
+    if (!isOpen()) { reject(new Error("bifa monitor does not answer; it may have ended")); return; }
+    number += 1;
+    waiting.set(number, { resolve, reject });
+    socket.send(JSON.stringify({ id: number, do: name, ...body }));
+  });
   const ask = async (name, body) => {
-    try {
-      say((await post(name, body)).said);
-      if (name === "apply" || name === "save") period = body.gait.period_s;
-    } catch (error) { say(error.message, true); }
+    try { say(await request(name, body)); } catch (error) { say(error.message, true); }
   };
-  const number = (slider) => slider.parentElement.querySelector("[type=number]");
-  const gait = () => Object.fromEntries(sliders.map((slider) => [slider.name, Number(number(slider).value)]));
-
-  stop.addEventListener("click", async () => {
+  const answered = (message) => {
+    const waits = waiting.get(message.id);
+    waiting.delete(message.id);
+    if (!waits) return;
+    if (message.error) waits.reject(new Error(message.error)); else waits.resolve(message.said);
+  };
+  const stopByRequest = async () => {
+    let answer;
+    try { answer = await (await fetch("/stop", { method: "POST", keepalive: true })).json(); }
+    catch { throw new Error("bifa monitor does not answer; it may have ended"); }
+    if (answer.error) throw new Error(answer.error);
+    return answer.said;
+  };
+  const halt = async () => {
     say("stopping…");
-    try { say((await post("stop")).said); } catch (error) { say(`NOT CONFIRMED: ${error.message}. Press the emergency stop.`, true); }
+    try { say(await (isOpen() ? request("stop").catch(stopByRequest) : stopByRequest())); }
+    catch (error) { say(`NOT CONFIRMED: ${error.message}. Press the emergency stop.`, true); }
+  };
+
+  const box = (slider) => slider.parentElement.querySelector("[type=number]");
+  const gait = () => Object.fromEntries(sliders.map((slider) => [slider.name, Number(box(slider).value)]));
+  const set = (wanted) => sliders.forEach((slider) => { slider.value = box(slider).value = wanted[slider.name]; });
+  const rounded = (value) => Math.round(1e4 * value) / 1e4;
+
+  stop.addEventListener("click", halt);
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" || event.key === "!") { event.preventDefault(); halt(); }
   });
   for (const button of document.querySelectorAll("[data-do]")) {
     const name = button.dataset.do;
-    button.addEventListener("click", () => ask(name, name === "save" ? { gait: gait(), preset: preset.value } : { gait: gait() }));
+    button.addEventListener("click", () => ask(name, { gait: gait(), preset: name === "load" ? presets.value : preset.value }));
   }
   closing.addEventListener("change", () => ask("closing", { stop: closing.checked }));
   document.querySelector("form").addEventListener("submit", (event) => event.preventDefault());
-
-  // --- The gait and what the model makes of it: one question at a time, the newest gait last --------------------
-  let asking = false, again = false;
-  const predict = async () => {
-    if (asking) { again = true; return; }
-    asking = true;
-    do {
-      again = false;
-      try {
-        const found = await post("predict", { gait: gait() });
-        predicted.textContent = `The model predicts ${found.speed_mm_s.toFixed(2)} mm/s, with ${found.slip_mm.toFixed(2)} mm of slip a cycle.`;
-      } catch (error) { predicted.textContent = `No prediction: ${error.message}`; }
-    } while (again);
-    asking = false;
-  };
+  const draft = () => request("draft", { gait: gait() }).catch((error) => say(error.message, true));
   for (const slider of sliders) {
-    slider.addEventListener("input", () => { number(slider).value = slider.value; predict(); });
-    number(slider).addEventListener("input", () => { slider.value = number(slider).value; predict(); });
+    slider.addEventListener("input", () => { box(slider).value = slider.value; draft(); });
+    box(slider).addEventListener("input", () => { slider.value = box(slider).value; draft(); });
   }
+  revert.addEventListener("click", () => {
+    set(Object.fromEntries(sliders.map(({ name }) => [name, rounded(live.parameters[name])])));
+    draft();
+  });
 
-  const setUp = async () => {
-    const answer = await fetch("/setup");
-    const found = await answer.json();
-    for (const slider of sliders) {
-      const box = number(slider);
-      [box.min, box.max] = [slider.min, slider.max] = found.ranges[slider.name];
-      // a slider to 60 s would leave no room for the gaits that there are; the number beside it goes to its end
-      if (slider.name === "period_s") slider.max = 12;
-      slider.disabled = box.disabled = !token;
-      if (found.gait) { box.value = Math.round(1e4 * found.gait[slider.name]) / 1e4; slider.value = box.value; }
-    }
-    if (found.gait) period = found.gait.period_s;
-    closing.checked = found.stops_when_closed;
-    for (const control of [...document.querySelectorAll("[data-do]"), closing, preset, stop]) control.disabled = !token;
-    if (!token) say("Only to look at: open the page by the address that bifa monitor printed, to the end.");
-    else if (found.error) say(found.error, true);
-    else predict();
-  };
-
-  // --- What comes from the robot -------------------------------------------------------------------------------
+  // --- What is so, for every page alike --------------------------------------------------------------------------
   const times = [], traces = Object.fromEntries(chambers.map((name) => [name, { psi: [], valves: [] }]));
   const path = { t: [], mm: [] };
-  const keep = (list, count) => list.splice(0, Math.max(0, list.length - count));
+  const lists = [times, path.t, path.mm, ...Object.values(traces).flatMap((trace) => [trace.psi, trace.valves])];
 
-  const take = (report) => {
-    for (const sample of report.samples) {
-      if (times.length && sample.t < times[times.length - 1]) { times.length = 0; path.t.length = path.mm.length = 0; for (const t of Object.values(traces)) t.psi.length = t.valves.length = 0; }
+  const take = (samples) => {
+    for (const sample of samples) {
+      if (times.length && sample.t < times[times.length - 1]) for (const list of lists) list.length = 0;
       times.push(sample.t);
       chambers.forEach((name, i) => {
         traces[name].psi.push(sample.psi[i]);
         traces[name].valves.push(LEVEL[sample.valves[i]] * 0.8 + 1.2 * i);
       });
+      if ("mm" in sample) { path.t.push(sample.t); path.mm.push(sample.mm); }
     }
-    if (report.position_mm) { path.t.push(report.uno_s); path.mm.push(report.position_mm.head); }
-    for (const list of [times, ...Object.values(traces).flatMap((t) => [t.psi, t.valves])]) keep(list, 25 * SHOWN_S);
-    for (const list of [path.t, path.mm]) keep(list, 70 * 10);
+    const until = times[times.length - 1] - SHOWN_S;
+    while (times[0] < until) { times.shift(); for (const trace of Object.values(traces)) { trace.psi.shift(); trace.valves.shift(); } }
+    while (path.t[0] < until) { path.t.shift(); path.mm.shift(); }
   };
 
-  // over one whole cycle, from where it was a period ago, between two reports
-  const speed = () => {
-    const last = path.t.length - 1, from = path.t[last] - period;
-    const after = path.t.findIndex((t) => t >= from);
-    if (!period || after < 1) return "not for a cycle yet";
-    const share = (from - path.t[after - 1]) / (path.t[after] - path.t[after - 1]);
-    const began = path.mm[after - 1] + share * (path.mm[after] - path.mm[after - 1]);
-    return `${((path.mm[last] - began) / period).toFixed(1)} mm/s over the last cycle, at ${path.mm[last].toFixed(0)} mm`;
+  const stopWords = (stopped) => {
+    if (!stopped) return "";
+    if (stopped.why) return `Stopped at ${stopped.at}: ${stopped.why}.`;
+    const by = stopped.by === `page ${you.number}` ? "this page" : stopped.by;
+    if (stopped.is_confirmed) return `Stopped by ${by} at ${stopped.at}; all valves are off.`;
+    return stopped.is_confirmed === false ? `THE ROBOT MAY STILL BE MOVING: the stop by ${by} at ${stopped.at} is not confirmed. Press the emergency stop.` : `Being stopped by ${by}.`;
   };
 
-  const show = (report) => {
-    if (report.gone) { state.textContent = report.gone; say(report.gone, true); return; }
-    link.textContent = report.link;
-    state.textContent = report.state ? `${report.state}, ${report.uno_s.toFixed(1)} s${report.warning ? `: ${report.warning}` : ""}` : "no telemetry yet";
-    state.classList.toggle("wrong", Boolean(report.warning));
+  const showGait = () => {
+    const robot = live.parameters;
+    for (const output of document.querySelectorAll("[data-robot]")) if (robot) tell(output, String(rounded(robot[output.dataset.robot])));
+    if (live.draft && (live.draft.by !== you.number || live.fresh)) set(live.draft.gait);
+    const differs = robot && live.draft && sliders.some(({ name }) => Math.abs(live.draft.gait[name] - robot[name]) > 6e-4);
+    tell(unsent, live.is_pending ? "The robot takes its new gait at its next cycle." : differs ? "Not sent: the robot walks another gait than the sliders show." : robot ? "The sliders show the robot's gait." : "");
+    const found = live.prediction;
+    if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.speed_mm_s.toFixed(2)} mm/s, with ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
+    const there = Object.keys(live.presets || {});
+    if (there.join() !== [...presets.options].map((option) => option.value).join()) presets.replaceChildren(...there.map((name) => new Option(name)));
+    return differs;
+  };
+
+  const showControls = (differs) => {
+    const may = you.is_owner && !live.gone && Boolean(live.parameters);
+    const can = { run: ["idle", "holding"].includes(live.robot), clear: ["stopped", "fault"].includes(live.robot), apply: differs, save: true, load: presets.options.length > 0 };
+    for (const button of document.querySelectorAll("[data-do]")) button.disabled = !may || !can[button.dataset.do];
+    for (const control of [...sliders, ...sliders.map(box), closing, preset, presets]) control.disabled = !may;
+    revert.disabled = !may || !differs;
+    if (closing.checked !== live.stops_when_closed) closing.checked = live.stops_when_closed;
+  };
+
+  const show = () => {
+    tell(state, live.gone || (live.robot === "connecting" ? "waiting for the robot" : live.warning ? `${live.robot}: ${live.warning}` : live.robot));
+    tell(clock, live.gone || live.uno_s === undefined ? "" : `, ${live.uno_s.toFixed(1)} s`);
+    state.classList.toggle("wrong", Boolean(live.gone || live.warning));
+    tell(alarm, you.is_stale ? STALE : live.gone || stopWords(live.stopped));
+    alarm.classList.toggle("loud", Boolean(you.is_stale || live.gone || (live.stopped && live.stopped.is_confirmed === false)));
+    tell(link, live.link || "–");
     for (const row of document.querySelectorAll("[data-chamber]")) {
-      const now = report.chambers && report.chambers[row.dataset.chamber];
+      const now = live.chambers && live.chambers[row.dataset.chamber];
       if (!now) continue;
-      row.querySelector(".psi").textContent = now.psi.toFixed(2);
-      row.querySelector(".valves").textContent = now.valves;
+      tell(row.querySelector(".psi"), now.psi.toFixed(2));
+      tell(row.querySelector(".valves"), now.valves);
       row.querySelector("progress").value = now.phase_rad / (2 * Math.PI);
     }
-    if (report.position_mm) { speedBox.textContent = speed(); document.getElementById("path-key").hidden = false; }
+    if (live.position_mm) {
+      const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "not for a cycle yet" : `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
+      tell(speedBox, `${fast}, at ${live.position_mm.head.toFixed(0)} mm`);
+      document.getElementById("path-key").hidden = false;
+    }
+    showControls(showGait());
+  };
+
+  const setUp = () => {
+    for (const slider of sliders) {
+      [box(slider).min, box(slider).max] = [slider.min, slider.max] = live.ranges[slider.name];
+      // a slider to 60 s would leave no room for the gaits that there are; the number beside it goes to its end
+      if (slider.name === "period_s") slider.max = 12;
+    }
+    if (!token) say("Only to look at, and to stop: open the page by the address that bifa monitor printed, to the end.");
   };
 
   // A panel for pressures, valves and, where it is seen, the head's position; made when there is something to draw.
@@ -169,21 +199,30 @@
   dark.addEventListener("change", () => { panels = []; plot.replaceChildren(); });
 
   let fresh = false;
+  const hear = (message) => {
+    if ("id" in message) { answered(message); return; }
+    if (message.you) you = message.you;
+    live = message.state;
+    live.fresh = Boolean(message.you);
+    if (message.you) setUp();
+    if (message.whole) for (const list of lists) list.length = 0;
+    take(message.samples);
+    show();
+    fresh = true;
+  };
+  const lost = () => {
+    for (const waits of waiting.values()) waits.reject(new Error("bifa monitor does not answer; it may have ended"));
+    waiting.clear();
+    if (!live || !live.gone) { tell(state, "not connected"); tell(clock, ""); tell(alarm, OLD); state.classList.add("wrong"); alarm.classList.add("loud"); }
+    for (const control of document.querySelectorAll("[data-do], form input, form select, #revert")) control.disabled = true;
+    setTimeout(connect, 1000);
+  };
   const connect = () => {
-    const socket = new WebSocket(`ws://${location.host}/live`);
-    socket.addEventListener("message", (event) => {
-      const report = JSON.parse(event.data);
-      if (report.samples) take(report);
-      show(report);
-      fresh = true;
-    });
-    socket.addEventListener("close", () => {
-      if (!state.textContent.startsWith("the robot is gone")) { state.textContent = "bifa monitor does not answer; what is shown is old"; state.classList.add("wrong"); }
-      setTimeout(connect, 1000);
-    });
+    socket = new WebSocket(`ws://${location.host}/live`, token ? ["bifa", token] : ["bifa"]);
+    socket.addEventListener("message", (event) => hear(JSON.parse(event.data)));
+    socket.addEventListener("close", lost);
   };
   const tick = () => { if (fresh) { fresh = false; draw(); } requestAnimationFrame(tick); };
-  setUp().catch(() => say("bifa monitor does not answer", true));
   connect();
   tick();
 })();

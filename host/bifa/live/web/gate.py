@@ -1,0 +1,76 @@
+"""Who may be connected to the live page's server, and for how long: strangers never keep the robot's owner waiting.
+
+A connection is a stranger's until it has shown the token. When too many strangers are there, the one that has been
+there longest goes, so that whoever comes is heard: a stop needs no token. All of it runs in the server's loop.
+"""
+
+import asyncio
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.wsproto_impl import WSProtocol
+
+MOST_STRANGERS = 32
+HEADERS_WITHIN_S = 5.0
+ANSWERED_WITHIN_S = 20.0  # a request and its answer; a page that only watches stays
+LARGEST_HEADERS = 16 * 1024
+LARGEST_MESSAGE = 4 * 1024
+ACCEPTED_AT_ONCE = 4  # connections, before the loop looks at what the others say
+
+
+class Gate:
+    """Counts connections; `http` and `websocket` are the protocols that uvicorn is to serve with."""
+
+    def __init__(self, most_strangers: int = MOST_STRANGERS) -> None:
+        self._most_strangers = most_strangers
+        self._strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # the oldest first
+
+        class Http(H11Protocol):
+            def connection_made(http, transport):  # noqa: N805
+                super().connection_made(transport)
+                self._enter(http)
+
+            def connection_lost(http, error):  # noqa: N805
+                self._forget(http.transport)
+                super().connection_lost(error)
+
+        class Websocket(WSProtocol):
+            def connection_made(websocket, transport):  # noqa: N805
+                super().connection_made(transport)
+                self._watches(transport)
+
+            def connection_lost(websocket, error):  # noqa: N805
+                self._forget(websocket.transport)
+                super().connection_lost(error)
+
+        self.http, self.websocket = Http, Websocket
+
+    def prove(self, client: tuple[str, int]) -> None:
+        """Whoever is connected from `client` has shown the token."""
+        for transport in [t for t in self._strangers if t.get_extra_info("peername") == tuple(client)]:
+            self._forget(transport)
+
+    def _enter(self, http: H11Protocol) -> None:
+        while len(self._strangers) >= self._most_strangers:
+            self._end(next(iter(self._strangers)))
+        loop = asyncio.get_running_loop()
+        self._strangers[http.transport] = loop.call_later(HEADERS_WITHIN_S, self._look_for_headers, http)
+
+    def _look_for_headers(self, http: H11Protocol) -> None:
+        transport = http.transport
+        if http.scope is None:
+            self._end(transport)
+        elif transport in self._strangers:
+            left_s = ANSWERED_WITHIN_S - HEADERS_WITHIN_S
+            self._strangers[transport] = asyncio.get_running_loop().call_later(left_s, self._end, transport)
+
+    def _watches(self, transport: asyncio.Transport) -> None:
+        if timer := self._strangers.get(transport):
+            timer.cancel()
+
+    def _end(self, transport: asyncio.Transport) -> None:
+        self._forget(transport)
+        transport.abort()
+
+    def _forget(self, transport: asyncio.Transport) -> None:
+        if timer := self._strangers.pop(transport, None):
+            timer.cancel()

@@ -1,0 +1,110 @@
+"""The page's stop while strangers keep the server busy: within 100 ms at the port, whatever they do."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from bifa.link import frames
+from harness.pty_uno import PtyUno
+from harness.web_monitor import Monitor
+from harness.web_socket import WebSocket
+
+pytestmark = pytest.mark.real_time
+
+WITHIN_S = 0.1
+FLOOD_S = 4.0
+
+# What strangers do, each in a program of its own for FLOOD_S: bounded in time and in connections.
+FLOODS = {
+    "requests that are never read": """
+        one.sendall(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n" * 50)
+    """,
+    "connections that say nothing": """
+        pass
+    """,
+    "headers without an end": """
+        one.sendall(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\nX: " + b"x" * 15_000)
+    """,
+    "what is no request": """
+        one.sendall(b"\\x00" * 60_000)
+    """,
+    "pages without a token": """
+        one.sendall(b"GET /live HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\nUpgrade: websocket\\r\\nConnection: Upgrade\\r\\n"
+                    b"Sec-WebSocket-Version: 13\\r\\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\\r\\n\\r\\n")
+        one.sendall((b"\\x81\\xfe\\x0f\\xa0" + bytes(4) + b"x" * 4000) * 20)
+    """,
+}
+_FLOOD = """
+import contextlib, socket, sys, time
+port, until = int(sys.argv[1]), time.monotonic() + float(sys.argv[2])
+held = []
+print("begun", flush=True)
+while time.monotonic() < until:
+    with contextlib.suppress(OSError):
+        one = socket.create_connection(("127.0.0.1", port), timeout=1)
+        held.append(one)
+        {what}
+    while len(held) > 300:
+        held.pop(0).close()
+"""
+
+
+class Flood:
+    """Two programs that come to the server as often as they can."""
+
+    def __init__(self, port: int, what: str) -> None:
+        code = _FLOOD.format(what=what.strip().replace("\n        ", "\n        "))
+        command = [sys.executable, "-c", code, str(port), str(FLOOD_S)]
+        self._programs = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(2)]
+        for program in self._programs:
+            program.stdout.readline()
+
+    def close(self) -> None:
+        for program in self._programs:
+            program.kill()
+            program.wait()
+            program.stdout.close()
+
+
+class Watched(PtyUno):
+    """Notes when a stop arrived at the port."""
+
+    stopped_s = None
+
+    def on_heard(self, data: bytes) -> None:
+        if frames.STOP_FRAME in data and self.stopped_s is None:
+            self.stopped_s = time.monotonic()
+
+
+@pytest.fixture
+def bifa():
+    started = Monitor("--run", uno=Watched())
+    yield started
+    started.close()
+
+
+@pytest.mark.parametrize("flood", FLOODS)
+def test_a_stop_is_at_the_port_within_a_tenth_of_a_second(bifa, flood, figure):
+    port = int(bifa.origin.rpartition(":")[2])
+    owner = WebSocket(port, bifa.token)
+    assert bifa.until("running") == "running"
+    crowd = Flood(port, FLOODS[flood])
+    try:
+        taken = []
+        for _ in range(10):
+            owner.until(lambda state: state["robot"] in ("running", "stopped"))
+            time.sleep(0.1)
+            bifa.uno.stopped_s, asked_s = None, time.monotonic()
+            number = owner.ask("stop")
+            while bifa.uno.stopped_s is None and time.monotonic() < asked_s + 5:
+                time.sleep(0.001)
+            taken.append((bifa.uno.stopped_s or asked_s + 5) - asked_s)
+            assert "confirms" in owner.answer(number)["said"]
+    finally:
+        crowd.close()
+        owner.close()
+    figure(f"stop at the port, {flood}: worst of {len(taken)} {1e3 * max(taken):.0f} ms")
+    assert max(taken) < WITHIN_S
+    assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
