@@ -181,7 +181,7 @@ def test_two_tabs_show_the_same(monitor, tab):
         expect(page.locator("#predicted")).not_to_contain_text("10.8")
         expect(page.locator("#unsent")).to_contain_text("Not sent")
         expect(page.locator("[data-robot=period_s]")).to_have_text("5.7")
-    assert other.locator("input[name=period_s]").input_value() == "4.5"
+        expect(page.locator("input[name=period_s]")).to_have_value("4.5")
     other.get_by_role("button", name="Apply").click()
     for page in (one, other):
         expect(page.locator("[data-robot=period_s]")).to_have_text("4.5")
@@ -190,7 +190,7 @@ def test_two_tabs_show_the_same(monitor, tab):
     one.get_by_role("button", name="Load", exact=True).click()
     for page in (one, other):
         expect(page.locator("[data-robot=period_s]")).to_have_text("6")
-        assert page.locator("input[name=period_s]").input_value() == "6"
+        expect(page.locator("input[name=period_s]")).to_have_value("6")
     one.get_by_role("button", name="Stop", exact=True).click()
     expect(one.locator("#alarm")).to_contain_text("Stopped by this page at")
     expect(other.locator("#alarm")).to_contain_text("Stopped by page ")

@@ -62,7 +62,18 @@
   }
   closing.addEventListener("change", () => ask("closing", { stop: closing.checked }));
   document.querySelector("form").addEventListener("submit", (event) => event.preventDefault());
-  const draft = () => request("draft", { gait: gait() }).catch((error) => say(error.message, true));
+  let sending = 0, shownDraft = ""; // what comes before the answer is older than what the sliders show
+  const draft = async () => {
+    sending += 1;
+    try { await request("draft", { gait: gait() }); } catch (error) { say(error.message, true); }
+    sending -= 1;
+  };
+  const showDraft = () => {
+    const now = JSON.stringify(live.draft);
+    if (now === shownDraft || sending) return;
+    shownDraft = now;
+    if (live.draft && live.draft.by !== you.number) set(live.draft.gait);
+  };
   for (const slider of sliders) {
     slider.addEventListener("input", () => { box(slider).value = slider.value; draft(); });
     box(slider).addEventListener("input", () => { slider.value = box(slider).value; draft(); });
@@ -103,7 +114,7 @@
   const showGait = () => {
     const robot = live.parameters;
     for (const output of document.querySelectorAll("[data-robot]")) if (robot) tell(output, String(rounded(robot[output.dataset.robot])));
-    if (live.draft && (live.draft.by !== you.number || live.fresh)) set(live.draft.gait);
+    showDraft();
     const differs = robot && live.draft && sliders.some(({ name }) => Math.abs(live.draft.gait[name] - robot[name]) > 6e-4);
     tell(unsent, live.is_pending ? "The robot takes its new gait at its next cycle." : differs ? "Not sent: the robot walks another gait than the sliders show." : robot ? "The sliders show the robot's gait." : "");
     const found = live.prediction;
@@ -203,8 +214,7 @@
     if ("id" in message) { answered(message); return; }
     if (message.you) you = message.you;
     live = message.state;
-    live.fresh = Boolean(message.you);
-    if (message.you) setUp();
+    if (message.you) { shownDraft = ""; setUp(); }
     if (message.whole) for (const list of lists) list.length = 0;
     take(message.samples);
     show();
