@@ -13,6 +13,7 @@ import doc_tables
 import phrases
 import py_ranges
 import py_tables
+import py_version
 from tables import WIRE_BYTES, command_table, parameter_table, table_hash
 
 ROOT = Path(__file__).parent.parent
@@ -36,6 +37,9 @@ def generated() -> dict[Path, str]:
         ROOT / "lib/text/phrase_table.cpp": cpp_commands.phrase_source(common),
         ROOT / "lib/link/message_table.h": cpp_commands.message_header(commands, set_size, agreed),
         ROOT / "lib/link/message_table.cpp": cpp_commands.message_source(commands, set_size),
+        ROOT / "host/bifa/version.py": py_version.module(commands),
+        ROOT / "host/lacuna/version.py": py_version.module(commands),
+        ROOT / "host/virtual_robot/version.py": py_version.module(commands, py_version.GPL),
         ROOT / "host/bifa/ranges.py": py_ranges.module(parameters),
         ROOT / "host/bifa/link/table.py": py_tables.module(parameters, commands, agreed),
     }

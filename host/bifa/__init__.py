@@ -8,7 +8,7 @@ verdict = robot.diagnose(dataset)
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+from bifa.version import __version__
 
 _WHERE = {  # imported when first asked for: a command waits only for what it uses
     "load_dataset": ("bifa.notebook", "load_dataset"),

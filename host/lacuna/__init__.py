@@ -7,7 +7,7 @@ verdict = lacuna.diagnose(system, records)
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+from lacuna.version import __version__
 
 _WHERE = {  # imported when first asked for: who wants one class need not wait for SciPy
     "System": ("lacuna.function_system", "FunctionSystem"),
