@@ -1,38 +1,49 @@
-"""Write docs/lacuna-reference.md from the docstrings of what `lacuna` exports: python tools/lacuna_reference.py"""
+"""Write docs/lacuna-reference.md and docs/bifa-reference.md from the docstrings of what the packages export:
+python tools/reference.py"""
 
+import importlib
 import inspect
+import re
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "lacuna-reference.md"
-BESIDE = ("lacuna.records.read", "lacuna.system.System", "lacuna.errors.MisuseError")
+BESIDE = {
+    "lacuna": ("lacuna.records.read", "lacuna.system.System", "lacuna.errors.MisuseError"),
+    "bifa": ("bifa.data.Dataset", "bifa.data.Trial", "bifa.gait.Optimum", "bifa.link.Uno"),
+}
 
 
 def main() -> int:
-    """Write the page."""
-    PAGE.write_text(reference())
+    """Write the pages."""
+    for package in BESIDE:
+        page(package).write_text(reference(package), "utf-8")
     return 0
 
 
-def reference() -> str:
-    """The page as Markdown."""
-    import lacuna
+def page(package: str) -> Path:
+    """Where the page of a package is."""
+    return ROOT / "docs" / f"{package}-reference.md"
 
-    parts = ["# Reference of lacuna\n\nGenerated from the docstrings by `python tools/lacuna_reference.py`."]
-    parts += [_entry(f"lacuna.{name}", getattr(lacuna, name)) for name in lacuna.__all__ if name != "__version__"]
-    for path in BESIDE:
+
+def reference(package: str) -> str:
+    """The page as Markdown."""
+    exported = importlib.import_module(package)
+    parts = [f"# Reference of {package}\n\nGenerated from the docstrings by `python tools/reference.py`."]
+    parts += [
+        _entry(f"{package}.{name}", getattr(exported, name)) for name in exported.__all__ if name != "__version__"
+    ]
+    for path in BESIDE[package]:
         module, name = path.rsplit(".", 1)
-        parts.append(_entry(path, getattr(__import__(module, fromlist=[name]), name)))
+        parts.append(_entry(path, getattr(importlib.import_module(module), name)))
     return "\n\n".join(parts) + "\n"
 
 
 def _entry(path: str, thing: object) -> str:
-    parts = [
-        f"## `{path}`",
-        f"```python\n{path.rsplit('.', 1)[1]}{_signature(thing)}\n```",
-        inspect.getdoc(thing) or "",
-    ]
+    name = path.rsplit(".", 1)[1]
+    if not (inspect.isclass(thing) or inspect.isroutine(thing)):
+        return f"## `{path}`\n\n```python\n{name} = {thing!r}\n```"
+    parts = [f"## `{path}`", f"```python\n{name}{_signature(thing)}\n```", inspect.getdoc(thing) or ""]
     if inspect.isclass(thing):
         own = [(n, m) for n, m in vars(thing).items() if not n.startswith("_") and inspect.isfunction(m)]
         parts += [
@@ -43,9 +54,11 @@ def _entry(path: str, thing: object) -> str:
 
 def _signature(thing: object) -> str:
     try:
-        return str(inspect.signature(thing)).replace(" -> None", "")
+        found = str(inspect.signature(thing))
     except (TypeError, ValueError):
         return ""
+    found = re.sub(r" -> '?None'?$", "", found)
+    return found.replace("pathlib._local.", "pathlib.")  # as Python 3.13 writes it
 
 
 if __name__ == "__main__":

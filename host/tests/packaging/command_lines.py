@@ -1,10 +1,12 @@
-"""The command lines of the README and the docs: those in blocks and those in the text."""
+"""The command lines of the README, the docs and the workflows: those in blocks and those in the text."""
 
 import re
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+import yaml
 
 PROGRAMS = ("bifa", "make", "pio", "pip", "python", "pytest")
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -27,14 +29,27 @@ class CommandLine:
 
 def command_lines(root: Path) -> list[CommandLine]:
     """All of them, each once a page. What names no argument of `make` or a tool is prose: "`bifa` talks to..."."""
-    pages = [root / "README.md", root / "host" / "lacuna" / "README.md", *sorted((root / "docs").rglob("*.md"))]
-    found = {}
-    for page in pages:
-        for text in _candidates(page.read_text("utf-8")):
-            for command in _commands(text):
-                line = CommandLine(str(page.relative_to(root)), command[0], tuple(command[1:]))
-                found[line] = None
-    return list(found)
+    pages = [root / "README.md", root / "host" / "lacuna" / "README.md", *sorted((root / ".github").glob("*.md"))]
+    pages += sorted((root / "docs").rglob("*.md"))
+    texts = [(page, text) for page in pages for text in _candidates(page.read_text("utf-8"))]
+    texts += [(page, step["run"]) for page in workflows(root) for step in steps(page) if "run" in step]
+    return list(
+        dict.fromkeys(
+            CommandLine(page.relative_to(root).as_posix(), command[0], tuple(command[1:]))
+            for page, text in texts
+            for command in _commands(text)
+        )
+    )
+
+
+def workflows(root: Path) -> list[Path]:
+    """The files of the workflows."""
+    return sorted((root / ".github" / "workflows").glob("*.yml"))
+
+
+def steps(workflow: Path) -> list[dict]:
+    """The steps of all its jobs."""
+    return [step for job in yaml.safe_load(workflow.read_text("utf-8"))["jobs"].values() for step in job["steps"]]
 
 
 def _candidates(text: str) -> Iterator[str]:

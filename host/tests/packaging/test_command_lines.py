@@ -130,6 +130,8 @@ def understands(line: CommandLine, monkeypatch, lay_out) -> None:
         bifa_line(line, lay_out)
     elif line.program == "pytest" or line.arguments[:2] == ("-m", "pytest"):
         pytest_line(line)
+    elif line.arguments[:2] == ("-m", "pip"):
+        pip_line(CommandLine(line.page, "pip", line.arguments[2:]))
     else:
         python_line(line, monkeypatch)
 
@@ -183,9 +185,16 @@ def test_platformio_has_the_environment_and_the_suite(line):
 @pytest.mark.parametrize("line", [line for line in LINES if line.program == "pip"], ids=str)
 def test_pip_finds_the_package(line):
     """tests/packaging/test_wheels.py installs those of the project."""
+    pip_line(line)
+
+
+def pip_line(line: CommandLine) -> None:
     action, *packages = (word for word in line.arguments if not word.startswith("-"))
     assert action == "install"
     for package in packages:
+        if package.endswith(".lock"):
+            assert (ROOT / package).is_file(), package
+            continue
         folder = ROOT / re.sub(r"\[.*\]", "", package)
         assert (folder / "pyproject.toml").is_file(), package
 

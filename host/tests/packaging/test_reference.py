@@ -1,19 +1,17 @@
-"""The reference page is what the docstrings say; every exported name has one."""
+"""The reference pages are what the docstrings say; every exported name has one."""
 
-import importlib.util
-from pathlib import Path
+import importlib
 
-import lacuna
-
-TOOL = Path(__file__).resolve().parents[3] / "tools" / "lacuna_reference.py"
+import pytest
+import reference
 
 
-def test_the_page_is_up_to_date():
-    spec = importlib.util.spec_from_file_location("lacuna_reference", TOOL)
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    assert tool.PAGE.read_text() == tool.reference(), "run: python tools/lacuna_reference.py"
+@pytest.mark.parametrize("package", reference.BESIDE)
+def test_the_page_is_up_to_date(package):
+    assert reference.page(package).read_text("utf-8") == reference.reference(package), "run: python tools/reference.py"
 
 
-def test_every_exported_name_says_what_it_is():
-    assert all(getattr(lacuna, name).__doc__ for name in lacuna.__all__)
+@pytest.mark.parametrize("package", reference.BESIDE)
+def test_every_exported_name_says_what_it_is(package):
+    exported = importlib.import_module(package)
+    assert all(getattr(exported, name).__doc__ for name in exported.__all__)
