@@ -35,16 +35,20 @@ def console(
     from bifa.rig import open_rig
     from bifa.screen import Console
 
-    with writable(), open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
-        with Console(stderr=True).status("waiting for the Uno"):
-            uno.connect()
-            settle(uno, rig.clock)
-        if sys.stdin.isatty():
-            from bifa.live.interactive import converse
+    typed = sys.stdin.isatty()
+    with writable(), open_rig(port) as rig:
+        with Uno(rig.transport, rig.clock) as uno:
+            with Console(stderr=True).status("waiting for the Uno"):
+                uno.connect()
+                settle(uno, rig.clock)
+            if typed:
+                from bifa.live.interactive import converse
 
-            converse(uno, rig)
-        elif not _pipe(uno, rig):
-            raise typer.Exit(1)
+                converse(uno, rig)
+            elif not _pipe(uno, rig):
+                raise typer.Exit(1)
+        if typed:  # or leaving would have raised
+            typer.echo("the Uno confirms that all valves are off")
 
 
 def _pipe(uno, rig) -> bool:

@@ -29,7 +29,7 @@ class Known:
 
 def words_after(words: list[str], known: Known) -> dict[str, str]:
     """What may follow the complete words of a line, and what is worth knowing about each."""
-    parameters = {p.name: f"{p.help}; {_range_and_value(p.name, known)}" for p in PARAMETERS}
+    parameters = {p.name: f"{_range_and_value(p.name, known)}; {p.help}" for p in PARAMETERS}
     commands = {name: text for name, _, text in CONSOLE_COMMANDS}
     presets = {name: "saved" if is_saved else "factory" for name, is_saved in known.presets.items()}
     match words:

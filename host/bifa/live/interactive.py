@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from prompt_toolkit import PromptSession
+from prompt_toolkit.application import get_app
 from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 from prompt_toolkit.key_binding import KeyBindings
 from prompt_toolkit.patch_stdout import patch_stdout
@@ -16,18 +17,22 @@ from bifa.live.conversation import Conversation
 STATE_STYLES = {"running": "bg:ansigreen", "holding": "bg:ansiyellow", "stopped": "bg:ansired", "fault": "bg:ansired"}
 
 
-def status_lines(conversation: Conversation) -> list[tuple[str, str]]:
-    """Two lines, in 80 columns: the robot; the link."""
+_WIDE = 80
+
+
+def status_lines(conversation: Conversation, columns: int = _WIDE) -> list[tuple[str, str]]:
+    """Two lines, shorter where there are fewer than 80 columns: the robot; the link."""
     sample, link = conversation.latest.sample, conversation.uno.counters.text()
     if sample is None:
         return [("", " no telemetry yet\n"), ("", f" link: {link}")]
+    is_wide = columns >= _WIDE
     chambers = "  ".join(
-        f"{name} {pressure:+6.2f} {connected:8}"
+        f"{name} {pressure:+6.2f} {connected:8}" if is_wide else f"{name} {pressure:+5.1f} {connected[:3]:3}"
         for name, pressure, connected in zip(CHAMBERS, sample.pressure_psi, sample.connected, strict=True)
     )
     return [
         (STATE_STYLES.get(sample.state, ""), f" {sample.state:7} "),
-        ("", f" psi: {chambers}\n"),
+        ("", f" psi: {chambers}\n" if is_wide else f" {chambers}\n"),
         ("", f" link: {link}  {conversation.latest.warning}"),
     ]
 
@@ -73,7 +78,7 @@ def _prompt(conversation: Conversation) -> PromptSession:
         completer=LineCompleter(conversation.known),
         complete_while_typing=True,
         key_bindings=_keys(conversation),
-        bottom_toolbar=lambda: status_lines(conversation),
+        bottom_toolbar=lambda: status_lines(conversation, get_app().output.get_size().columns),
         refresh_interval=0.2,
     )
 

@@ -1,8 +1,7 @@
 """A live picture of the robot in the terminal: pressures with their last seconds, valves, phases, the link."""
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from rich.console import Group
 from rich.live import Live
@@ -14,22 +13,12 @@ from bifa.link import Clock, Sample, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.latest import Latest
 from bifa.live.pace import Pace
+from bifa.live.trace import Trace
 from bifa.screen import Console
 
 REFRESH_S = 0.1
-TRACE = 24
-BLOCKS = " ▁▂▃▄▅▆▇█"
+_WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters of the trace, and of what stands beside it
 COLOURS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
-LOWEST_PSI, HIGHEST_PSI = -15.0, 15.0
-
-
-def sparkline(values: Iterable[float], width: int) -> str:
-    """The last `width` values as blocks from LOWEST_PSI to HIGHEST_PSI."""
-    shown = list(values)[-width:]
-    steps = len(BLOCKS) - 1
-    return "".join(
-        BLOCKS[min(steps, max(0, round((v - LOWEST_PSI) / (HIGHEST_PSI - LOWEST_PSI) * steps)))] for v in shown
-    )
 
 
 def dial(phase_rad: float, width: int = 10) -> str:
@@ -44,28 +33,28 @@ class Monitor:
     def __init__(self, uno: Uno) -> None:
         self._uno = uno
         self._latest = Latest()
-        self._history = [deque(maxlen=TRACE) for _ in CHAMBERS]
+        self._trace = Trace()
 
     def take(self, samples: list[Sample]) -> None:
         """The samples since the last picture; the last one is shown."""
         if not samples:
             return
         self._latest.take(samples)
-        for history, pressure in zip(self._history, samples[-1].pressure_psi, strict=True):
-            history.append(pressure)
+        self._trace.take(samples[-1])
 
-    def draw(self) -> Panel:
-        """The picture as it is now."""
+    def draw(self, columns: int) -> Panel:
+        """The picture as it is now, so many characters wide: in fewer the last cycle is drawn more coarsely."""
         sample = self._latest.sample
+        width = max(_NARROWEST, min(_WIDEST, columns - _BESIDE))
         table = Table(box=None, pad_edge=False)
-        for heading in ("chamber", "psi", f"last {TRACE * REFRESH_S:g} s", "valves", "phase"):
+        for heading in ("chamber", "psi", f"last {self._trace.seconds:.1f} s", "valves", "phase"):
             table.add_column(heading, no_wrap=True)
         for i, name in enumerate(CHAMBERS if sample else ()):
             connected = sample.connected[i]
             table.add_row(
                 name,
                 f"{sample.pressure_psi[i]:+7.3f}",
-                f"{sparkline(self._history[i], TRACE):{TRACE}}",
+                f"{self._trace.sparkline(i, width):{width}}",
                 Text(connected, COLOURS[connected]),
                 dial(sample.phase_rad[i]),
             )
@@ -90,7 +79,7 @@ def watch(
             _follow(uno, clock, monitor, live, math.inf if duration_s is None else clock.now() + duration_s)
     finally:
         if uno.counters.samples:
-            console.print(monitor.draw())
+            console.print(monitor.draw(console.width))
 
 
 def _follow(uno: Uno, clock: Clock, monitor: Monitor, live: Live, end_s: float) -> None:
@@ -100,5 +89,5 @@ def _follow(uno: Uno, clock: Clock, monitor: Monitor, live: Live, end_s: float) 
         while (left_s := until_s - clock.now()) > 1e-4:
             samples += uno.samples(left_s)
         monitor.take(samples)
-        live.update(monitor.draw(), refresh=True)
+        live.update(monitor.draw(live.console.width), refresh=True)
         pace.wait()

@@ -56,12 +56,13 @@ def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
     enters(console, "load fast", "ok")
     enters(console, "show period_s", f"[period_s 4 {PERIOD} * power-up 5.7 s", "ok")
     console.presses(CTRL_D)
+    console.sees("the Uno confirms that all valves are off")
     assert console.exit_status() == 0
 
 
 def test_completion_shows_what_a_parameter_means_and_what_it_is_now(console, uno):
     console.presses("set per")
-    console.sees("period_s  time of one cycle (1/f); 0.5 to 60 s, now 5.7")
+    console.sees("period_s  0.5 to 60 s, now 5.7; time of one cycle (1/f)")
     enters(console, "set period_s 3", "[period_s 5.700 -> 3.000 s", "ok", keys=TAB + " 3")
     console.presses("set period_s ")
     console.sees("3      now; 0.5 to 60 s")
@@ -82,7 +83,7 @@ def test_completion_knows_the_grammar():
     assert list(words_after(["hold", "body"], KNOWN)) == ["off", "vacuum", "positive"]
     assert words_after(["load"], KNOWN) == {"baseline": "factory", "fast": "saved"}
     assert words_after(["forget"], KNOWN) == {"fast": "saved"}
-    assert words_after(["set"], KNOWN)["period_s"] == "time of one cycle (1/f); 0.5 to 60 s, now 2.720001"
+    assert words_after(["set"], KNOWN)["period_s"] == "0.5 to 60 s, now 2.720001; time of one cycle (1/f)"
     assert words_after(["set", "period_s"], KNOWN) == {"2.720001": "now; 0.5 to 60 s"}
     assert words_after(["set", "speed"], KNOWN) == words_after(["run"], KNOWN) == {}
 
@@ -216,6 +217,9 @@ def test_the_status_lines_fit_and_tell_old_telemetry():
     robot, link = "".join(text for _, text in status_lines(conversation)).split("\n")
     assert robot == " stopped  psi: body -13.00 positive  head -13.00 vacuum    tail -13.00 positive"
     assert len(robot) <= 80
+    narrow = "".join(text for _, text in status_lines(conversation, 60)).split("\n")[0]
+    assert narrow == " stopped  body -13.0 pos  head -13.0 vac  tail -13.0 pos"
+    assert len(narrow) <= 60
     assert link.rstrip() == " link: samples 1234567  lost 45  bad frames 2  sent again 3"
     conversation.latest.warning = "no telemetry for 3 s"
     assert "no telemetry for 3 s" in status_lines(conversation)[-1][1]

@@ -46,8 +46,22 @@ def test_the_trace_is_as_long_as_it_says():
     board, shown = Board(), io.StringIO()
     watch(Uno(board, board), board, Console(file=shown, width=80), 1.0)
     body = next(line for line in shown.getvalue().splitlines() if "body" in line)
-    assert "last 2.4 s" in shown.getvalue()
+    assert "last 0.9 s" in shown.getvalue()
     assert body.count("▄") == 10  # one block, at 0 psi, each tenth of a second
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_a_whole_cycle_is_in_the_trace_at_any_width(width):
+    monitor = Monitor(SimpleNamespace(counters=SimpleNamespace(text=str)))
+    for k in range(400):
+        psi, phase = (8.0 if k % 57 < 4 else -12.0), 2 * math.pi * (k % 57) / 57
+        monitor.take([Sample(k, 100_000 * k, "running", (psi,) * 3, (1.0,) * 3, (phase,) * 3, 0)])
+    shown = io.StringIO()
+    Console(file=shown, width=width).print(monitor.draw(width))
+    assert "last 5.7 s" in shown.getvalue()
+    for chamber in ("body", "head", "tail"):
+        line = next(line for line in shown.getvalue().splitlines() if chamber in line)
+        assert {"▆", "▁"} <= set(line), "the pulse is 0.4 s long"
 
 
 def test_the_picture_is_that_of_the_sample():
@@ -55,7 +69,7 @@ def test_the_picture_is_that_of_the_sample():
     monitor = Monitor(SimpleNamespace(counters=counters))
     monitor.take([Sample(5, 12_300_000, "holding", (-15.0, 0.0, 14.5), (0.0,) * 3, (0.0, math.pi, 6.2), 0b011000)])
     shown = io.StringIO()
-    Console(file=shown, width=80).print(monitor.draw())
+    Console(file=shown, width=80).print(monitor.draw(80))
     lines = [" ".join(line.strip("│ ").split()) for line in shown.getvalue().splitlines()]
     assert "holding 12.3 s" in lines
     assert "body -15.000 off ●·········" in lines
