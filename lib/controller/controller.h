@@ -73,7 +73,7 @@ class Controller {
   /// Takes the present pressures as zero: only while idle, if they have rested for 4 s (Rest), and if each is within
   /// kGreatestOffset_mpsi.
   Verdict measure_zero(Calibration& measured) const;
-  void calibrate(const Calibration& calibration);
+  void calibrate(const Calibration& calibration);  ///< it must be valid (is_valid())
   const Calibration& calibration() const { return calibration_; }
 
   /// Leaves out the next kMarkPause strobes, not the samples: an instrument that stamps the strobe sees the pause.
@@ -131,7 +131,7 @@ class Controller {
   uint8_t since_sample_ms_ = 0;
   uint8_t strobes_left_out_ = 0;  ///< still to be left out
   uint16_t marked_ = 0;
-  volatile bool emergency_stop_ = false;
+  volatile bool emergency_stop_ = false;  ///< latched, too, for as long as it is pressed
 
   uint16_t wanted_mpsi_ = 0;
   SupplyCode wanted_code_;

@@ -74,8 +74,9 @@ void Session::in_order(const Frame& frame, const LinkCounters& counters) {
   ++expected_;
   if (query(frame, counters)) return;
   Result& result = results_[frame.sequence % kRemembered];
+  const bool saves_for_another = commands_.store().busy();  // the console, or a session before: no answer of this one
   result = carry_out(static_cast<MessageId>(frame.message), frame.fields, *this);
-  waiting_ = result == Result::kOk && commands_.store().busy();
+  waiting_ = result == Result::kOk && !saves_for_another && commands_.store().busy();
   if (!waiting_) done(frame.sequence);
 }
 

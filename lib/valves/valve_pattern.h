@@ -18,7 +18,6 @@ class ValvePattern {
   uint8_t bits() const { return bits_; }
 
   bool operator==(const ValvePattern& other) const { return bits_ == other.bits_; }
-  bool operator!=(const ValvePattern& other) const { return bits_ != other.bits_; }
 
  private:
   // Any other number that is forced into the enum (damaged RAM) means off.

@@ -31,12 +31,25 @@ void test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it() 
   TEST_ASSERT_INT16_WITHIN(1, 18731, last);
 }
 
+// Against the formulas in the datasheets, in floating point.
+void test_pressures_are_the_nearest_thousandths_of_a_psi() {
+  for (uint16_t sum = 0; sum <= 1023 * 8; ++sum) {
+    const double exact = (sum / 8.0 + 0.5) * 37500 / 1024 - 18750;
+    TEST_ASSERT_TRUE(sensor_mpsi(sum) - exact <= 0.5 && exact - sensor_mpsi(sum) < 0.51);
+  }
+  for (uint16_t conversion = 0; conversion < 410; ++conversion) {
+    const double exact = (5 * (conversion + 0.5) / 1024 - 1) * 130000 / 4;
+    TEST_ASSERT_TRUE(bifa::monitor_mpsi(conversion) <= exact + 0.01 && bifa::monitor_mpsi(conversion) > exact - 1);
+  }
+  TEST_ASSERT_EQUAL_INT16(INT16_MAX, bifa::monitor_mpsi(412));
+}
+
 void test_range_of_a_sensor_that_works_is_its_diagnostic_band() {
   TEST_ASSERT_FALSE(bifa::is_in_range(0));
-  TEST_ASSERT_FALSE(bifa::is_in_range(25 * kOversampling));
-  TEST_ASSERT_TRUE(bifa::is_in_range(26 * kOversampling));
-  TEST_ASSERT_TRUE(bifa::is_in_range(997 * kOversampling));
-  TEST_ASSERT_FALSE(bifa::is_in_range(998 * kOversampling));
+  TEST_ASSERT_FALSE(bifa::is_in_range(26 * 8 - 1));
+  TEST_ASSERT_TRUE(bifa::is_in_range(26 * 8));
+  TEST_ASSERT_TRUE(bifa::is_in_range(997 * 8));
+  TEST_ASSERT_FALSE(bifa::is_in_range(997 * 8 + 1));
   TEST_ASSERT_FALSE(bifa::is_in_range(1023 * kOversampling));
 }
 
@@ -110,6 +123,31 @@ void test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went() {
   TEST_ASSERT_TRUE(rest.is_long());
 }
 
+// Against all that it was ever told: the samples of the last three parts and of the one under way.
+void test_last_second_holds_the_last_three_thirds_and_the_one_under_way() {
+  const uint16_t kPart = 34, kSamples = 5 * 34 + 7;
+  int16_t told[kSamples];
+  LastSecond last;
+  uint32_t random = 1;
+  for (uint16_t n = 0; n < kSamples; ++n) {
+    random = random * 1664525UL + 1013904223UL;
+    told[n] = static_cast<int16_t>(random >> 18) - 8192;
+    const int16_t pressures[] = {told[n], static_cast<int16_t>(-told[n]), static_cast<int16_t>(told[n] / 2)};
+    last.add(pressures);
+    const uint16_t part = n / kPart, first = part > 3 ? (part - 3) * kPart : 0;
+    int16_t lowest = told[first], highest = told[first];
+    for (uint16_t i = first; i <= n; ++i) {
+      if (told[i] < lowest) lowest = told[i];
+      if (told[i] > highest) highest = told[i];
+    }
+    TEST_ASSERT_EQUAL_INT16(lowest, last.lowest_mpsi(0));
+    TEST_ASSERT_EQUAL_INT16(highest, last.highest_mpsi(0));
+    TEST_ASSERT_EQUAL_INT16(-lowest, last.highest_mpsi(1));
+    TEST_ASSERT_EQUAL_INT16(-highest, last.lowest_mpsi(1));
+    TEST_ASSERT_EQUAL_INT16(lowest / 2, last.lowest_mpsi(2));
+  }
+}
+
 void test_last_second_knows_nothing_before_the_first_sample() {
   LastSecond last;
   TEST_ASSERT_EQUAL_INT16(0, last.lowest_mpsi(0));
@@ -119,12 +157,14 @@ void test_last_second_knows_nothing_before_the_first_sample() {
 void run() {
   RUN_TEST(test_sensor_spans_15_psi_either_way_from_10_to_90_percent_of_the_supply);
   RUN_TEST(test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it);
+  RUN_TEST(test_pressures_are_the_nearest_thousandths_of_a_psi);
   RUN_TEST(test_range_of_a_sensor_that_works_is_its_diagnostic_band);
   RUN_TEST(test_monitor_of_the_regulator_is_0_to_130_psi_at_1_to_5_volts);
   RUN_TEST(test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets);
   RUN_TEST(test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon_after);
   RUN_TEST(test_pressures_rest_once_their_means_have_stayed_for_four_seconds);
   RUN_TEST(test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went);
+  RUN_TEST(test_last_second_holds_the_last_three_thirds_and_the_one_under_way);
   RUN_TEST(test_last_second_knows_nothing_before_the_first_sample);
 }
 

@@ -18,7 +18,8 @@ const ChamberState kOff = ChamberState::kOff;
 const ChamberState kVacuum = ChamberState::kVacuum;
 const ChamberState kPositive = ChamberState::kPositive;
 
-uint8_t pins = 0;      ///< what stands on the valves' pins
+uint8_t pins = 0;  ///< what stands on the valves' pins
+uint8_t writes = 0;
 uint8_t outdated = 0;  ///< how often what waits was told that it came before a stop or fault
 
 // ---- the states ----
@@ -125,6 +126,87 @@ void test_every_stop_and_every_new_fault_outdates_what_came_before_it() {
   TEST_ASSERT_FALSE(supervisor.outdated());
 }
 
+void test_each_chamber_is_walked_by_its_own_output() {
+  for (uint8_t outputs = 0; outputs < 8; ++outputs) {
+    Supervisor supervisor;
+    supervisor.run();
+    supervisor.walk(outputs);
+    supervisor.tick();
+    for (uint8_t i = 0; i < 3; ++i) {
+      const bool positive = outputs >> i & 1;
+      TEST_ASSERT_TRUE(supervisor.wanted(i) == (positive ? kPositive : kVacuum));
+      TEST_ASSERT_EQUAL_HEX8(positive ? 1 : 2, pins >> 2 * i & 3);
+    }
+    TEST_ASSERT_EQUAL_HEX8(pins, supervisor.valves().bits());
+  }
+}
+
+void test_run_is_for_idle_and_idle_for_what_moves_air() {
+  Supervisor supervisor;
+  supervisor.hold(Chamber::kBody, kPositive);
+  TEST_ASSERT_TRUE(supervisor.moves_air());
+  supervisor.run();
+  TEST_ASSERT_TRUE(supervisor.state() == State::kHolding);
+  supervisor.tick();
+  supervisor.idle();
+  TEST_ASSERT_EQUAL_HEX8(0, pins);
+  TEST_ASSERT_TRUE(supervisor.state() == State::kIdle);
+  TEST_ASSERT_FALSE(supervisor.moves_air());
+  supervisor.run();
+  TEST_ASSERT_TRUE(supervisor.moves_air());
+  supervisor.hold(Chamber::kBody, kPositive);
+  TEST_ASSERT_TRUE(supervisor.state() == State::kRunning);
+  TEST_ASSERT_TRUE(supervisor.wanted(0) == kOff);
+  supervisor.stop();
+  TEST_ASSERT_FALSE(supervisor.moves_air());
+  TEST_ASSERT_TRUE(supervisor.is_latched());
+  supervisor.idle();
+  TEST_ASSERT_TRUE(supervisor.state() == State::kStopped);
+}
+
+void test_a_vent_ends_what_every_chamber_was_to_do() {
+  for (uint8_t chamber = 0; chamber < 3; ++chamber) {
+    for (uint8_t way = 0; way < 4; ++way) {
+      Supervisor supervisor;
+      LastSecond last_second;
+      supervisor.hold(static_cast<Chamber>(chamber), kPositive);
+      supervisor.tick();
+      if (way == 0) supervisor.idle();
+      if (way == 1) supervisor.stop();
+      if (way == 2) supervisor.trip(Fault::kOverPressure, chamber, 1, 2, 3, last_second);
+      if (way == 3) supervisor.hold(static_cast<Chamber>(chamber), kOff);
+      TEST_ASSERT_EQUAL_HEX8(0, pins);
+      TEST_ASSERT_EQUAL_HEX8(0, supervisor.valves().bits());
+      TEST_ASSERT_TRUE(supervisor.wanted(chamber) == kOff);
+      tick(supervisor, 10);
+      TEST_ASSERT_EQUAL_HEX8(0, pins);
+      // and the valve has its time to close
+      if (way == 1 || way == 2) supervisor.clear();
+      supervisor.hold(static_cast<Chamber>(chamber), kVacuum);
+      tick(supervisor, 1);
+      TEST_ASSERT_EQUAL_HEX8(2 << 2 * chamber, pins);
+    }
+  }
+}
+
+void test_a_second_fault_vents_but_keeps_the_first_one_s_report() {
+  Supervisor supervisor;
+  LastSecond last_second;
+  supervisor.trip(Fault::kOverPressure, 1, 12345, 10500, 777, last_second);
+  pins = 0xFF;  // whatever stands there
+  supervisor.trip(Fault::kHostSilent, bifa::kNoChannel, 1, 2, 888, last_second);
+  TEST_ASSERT_EQUAL_HEX8(0, pins);
+  TEST_ASSERT_TRUE(supervisor.fault().fault == Fault::kOverPressure);
+  TEST_ASSERT_TRUE(supervisor.is_latched());
+}
+
+void test_pins_are_written_only_when_they_change() {
+  Supervisor supervisor;
+  supervisor.hold(Chamber::kBody, kPositive);
+  tick(supervisor, 3);
+  TEST_ASSERT_EQUAL_UINT8(1, writes);
+}
+
 void run() {
   RUN_TEST(test_walking_puts_the_oscillators_outputs_on_the_valves);
   RUN_TEST(test_outputs_of_the_oscillators_are_nothing_unless_running);
@@ -133,14 +215,22 @@ void run() {
   RUN_TEST(test_stopped_nothing_moves_until_it_is_cleared);
   RUN_TEST(test_a_fault_keeps_its_first_cause_with_channel_value_limit_time_and_extremes);
   RUN_TEST(test_every_stop_and_every_new_fault_outdates_what_came_before_it);
+  RUN_TEST(test_each_chamber_is_walked_by_its_own_output);
+  RUN_TEST(test_run_is_for_idle_and_idle_for_what_moves_air);
+  RUN_TEST(test_a_vent_ends_what_every_chamber_was_to_do);
+  RUN_TEST(test_a_second_fault_vents_but_keeps_the_first_one_s_report);
+  RUN_TEST(test_pins_are_written_only_when_they_change);
 }
 
 }  // namespace
 
-void bifa::set_valves(ValvePattern pattern) { pins = pattern.bits(); }
+void bifa::set_valves(ValvePattern pattern) {
+  pins = pattern.bits();
+  ++writes;
+}
 void bifa::outdate_input() { ++outdated; }
 
-void setUp() { pins = outdated = 0; }
+void setUp() { pins = writes = outdated = 0; }
 void tearDown() {}
 
 RUN_SUITE(run)

@@ -57,6 +57,17 @@ void test_numbers_that_are_no_state_mean_off() {
   }
 }
 
+void test_times_are_those_that_the_valve_needs() {
+  TEST_ASSERT_EQUAL_UINT8(3, kDeadTime_ms);
+  TEST_ASSERT_EQUAL_UINT8(20, kDwell_ms);
+}
+
+void test_venting_a_valve_that_has_rested_does_not_delay_it() {
+  ValveSequencer sequencer;
+  sequencer.vent();
+  TEST_ASSERT_TRUE(sequencer.tick(kPositive) == kPositive);
+}
+
 void test_a_valve_that_has_rested_opens_at_once() {
   ValveSequencer sequencer;
   TEST_ASSERT_TRUE(sequencer.tick(kPositive) == kPositive);
@@ -154,6 +165,8 @@ void test_the_paper_s_pressure_is_count_268_less_rounding() {
 void run() {
   RUN_TEST(test_every_pattern_that_can_be_made_has_at_most_one_valve_of_a_chamber_on);
   RUN_TEST(test_numbers_that_are_no_state_mean_off);
+  RUN_TEST(test_times_are_those_that_the_valve_needs);
+  RUN_TEST(test_venting_a_valve_that_has_rested_does_not_delay_it);
   RUN_TEST(test_a_valve_that_has_rested_opens_at_once);
   RUN_TEST(test_one_valve_closes_before_the_other_opens);
   RUN_TEST(test_a_valve_stays_on_for_the_dwell_however_short_its_command);

@@ -3,6 +3,7 @@
 
 #include "../../suite.h"
 #include "controller.h"
+#include "critical.h"
 #include "parameters.h"
 
 using bifa::Calibration;
@@ -51,6 +52,12 @@ struct Bench {
       if (noisy && rounds % 2) ++seen.sum[0], ++seen.sum[1], ++seen.sum[2];
       controller.converted_in_interrupt(seen);
     }
+  }
+
+  /// In the receive interrupt, which others wait for.
+  void stop_byte() {
+    const bifa::Critical interrupts_off;
+    controller.stop_in_interrupt();
   }
 
   /// A command that comes now.
@@ -117,7 +124,7 @@ void test_a_stop_byte_latches_until_clear() {
   Bench bench;
   bench.controller.run();
   bench.tick(10);
-  bench.controller.stop_in_interrupt();
+  bench.stop_byte();
   TEST_ASSERT_EQUAL_HEX8(0, pins);
   equal(Verdict::kLatched, bench.controller.run());
   equal(Verdict::kLatched, bench.controller.hold(Chamber::kBody, ChamberState::kVacuum));
@@ -131,7 +138,7 @@ void test_a_stop_byte_latches_until_clear() {
 void test_a_clear_that_came_before_the_stop_does_not_undo_it() {
   Bench bench;
   bench.controller.hear_from_now_on();
-  bench.controller.stop_in_interrupt();
+  bench.stop_byte();
   equal(Verdict::kLatched, bench.controller.clear());
   equal(State::kStopped, bench.state());
   equal(Verdict::kDone, bench.clear());
@@ -221,7 +228,7 @@ void test_a_stop_ends_timed_holds() {
   Bench bench;
   bench.controller.schedule_add(50, Chamber::kBody, ChamberState::kPositive);
   bench.controller.schedule_start();
-  bench.controller.stop_in_interrupt();
+  bench.stop_byte();
   bench.tick(2);
   bench.clear();
   bench.tick(200);
@@ -232,7 +239,7 @@ void test_timed_holds_do_not_outlive_a_stop_that_is_cleared_within_a_tick() {
   Bench bench;
   bench.controller.schedule_add(50, Chamber::kBody, ChamberState::kPositive);
   bench.controller.schedule_start();
-  bench.controller.stop_in_interrupt();
+  bench.stop_byte();
   equal(Verdict::kDone, bench.clear());
   bench.tick(200);
   TEST_ASSERT_EQUAL_HEX8(0, pins);
@@ -318,6 +325,71 @@ void test_a_hold_that_falls_due_as_the_host_becomes_too_silent_opens_no_valve() 
   }
 }
 
+void test_stop_ends_timed_holds_for_good() {
+  Bench bench;
+  bench.controller.schedule_add(50, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_start();
+  bench.tick(10);
+  equal(Verdict::kDone, bench.controller.stop());
+  TEST_ASSERT_FALSE(bench.controller.status().scheduled);
+  bench.tick(200);
+  TEST_ASSERT_EQUAL_HEX8(0, pins);
+}
+
+void test_a_schedule_that_is_started_again_begins_at_time_0() {
+  Bench bench;
+  bench.controller.schedule_add(50, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_add(90, Chamber::kBody, ChamberState::kOff);
+  for (uint8_t turn = 0; turn < 3; ++turn) {
+    equal(Verdict::kDone, bench.controller.schedule_start());
+    bench.tick(50);
+    TEST_ASSERT_EQUAL_HEX8(0, pins);
+    bench.tick(1);
+    TEST_ASSERT_EQUAL_HEX8(kBodyPositive, pins);
+    bench.tick(40);
+    TEST_ASSERT_EQUAL_HEX8(0, pins);
+    bench.tick(30);
+  }
+}
+
+void test_an_empty_schedule_does_not_run() {
+  Bench bench;
+  equal(Verdict::kDone, bench.controller.schedule_start());
+  TEST_ASSERT_FALSE(bench.controller.status().scheduled);
+  bench.controller.schedule_add(10, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.schedule_clear();
+  equal(Verdict::kDone, bench.controller.schedule_start());
+  bench.tick(100);
+  TEST_ASSERT_EQUAL_HEX8(0, pins);
+}
+
+void test_timed_holds_are_not_started_while_it_walks() {
+  Bench bench;
+  bench.controller.schedule_add(10, Chamber::kBody, ChamberState::kPositive);
+  bench.controller.run();
+  equal(Verdict::kRefused, bench.controller.schedule_start());
+  bench.controller.stop();
+  bench.controller.hold(Chamber::kHead, ChamberState::kVacuum);
+  equal(Verdict::kDone, bench.controller.schedule_start());
+}
+
+void test_every_chamber_and_state_can_be_held_at_a_time_even_at_the_same() {
+  const uint8_t on[] = {0, 2, 1};
+  for (uint8_t chamber = 0; chamber < 3; ++chamber) {
+    for (uint8_t state = 0; state < 3; ++state) {
+      Bench bench;
+      const uint8_t other = (chamber + 1) % 3;
+      bench.controller.schedule_add(70000, static_cast<Chamber>(other), ChamberState::kVacuum);
+      bench.controller.schedule_add(70000, static_cast<Chamber>(chamber), static_cast<ChamberState>(state));
+      bench.controller.schedule_start();
+      bench.tick(70000);
+      TEST_ASSERT_EQUAL_HEX8(0, pins);
+      bench.tick();
+      TEST_ASSERT_EQUAL_HEX8(on[state] << 2 * chamber | 2 << 2 * other, pins);
+    }
+  }
+}
+
 // ---- sampling ----
 
 void test_a_sample_every_ten_milliseconds_stamped_with_the_strobe() {
@@ -342,6 +414,123 @@ void test_a_sample_every_ten_milliseconds_stamped_with_the_strobe() {
   TEST_ASSERT_EQUAL_UINT16(0, bench.controller.status().samples_lost);
 }
 
+void test_a_sample_says_what_stood_at_its_strobe() {
+  Bench bench;
+  bench.pressure(0, 500);
+  bench.pressure(1, 520);
+  bench.pressure(2, 560);
+  bench.tick(40);
+  bench.controller.hold(Chamber::kHead, ChamberState::kPositive);
+  bench.controller.hold(Chamber::kTail, ChamberState::kVacuum);
+  bench.tick(20);
+  Sample sample;
+  TEST_ASSERT_TRUE(bench.controller.take_sample(sample));
+  TEST_ASSERT_FALSE(bench.controller.take_sample(sample));
+  equal(State::kHolding, sample.state);
+  TEST_ASSERT_EQUAL_HEX8(0x04 | 0x20, sample.valves);
+  const ChamberState commands[] = {ChamberState::kOff, ChamberState::kPositive, ChamberState::kVacuum};
+  const uint16_t conversions[] = {500, 520, 560};
+  for (uint8_t i = 0; i < 3; ++i) {
+    TEST_ASSERT_TRUE(commands[i] == sample.command[i]);
+    TEST_ASSERT_INT16_WITHIN(5, bifa::sensor_mpsi(conversions[i] * 8), sample.pressure_mpsi[i]);
+  }
+  // What comes while it is converted stands in the next one.
+  for (uint8_t ms = 0; ms < 10; ++ms) bench.controller.tick(false);
+  bench.controller.stop();
+  bench.controller.converted_in_interrupt(bench.round);
+  TEST_ASSERT_FALSE(bench.controller.take_sample(sample));
+  bench.controller.tick(false);
+  TEST_ASSERT_TRUE(bench.controller.take_sample(sample));
+  equal(State::kHolding, sample.state);
+  TEST_ASSERT_EQUAL_HEX8(0x04 | 0x20, sample.valves);
+  TEST_ASSERT_TRUE(sample.command[1] == ChamberState::kPositive);
+  bench.tick(19);
+  TEST_ASSERT_TRUE(bench.controller.take_sample(sample));
+  equal(State::kIdle, sample.state);
+  TEST_ASSERT_EQUAL_HEX8(0, sample.valves);
+}
+
+void test_phases_of_a_sample_are_turns_of_65536_and_every_walk_begins_with_the_body_at_0() {
+  Bench bench;
+  for (uint8_t walk = 0; walk < 2; ++walk) {
+    bench.controller.run();
+    bench.tick(1003);
+    Sample sample;
+    bench.controller.take_sample(sample);
+    // 5.7 s; the strobe was 2 to 13 ms ago
+    TEST_ASSERT_UINT16_WITHIN(90, 11400, sample.phase[0]);
+    TEST_ASSERT_UINT16_WITHIN(2, 49152, static_cast<uint16_t>(sample.phase[1] - sample.phase[0]));
+    TEST_ASSERT_UINT16_WITHIN(2, 16384, static_cast<uint16_t>(sample.phase[2] - sample.phase[0]));
+    bench.controller.stop();
+    bench.tick(997);
+  }
+}
+
+void test_first_sample_comes_with_the_tenth_tick_and_a_sample_is_numbered_from_1() {
+  Bench bench;
+  Sample sample;
+  bench.tick(10);
+  TEST_ASSERT_EQUAL_UINT16(1, bench.rounds);
+  TEST_ASSERT_TRUE(bench.controller.take_sample(sample));
+  TEST_ASSERT_EQUAL_UINT16(1, sample.sequence);
+  TEST_ASSERT_EQUAL_UINT32(10000, sample.time_us);
+}
+
+void test_status_says_what_is_so() {
+  Bench bench(StartCause::kBrownOut);
+  bench.pressure(0, 500);
+  bench.pressure(1, 520);
+  bench.pressure(2, 560);
+  bench.tick(25);
+  bifa::Status status = bench.controller.status();
+  equal(State::kFault, status.state);
+  equal(Fault::kBrownOut, status.fault.fault);
+  TEST_ASSERT_EQUAL_UINT8(bifa::kNoChannel, status.fault.channel);
+  TEST_ASSERT_EQUAL_UINT8(3, bifa::kNoChannel);  // as the host knows it
+  TEST_ASSERT_EQUAL_INT16(0, status.fault.value);
+  TEST_ASSERT_EQUAL_INT16(0, status.fault.limit);
+  TEST_ASSERT_EQUAL_UINT32(25, status.uptime_ms);
+  TEST_ASSERT_EQUAL_UINT32(25, bench.controller.uptime_ms());
+  TEST_ASSERT_EQUAL_UINT16(1, status.samples_lost);
+  for (uint8_t i = 0; i < 3; ++i) {
+    TEST_ASSERT_INT16_WITHIN(5, bifa::sensor_mpsi(bench.round.sum[i]), status.pressure_mpsi[i]);
+  }
+  TEST_ASSERT_FALSE(status.emergency_stop);
+  bench.pressed = true;
+  bench.tick();
+  TEST_ASSERT_TRUE(bench.controller.status().emergency_stop);
+  bench.pressed = false;
+  bench.tick();
+  bench.clear();
+  bench.controller.hold(Chamber::kTail, ChamberState::kPositive);
+  bench.tick(2);
+  status = bench.controller.status();
+  TEST_ASSERT_FALSE(status.emergency_stop);
+  TEST_ASSERT_EQUAL_HEX8(0x10, status.valves);
+}
+
+void test_lost_samples_are_counted_up_to_65535() {
+  Bench bench;
+  for (uint32_t i = 0; i < 65534; ++i) bench.controller.lose_sample();
+  TEST_ASSERT_EQUAL_UINT16(65534, bench.controller.status().samples_lost);
+  for (uint8_t i = 0; i < 3; ++i) bench.controller.lose_sample();
+  TEST_ASSERT_EQUAL_UINT16(65535, bench.controller.status().samples_lost);
+}
+
+void test_calibration_at_the_start_is_that_of_the_board() {
+  const Calibration calibration = {{100, -200, 300}};
+  Controller controller;
+  controller.begin(StartCause::kPower, bifa::factory_preset(0), calibration);
+  for (uint8_t ms = 0; ms < 12; ++ms) {
+    if (controller.tick(false)) controller.converted_in_interrupt({{kZero, kZero, kZero}, kMonitorZero});
+  }
+  for (uint8_t i = 0; i < 3; ++i) {
+    TEST_ASSERT_EQUAL_INT16(calibration.offset_mpsi[i], controller.calibration().offset_mpsi[i]);
+    TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(kZero) - calibration.offset_mpsi[i],
+                            controller.status().pressure_mpsi[i]);
+  }
+}
+
 void test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them() {
   for (uint8_t when_ms = 0; when_ms < 25; ++when_ms) {
     Bench bench;
@@ -356,7 +545,7 @@ void test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them() {
       if (!strobed) ++left_out;
       if (strobed && left_out > 0 && first_after == 0) first_after = sample.sequence;
     }
-    equal_u16(bifa::kMarkPause, left_out);
+    equal_u16(10, left_out);
     equal_u16(bench.controller.marked(), first_after);
   }
 }
@@ -576,6 +765,122 @@ void test_a_silent_host_vents_when_it_was_asked_to() {
   equal(Verdict::kDone, bench.clear());
 }
 
+void test_silence_of_the_host_counts_from_the_command_that_moves_air() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.host_timeout_ms = 500;
+  for (uint8_t way = 0; way < 3; ++way) {
+    Bench bench(StartCause::kPower, set);
+    bench.controller.schedule_add(10, Chamber::kBody, ChamberState::kVacuum);
+    bench.tick(3000);
+    if (way == 0) bench.controller.run();
+    if (way == 1) bench.controller.hold(Chamber::kBody, ChamberState::kVacuum);
+    if (way == 2) bench.controller.schedule_start();
+    bench.tick(499);
+    equal(Fault::kNone, bench.fault());
+    TEST_ASSERT_TRUE(pins != 0);
+    bench.tick();
+    equal(Fault::kHostSilent, bench.fault());
+    const bifa::FaultReport report = bench.controller.status().fault;
+    TEST_ASSERT_EQUAL_UINT8(bifa::kNoChannel, report.channel);
+    TEST_ASSERT_EQUAL_INT16(50, report.value);
+    TEST_ASSERT_EQUAL_INT16(50, report.limit);
+    TEST_ASSERT_EQUAL_UINT32(3500, report.time_ms);
+  }
+  Bench bench(StartCause::kPower, set);
+  bench.controller.run();
+  bench.tick(300);
+  bench.controller.host_heard();
+  bench.tick(499);
+  equal(Fault::kNone, bench.fault());
+  bench.tick();
+  equal(Fault::kHostSilent, bench.fault());
+}
+
+void test_the_longest_time_out_is_a_minute() {
+  ParameterSet set = bifa::factory_preset(0);
+  set.host_timeout_ms = 60000;
+  Bench bench(StartCause::kPower, set);
+  bench.controller.run();
+  bench.tick(59999);
+  equal(State::kRunning, bench.state());
+  bench.tick();
+  equal(Fault::kHostSilent, bench.fault());
+  TEST_ASSERT_EQUAL_INT16(6000, bench.controller.status().fault.value);
+}
+
+void test_a_clear_forgets_what_every_sensor_has_counted() {
+  for (uint8_t chamber = 0; chamber < 3; ++chamber) {
+    Bench bench;
+    bench.tick(100);
+    bench.pressure(chamber, 512 + 330);
+    bench.tick(190);
+    bench.stop_byte();
+    equal(Verdict::kDone, bench.clear());
+    bench.tick(150);
+    equal(Fault::kNone, bench.fault());
+    bench.tick(60);
+    equal(Fault::kOverPressure, bench.fault());
+    TEST_ASSERT_EQUAL_UINT8(chamber, bench.controller.status().fault.channel);
+  }
+}
+
+void test_a_clear_does_not_shorten_the_time_that_a_valve_needs_to_close() {
+  for (uint8_t chamber = 0; chamber < 3; ++chamber) {
+    Bench bench;
+    const Chamber which = static_cast<Chamber>(chamber);
+    bench.controller.hold(which, ChamberState::kPositive);
+    bench.tick(100);
+    bench.stop_byte();
+    equal(Verdict::kDone, bench.clear());
+    bench.controller.hold(which, ChamberState::kVacuum);
+    bench.tick(3);
+    TEST_ASSERT_EQUAL_HEX8(0, pins);
+    bench.tick();
+    TEST_ASSERT_EQUAL_HEX8(2 << 2 * chamber, pins);
+  }
+}
+
+void test_a_fault_is_not_cleared_while_any_chamber_has_its_cause() {
+  for (uint8_t chamber = 0; chamber < 3; ++chamber) {
+    Bench bench;
+    bench.pressure(0, 512 + 330);
+    bench.tick(230);
+    equal(Fault::kOverPressure, bench.fault());
+    bench.pressure(0, 512);
+    bench.pressure(chamber, 512 + 330);
+    bench.tick(20);
+    equal(Verdict::kCauseStands, bench.clear());
+    bench.pressure(chamber, 512);
+    bench.tick(20);
+    equal(Verdict::kDone, bench.clear());
+  }
+}
+
+void test_a_fault_keeps_the_extremes_of_every_chamber() {
+  Bench bench;
+  bench.noisy = false;
+  bench.tick(200);
+  bench.pressure(0, 532);
+  bench.pressure(1, 482);
+  bench.tick(20);
+  bench.pressure(0, 512);
+  bench.pressure(1, 512);
+  bench.tick(20);
+  bench.pressure(2, 1023);
+  bench.tick(60);
+  const bifa::FaultReport report = bench.controller.status().fault;
+  equal(Fault::kSensorRange, report.fault);
+  const int16_t zero = bifa::sensor_mpsi(kZero);
+  TEST_ASSERT_EQUAL_INT16(zero, report.lowest_mpsi[0]);
+  TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(532 * 8), report.highest_mpsi[0]);
+  TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(482 * 8), report.lowest_mpsi[1]);
+  TEST_ASSERT_EQUAL_INT16(zero, report.highest_mpsi[1]);
+  TEST_ASSERT_EQUAL_INT16(zero, report.lowest_mpsi[2]);
+  TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(1023 * 8), report.highest_mpsi[2]);
+  TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(1023 * 8), report.value);
+  TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(bifa::kSensorHigh), report.limit);
+}
+
 void test_without_a_time_out_the_host_may_be_silent_forever() {
   Bench bench;
   bench.controller.run();
@@ -590,6 +895,9 @@ void test_a_dac_that_does_not_answer_is_a_fault_until_it_does() {
   equal(State::kIdle, bench.state());
   bench.controller.supply_told(false);
   equal(Fault::kSupplyControl, bench.fault());
+  TEST_ASSERT_EQUAL_UINT8(bifa::kNoChannel, bench.controller.status().fault.channel);
+  TEST_ASSERT_EQUAL_INT16(3, bench.controller.status().fault.value);
+  TEST_ASSERT_EQUAL_INT16(2, bench.controller.status().fault.limit);
   equal(Verdict::kCauseStands, bench.clear());
   bench.controller.supply_told(true);
   equal(Verdict::kDone, bench.clear());
@@ -619,9 +927,64 @@ void test_after_a_reset_from_outside_it_starts_idle() {
 
 void test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read() {
   Bench bench(StartCause::kWatchdog);
-  bench.controller.stop_in_interrupt();
+  bench.stop_byte();
   equal(State::kFault, bench.state());
   equal(Fault::kWatchdog, bench.fault());
+}
+
+// ---- what the interrupts share with the main loop ----
+
+/// Guards that a call enters.
+template <typename Call>
+unsigned guards(Call call) {
+  const unsigned before = bifa::Critical::entered();
+  call();
+  return bifa::Critical::entered() - before;
+}
+
+void test_everything_that_the_main_loop_calls_is_guarded() {
+  Bench bench;
+  Controller& controller = bench.controller;
+  const Calibration calibration = {};
+  const ParameterSet set = bifa::factory_preset(0);
+  Calibration measured;
+  Sample sample;
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.hold(Chamber::kBody, ChamberState::kVacuum); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.stop(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.run(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.clear(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.apply(set); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.schedule_add(0, Chamber::kBody, ChamberState::kOff); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.schedule_start(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.schedule_clear(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.measure_zero(measured); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.calibrate(calibration); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.mark_strobe(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.marked(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.take_sample(sample); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.lose_sample(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.status(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.uptime_ms(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.host_heard(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.supply(); }));
+  TEST_ASSERT_EQUAL(1, guards([&] { controller.supply_told(true); }));
+  TEST_ASSERT_EQUAL(0, bifa::Critical::depth());
+}
+
+// The tick lets other interrupts in: a stop may come between any two of its parts.
+void test_every_part_of_a_tick_that_a_stop_could_interrupt_is_guarded() {
+  Bench bench;
+  const auto tick = [&] { bench.tick(); };
+  bench.tick(8);
+  TEST_ASSERT_EQUAL(2, guards(tick));  // the buttons, the valves; with the next one a sample begins
+  TEST_ASSERT_EQUAL(3, guards(tick));
+  bench.tick(5);
+  bench.controller.schedule_add(1000, Chamber::kBody, ChamberState::kOff);
+  bench.controller.schedule_start();
+  TEST_ASSERT_EQUAL(3, guards(tick));
+  bench.controller.stop();
+  bench.controller.run();
+  TEST_ASSERT_EQUAL(3, guards(tick));
 }
 
 // ---- the set-point ----
@@ -654,7 +1017,18 @@ void run() {
   RUN_TEST(test_clearing_timed_holds_that_do_not_run_leaves_held_chambers_alone);
   RUN_TEST(test_timed_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve);
   RUN_TEST(test_a_hold_that_falls_due_as_the_host_becomes_too_silent_opens_no_valve);
+  RUN_TEST(test_stop_ends_timed_holds_for_good);
+  RUN_TEST(test_a_schedule_that_is_started_again_begins_at_time_0);
+  RUN_TEST(test_an_empty_schedule_does_not_run);
+  RUN_TEST(test_timed_holds_are_not_started_while_it_walks);
+  RUN_TEST(test_every_chamber_and_state_can_be_held_at_a_time_even_at_the_same);
   RUN_TEST(test_a_sample_every_ten_milliseconds_stamped_with_the_strobe);
+  RUN_TEST(test_a_sample_says_what_stood_at_its_strobe);
+  RUN_TEST(test_phases_of_a_sample_are_turns_of_65536_and_every_walk_begins_with_the_body_at_0);
+  RUN_TEST(test_first_sample_comes_with_the_tenth_tick_and_a_sample_is_numbered_from_1);
+  RUN_TEST(test_status_says_what_is_so);
+  RUN_TEST(test_lost_samples_are_counted_up_to_65535);
+  RUN_TEST(test_calibration_at_the_start_is_that_of_the_board);
   RUN_TEST(test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them);
   RUN_TEST(test_samples_that_nobody_takes_are_counted);
   RUN_TEST(test_zero_is_measured_while_idle_and_taken_off_every_sample);
@@ -671,6 +1045,12 @@ void run() {
   RUN_TEST(test_over_pressure_behind_a_loose_plug_is_not_cleared);
   RUN_TEST(test_a_stuck_sensor_is_a_fault_while_walking);
   RUN_TEST(test_a_silent_host_vents_when_it_was_asked_to);
+  RUN_TEST(test_silence_of_the_host_counts_from_the_command_that_moves_air);
+  RUN_TEST(test_the_longest_time_out_is_a_minute);
+  RUN_TEST(test_a_clear_forgets_what_every_sensor_has_counted);
+  RUN_TEST(test_a_clear_does_not_shorten_the_time_that_a_valve_needs_to_close);
+  RUN_TEST(test_a_fault_is_not_cleared_while_any_chamber_has_its_cause);
+  RUN_TEST(test_a_fault_keeps_the_extremes_of_every_chamber);
   RUN_TEST(test_without_a_time_out_the_host_may_be_silent_forever);
   RUN_TEST(test_a_dac_that_does_not_answer_is_a_fault_until_it_does);
   RUN_TEST(test_after_the_watchdog_it_starts_in_a_fault);
@@ -678,16 +1058,19 @@ void run() {
   RUN_TEST(test_after_a_restart_of_unknown_cause_it_starts_in_a_fault);
   RUN_TEST(test_after_a_reset_from_outside_it_starts_idle);
   RUN_TEST(test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read);
+  RUN_TEST(test_everything_that_the_main_loop_calls_is_guarded);
+  RUN_TEST(test_every_part_of_a_tick_that_a_stop_could_interrupt_is_guarded);
   RUN_TEST(test_pressures_beyond_14_psi_end_at_14_psi_even_from_a_set_that_nobody_checked);
 }
 
 }  // namespace
 
 void bifa::set_valves(ValvePattern pattern) {
+  TEST_ASSERT_TRUE(Critical::depth() > 0);
   pins = pattern.bits();
   ever_on |= pins;
 }
-void bifa::outdate_input() {}
+void bifa::outdate_input() { TEST_ASSERT_TRUE(Critical::depth() > 0); }
 
 void setUp() {}
 void tearDown() {}

@@ -1,0 +1,232 @@
+"""What may be changed in a C++ source: constants, comparisons, logic, arithmetic, statements.
+
+A mutant is one edit of one file. The sources are read as tokens, not as text: comments, strings, preprocessor lines and
+templates' brackets are left alone. That relies on the project's formatting, which puts spaces round binary operators.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+TOKEN = re.compile(
+    r"""
+      (?P<skip> //[^\n]* | /\*.*?\*/ | ^[ \t]*\#(?:\\\n|[^\n])* | "(?:\\.|[^"\\])*" | '(?:\\.|[^'\\])*' )
+    | (?P<number> \b(?:0[xX][0-9a-fA-F]+|[0-9]+)(?:[uUlL]*)\b )
+    | (?P<word> [A-Za-z_]\w* )
+    | (?P<operator> <<=|>>=|->|\+\+|--|&&|\|\||<=|>=|==|!=|\+=|-=|\|=|&=|\^=|::|[-+*/%<>=!&|^~?:;,.(){}\[\]] )
+    """,
+    re.VERBOSE | re.DOTALL | re.MULTILINE,
+)
+
+BINARY = {
+    "<": ("<=", ">="),
+    "<=": ("<", ">"),
+    ">": (">=", "<="),
+    ">=": (">", "<"),
+    "==": ("!=",),
+    "!=": ("==",),
+    "&&": ("||",),
+    "||": ("&&",),
+    "+": ("-",),
+    "-": ("+",),
+    "*": ("/",),
+    "/": ("*",),
+    "%": ("/",),
+    "<<": (">>",),
+    ">>": ("<<",),
+    "&": ("|",),
+    "|": ("&",),
+    "^": ("|",),
+    "+=": ("-=",),
+    "-=": ("+=",),
+    "|=": ("&=",),
+    "&=": ("|=",),
+}
+UNARY = {"++": "--", "--": "++", "!": ""}
+WORDS = {"true": "false", "false": "true"}
+NO_STATEMENT = {
+    "using",
+    "static_assert",
+    "friend",
+    "template",
+    "case",
+    "default",
+    "else",
+    "if",
+    "for",
+    "while",
+    "switch",
+}
+BLOCK_WORDS = {"else", "do", "const", "try"}  # before the brace of a block, besides a closing parenthesis
+
+
+@dataclass(frozen=True)
+class Token:
+    """One token and its place in the text."""
+
+    kind: str
+    text: str
+    begin: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`source[begin:end]` of `file` replaced by `to`; line: its number; before, after: the line without and with it.
+
+    function: in which it is, if any. With file, before and after it names the mutant, wherever its line may move to.
+    """
+
+    file: str
+    function: str
+    begin: int
+    end: int
+    to: str
+    line: int
+    before: str
+    after: str
+
+    @property
+    def key(self) -> tuple[str, str, str, str]:
+        return self.file, self.function, self.before, self.after
+
+    def applied(self, source: str) -> str:
+        return source[: self.begin] + self.to + source[self.end :]
+
+    @property
+    def name(self) -> str:
+        place = f" in {self.function}()" if self.function else ""
+        return f"{self.file}:{self.line}{place}: {self.before}  ->  {self.after or '(nothing)'}"
+
+
+def mutants(file: str, source: str) -> list[Mutant]:
+    """Every mutant of a source, in the order of the text."""
+    tokens = [
+        Token(match.lastgroup, match[0], match.start(), match.end())
+        for match in TOKEN.finditer(source)
+        if match.lastgroup != "skip"
+    ]
+    edits = sorted({*_of_tokens(source, tokens), *_statements(tokens)})
+    return [_mutant(file, source, *edit) for edit in edits]
+
+
+def _of_tokens(source: str, tokens: list[Token]) -> Iterator[tuple[int, int, str]]:
+    for token in tokens:
+        spaced = source[token.begin - 1 : token.begin].isspace() and source[token.end : token.end + 1].isspace()
+        if token.kind == "number":
+            for to in _other_numbers(token.text):
+                yield token.begin, token.end, to
+        elif token.text in WORDS:
+            yield token.begin, token.end, WORDS[token.text]
+        elif token.text in UNARY:
+            yield token.begin, token.end, UNARY[token.text]
+        elif token.text in BINARY and spaced:
+            for to in BINARY[token.text]:
+                yield token.begin, token.end, to
+
+
+def _other_numbers(text: str) -> Iterator[str]:
+    suffix = re.search(r"[uUlL]*$", text)[0]
+    value = int(text[: len(text) - len(suffix)], 0)
+    for other in (value - 1, value + 1):
+        if other >= 0:
+            yield f"{other:#X}".replace("X", "x") + suffix if "x" in text.lower() else f"{other}{suffix}"
+
+
+def _statements(tokens: list[Token]) -> Iterator[tuple[int, int, str]]:
+    """Simple statements within functions, from their first token to their semicolon, which stays alone."""
+    blocks: list[bool] = []  # of the open braces: whether each is a block of statements
+    brackets = 0
+    for at, token in enumerate(tokens):
+        brackets += (token.text in ("(", "[")) - (token.text in (")", "]"))
+        if token.text == "{":
+            blocks.append(_opens_block(tokens, at))
+        elif token.text == "}":
+            blocks.pop()
+        elif blocks and blocks[-1] and brackets == 0 and _begins_statement(tokens, at):
+            end = _end_of_statement(tokens, at)
+            if end is not None and not _is_declaration(tokens[at:end]):
+                yield token.begin, tokens[end].begin, ""
+
+
+def _opens_block(tokens: list[Token], at: int) -> bool:
+    before = tokens[at - 1].text
+    return before in (")", ";", "{", "}", ":") or before in BLOCK_WORDS
+
+
+def _begins_statement(tokens: list[Token], at: int) -> bool:
+    before = tokens[at - 1].text
+    if tokens[at].text in NO_STATEMENT or not (tokens[at].kind == "word" or tokens[at].text in ("++", "--", "*")):
+        return False
+    if before == ":":
+        return _closes_label(tokens, at - 1)
+    return before in ("{", "}", ";", "else") or (before == ")" and _closes_condition(tokens, at - 1))
+
+
+def _closes_label(tokens: list[Token], at: int) -> bool:
+    while tokens[at].text not in (";", "{", "}"):
+        if tokens[at].text in ("case", "default"):
+            return True
+        at -= 1
+    return False
+
+
+def _closes_condition(tokens: list[Token], at: int) -> bool:
+    depth = 0
+    while at >= 0:
+        depth += (tokens[at].text == ")") - (tokens[at].text == "(")
+        if depth == 0:
+            return tokens[at - 1].text in ("if", "for", "while", "switch")
+        at -= 1
+    return False
+
+
+def _end_of_statement(tokens: list[Token], at: int) -> int | None:
+    """The place of its semicolon; None if a block follows first."""
+    depth = 0
+    for place in range(at, len(tokens)):
+        text = tokens[place].text
+        if text in ("(", "[") or (text == "{" and not _opens_block(tokens, place)):
+            depth += 1
+        elif text in (")", "]", "}"):
+            depth -= 1
+        elif text == "{":
+            return None
+        if depth < 0:
+            return None
+        if text == ";" and depth == 0:
+            return place
+    return None
+
+
+def _is_declaration(statement: list[Token]) -> bool:
+    """Whether it declares what the rest needs, so that without it nothing compiles; a guard is not needed so."""
+    words = [token.text for token in statement]
+    if "Critical" in words:
+        return False
+    if words[0] in ("const", "static", "constexpr", "struct"):
+        return True
+    kinds = [token.kind for token in statement[:2]]
+    return kinds == ["word", "word"] and words[0] not in ("return", "delete", "goto")
+
+
+def _mutant(file: str, source: str, begin: int, end: int, to: str) -> Mutant:
+    first = source.rfind("\n", 0, begin) + 1
+    last = source.find("\n", end)
+    before = source[first:last]
+    after = source[first:begin] + to + source[end:last]
+    return Mutant(
+        file, _function(source[:last]), begin, end, to, source.count("\n", 0, begin) + 1, _flat(before), _flat(after)
+    )
+
+
+def _function(until: str) -> str:
+    """The function that was begun last, by the indentation that the formatter gives it."""
+    found = re.findall(
+        r"^(?:  |    )?[A-Za-z][\w:<>&*, ]*?([\w~]+|operator\S+)\([^;{}]*\)[^;{}]*\{", until, re.MULTILINE
+    )
+    return next((name for name in reversed(found) if name not in ("if", "for", "while", "switch")), "")
+
+
+def _flat(text: str) -> str:
+    return " ".join(text.split())
