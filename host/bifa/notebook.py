@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +74,7 @@ class Robot:
 
 
 @contextmanager
-def connect(port: str | None = None) -> Iterator:
+def connect(port: str | None = None) -> Iterator[Any]:
     """The Uno at `port` (a serial port, `virtual`, or found by itself), connected: a `bifa.link.Uno`. Valves are off
     at the end."""
     from bifa.link import Uno

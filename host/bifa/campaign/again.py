@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Round:
         return self.effects == before.effects and as_fast and self.error_mm > 0.9 * before.error_mm
 
 
-def read_rounds(file: Path) -> list[dict]:
+def read_rounds(file: Path) -> list[dict[str, Any]]:
     """The rounds as `again` wrote them; StageError where an earlier version did, which kept less."""
     rounds = json.loads(file.read_text(encoding="utf-8"))
     known = {field.name for field in fields(Round)}

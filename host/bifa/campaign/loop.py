@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from bifa.campaign.about import about
 from bifa.campaign.again import Trades, again
@@ -134,7 +135,7 @@ def _optimise(which: str, bench: Bench, part: Part) -> Stage:
     return Stage(f"optimise-{which}", f"gait from the {which} model", (model,), (gait,), run, settings)
 
 
-def _gait_of(robot: Model, bench: Bench, part: Part) -> tuple[Gait, dict]:
+def _gait_of(robot: Model, bench: Bench, part: Part) -> tuple[Gait, dict[str, Any]]:
     """The gait found with a model, and where it comes from. A base model that lacks much may have none that walks, and
     neither may a robot whose bench shakes it: that ends no campaign, and the baseline stands in."""
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -52,9 +53,9 @@ _LONGEST_S = 20.0  # of an animation
 
 
 def campaign_page(
-    summary: Mapping,
-    diagnosis: Mapping,
-    traces: Sequence[Mapping],
+    summary: Mapping[str, Any],
+    diagnosis: Mapping[str, Any],
+    traces: Sequence[Mapping[str, Any]],
     walks: Mapping[str, Walk],
     labels: Mapping[str, str],
     robot: str,
@@ -87,7 +88,7 @@ def campaign_page(
     )
 
 
-def _faster(gaits: Sequence[Mapping]) -> str:
+def _faster(gaits: Sequence[Mapping[str, Any]]) -> str:
     measured = {gait["gait"]: gait["measured"] for gait in gaits}
     times = measured["completed"] / measured["baseline"] if measured["baseline"] > 0 else float("inf")
     return (
@@ -96,7 +97,7 @@ def _faster(gaits: Sequence[Mapping]) -> str:
     )
 
 
-def _found(summary: Mapping, diagnosis: Mapping) -> Section:
+def _found(summary: Mapping[str, Any], diagnosis: Mapping) -> Section:
     effects, truth = summary["effects"], summary["truth"]
     said = found_sentences(effects) if effects else []
     for experiment in diagnosis.get("separated_by", []):
@@ -110,7 +111,9 @@ def _found(summary: Mapping, diagnosis: Mapping) -> Section:
     return Section("What was found", said, [effects_table(effects, truth)])
 
 
-def _off(summary: Mapping, diagnosis: Mapping, traces: Sequence[Mapping], labels: Mapping[str, str]) -> Section:
+def _off(
+    summary: Mapping[str, Any], diagnosis: Mapping, traces: Sequence[Mapping], labels: Mapping[str, str]
+) -> Section:
     groups = residual_charts(traces)
     return Section(
         "Where the base model is off, and what is left",
@@ -171,7 +174,7 @@ def _ahead(miss_mm: float) -> str:
     return f"{abs(miss_mm):.1f} mm {'ahead' if miss_mm > 0 else 'behind'}"
 
 
-def _gaits(summary: Mapping, walks: Mapping[str, Walk]) -> Section:
+def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> Section:
     robots = len(next(iter(summary["robustness"].values())))
     standing = {name: standing_share(speeds) for name, speeds in summary["robustness"].items()}
     said = [
@@ -210,7 +213,7 @@ _ENDED = {
 }
 
 
-def rounds_section(rounds: Sequence[Mapping]) -> Section:
+def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> Section:
     """How well gaits were predicted that no fit had seen, round by round, and why the last round is the last."""
     rows = [
         [
@@ -236,12 +239,12 @@ def rounds_section(rounds: Sequence[Mapping]) -> Section:
     return Section("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
 
 
-def _round_words(one: Mapping) -> str:
+def _round_words(one: Mapping[str, Any]) -> str:
     added = " and ".join(effect_words(name) for name in one["effects"]) or "nothing"
     return f"the model has {added} added to it, its gait is {gait_words(one['gait'])}"
 
 
-def speed_table(gaits: Sequence[Mapping]) -> Table:
+def speed_table(gaits: Sequence[Mapping[str, Any]]) -> Table:
     """Predicted and measured speeds of the gaits."""
     rows = [
         [
@@ -257,7 +260,7 @@ def speed_table(gaits: Sequence[Mapping]) -> Table:
     return Table(columns, rows, strong_row=len(rows) - 1)
 
 
-def prediction_table(errors: Sequence[Mapping], only: str | None = None) -> Table:
+def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = None) -> Table:
     """Errors before and after in the units of the instruments, against the floor; `only`: "fitted" or "held-out"."""
     rows = []
     for error in errors:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.residual_error import repeat_differences, rms
@@ -13,7 +14,7 @@ from lacuna.system import Channels
 _QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
 
 
-def prediction_errors(found: Diagnosis) -> list[dict]:
+def prediction_errors(found: Diagnosis) -> list[dict[str, Any]]:
     """RMS error of each quantity on the trials that were fitted and on the held-out ones, by the base model and by the
     final one, and the floor: the RMS of what repeats differ by, over the root of 2. Plain types."""
     known, held_out = found.final.problem.trials, found.split.held_out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from lacuna.estimation.fit import evaluate_on
 _POINTS = 400  # of a trace, enough for a small figure
 
 
-def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict]:
+def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any]]:
     """For each held-out condition the channel whose residual shrank most, in standard deviations of the noise, under
     the base model and the final one; thinned. Plain types. labels: what trials are called, by file."""
     held_out = found.split.held_out

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ class Run:
 
     name: str
     folder: Path
-    summary: Mapping
+    summary: Mapping[str, Any]
     models: Mapping[str, Model]
     gaits: Mapping[str, Gait]
 

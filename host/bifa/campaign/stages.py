@@ -13,6 +13,7 @@ import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import bifa
 from bifa.data.layout import RAW, TABLE_FILE
@@ -126,7 +127,7 @@ def run_stages(
         on_end(stage, ran)
 
 
-def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict]) -> None:
+def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict[str, Any]]) -> None:
     """StageError where the stage would replace what none of these records say was made by a stage."""
     made = {name for record in records.values() for name in record.get("artefacts", {})}
     for path in (folder / name for name in stage.makes if name not in made):
@@ -137,7 +138,7 @@ def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict]) 
             )
 
 
-def _asked(folder: Path, stage: Stage) -> dict:
+def _asked(folder: Path, stage: Stage) -> dict[str, Any]:
     missing = [name for name in stage.needs if not (folder / name).exists()]
     if missing:
         raise StageError(f"stage {stage.name} needs {', '.join(missing)} in {folder}: run the earlier stages first")
@@ -148,7 +149,7 @@ def _asked(folder: Path, stage: Stage) -> dict:
     }
 
 
-def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool:
+def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict | None) -> bool:
     if record is None:
         return False
     made = record.get("artefacts", {})
@@ -170,7 +171,7 @@ def _holds(folder: Path, stage: Stage, asked: dict, record: dict | None) -> bool
     return intact and same_inputs
 
 
-def _differing(old: Mapping, new: Mapping) -> list[str]:
+def _differing(old: Mapping[str, Any], new: Mapping) -> list[str]:
     """Settings that both know and that differ, in words; another version may have more or fewer."""
     found = []
     for name in old.keys() & new.keys():
@@ -181,7 +182,7 @@ def _differing(old: Mapping, new: Mapping) -> list[str]:
     return sorted(found)
 
 
-def _run(folder: Path, stage: Stage, asked: dict, records: dict) -> None:
+def _run(folder: Path, stage: Stage, asked: dict[str, Any], records: dict) -> None:
     """Run the stage and move what it makes to its place. On record first: an interruption between the two then leaves
     nothing in the folder that is not on record, and the digests say that it is not yet what they promise."""
     scratch = _unfinished(folder, stage)
@@ -206,7 +207,7 @@ def _unfinished(folder: Path, stage: Stage) -> Path:
     return folder / (f".{stage.name}-unfinished" if stage.resumes else _SCRATCH)
 
 
-def _resumed(scratch: Path, stage: Stage, asked: dict) -> dict:
+def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, Any]:
     """What the scratch to go on with was begun with, empty for a new one. Begun with something else it is deleted, as
     is what is left after all was moved; StageError where it was begun by hand with something else."""
     if not stage.resumes or not scratch.exists():
@@ -226,24 +227,24 @@ def _resumed(scratch: Path, stage: Stage, asked: dict) -> dict:
     return begun
 
 
-def _other_inputs(begun: Mapping, asked: Mapping) -> list[str]:
+def _other_inputs(begun: Mapping[str, Any], asked: Mapping) -> list[str]:
     old = begun.get("inputs", {})
     return [name for name, now in asked["inputs"].items() if name in old and old[name] != now]
 
 
-def _read_asked(path: Path) -> dict:
+def _read_asked(path: Path) -> dict[str, Any]:
     """Empty where an earlier version of bifa, or an interruption at the very beginning, left none."""
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
 
-def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping) -> dict[str, str]:
+def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:
     """What an earlier run made and did not come to move, or not all; empty where there is none."""
     made = begun.get("artefacts", {})
     here = all((scratch / name).exists() or (folder / name).exists() for name in stage.makes)
     return made if here and set(stage.makes) == set(made) else {}
 
 
-def _made(folder: Path, scratch: Path, stage: Stage, asked: dict) -> dict[str, str]:
+def _made(folder: Path, scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, str]:
     """Run the stage, unless an interrupted run has made all there is to make; the digests of that."""
     _write_json(scratch / _ASKED, asked)
     if _missing(scratch, stage):
@@ -276,7 +277,7 @@ def _earlier(target: Path) -> Path:
     return target.with_name(f"{target.name}.earlier-{last + 1}")
 
 
-def _read_records(folder: Path) -> dict:
+def _read_records(folder: Path) -> dict[str, Any]:
     try:
         return dict(json.loads((folder / PROVENANCE).read_text())["stages"])
     except FileNotFoundError:
@@ -287,5 +288,5 @@ def _read_records(folder: Path) -> dict:
         ) from None
 
 
-def _write_json(path: Path, content: dict) -> None:
+def _write_json(path: Path, content: dict[str, Any]) -> None:
     write_text(path, json.dumps(content, indent=1, sort_keys=True) + "\n")

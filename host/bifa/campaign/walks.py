@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from bifa.campaign.stages import Stage
 from bifa.data import Dataset, DatasetWriter, Trial
@@ -69,7 +70,7 @@ def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:
     return measured
 
 
-def predict(model: Model, trial: Trial) -> dict:
+def predict(model: Model, trial: Trial) -> dict[str, Any]:
     """The model's own record of the walk that `trial` holds, on the trial's clock: the same columns."""
     gait = Gait(**trial.gait)
     commands = valves_of(of_gait(gait, trial.time_s[-1] + gait.period_s), trial)

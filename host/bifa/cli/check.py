@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -66,7 +66,7 @@ def warn_of_units(console, dataset) -> None:
 def _print_findings(console, findings) -> None:
     from rich.text import Text
 
-    alike: dict[tuple, list] = {}
+    alike: dict[tuple[Any, ...], list[Any]] = {}
     for finding in findings:
         apart = finding if finding.file is None or finding.line is not None else None
         key = (finding.kind, finding.column, _NUMBER.sub("", finding.text), apart)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -170,7 +170,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
     return opened
 
 
-def print_diagnosis(console, record: dict, labels) -> None:
+def print_diagnosis(console, record: dict[str, Any], labels) -> None:
     """The record of a diagnosis in the words of its page; `labels`: what trials are called, by file."""
     from bifa.report.diagnosis import further, lacking, noise_table, verdict_sentence
     from bifa.report.terminal import print_lines, print_sections, print_table

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -113,7 +113,7 @@ def _explain(console, robot, pool, best, folder: Path) -> None:
 
 
 @contextmanager
-def search_progress(console) -> Iterator[Callable]:
+def search_progress(console) -> Iterator[Callable[..., Any]]:
     """Gives a function: title -> what `optimise` reports progress to."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -89,7 +89,7 @@ def _effect(text: str) -> tuple[str, dict[str, float]]:
     return name, values
 
 
-def _line(now: dict) -> str:
+def _line(now: dict[str, Any]) -> str:
     chambers = " ".join(f"{psi:+.1f}" for psi in now["pressure_psi"])
     port = "open" if now["open"] else "closed"
     place = f"{now['displacement_mm']:.1f} mm"

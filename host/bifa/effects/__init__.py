@@ -7,7 +7,7 @@ import math
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 
 from bifa.effects.effect import EffectError, EffectParameter, PhysicalEffect
 
@@ -17,7 +17,7 @@ _NOT_AN_EFFECT = "effect"
 
 
 @cache
-def modules() -> Mapping[str, object]:
+def modules() -> Mapping[str, ModuleType]:
     """Each effect's module by the effect's name, in alphabetical order."""
     names = sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name != _NOT_AN_EFFECT)
     return MappingProxyType({name: importlib.import_module(f"{__name__}.{name}") for name in names})

@@ -25,7 +25,7 @@ class Axis:
     unit: str
     wraps: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in self.sets:
             low, high, unit = RANGES[name]
             if not low <= self.lower < self.upper <= high:

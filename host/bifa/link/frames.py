@@ -3,6 +3,7 @@
 import binascii
 import struct
 from dataclasses import dataclass
+from typing import Any
 
 from bifa.link.table import COMMANDS, NAME_BYTES, REPORTS, TABLE_HASH, Message
 
@@ -68,7 +69,7 @@ def mask(code: bytes) -> bytes:
     return bytes([least]) + bytes(byte ^ least for byte in code)
 
 
-def encode(message: Message, sequence: int, values: tuple, seed: int) -> bytes:
+def encode(message: Message, sequence: int, values: tuple[Any, ...], seed: int) -> bytes:
     """A message as it goes to the Uno. The doubled first delimiter ends what may hang open at the receiver."""
     body = bytes([message.number, sequence]) + struct.pack(message.layout, *values)
     return b"\0\0" + mask(cobs_encode(body + checks(body, seed))) + b"\0"
@@ -93,7 +94,7 @@ class Report:
 
     name: str
     sequence: int
-    fields: dict
+    fields: dict[str, Any]
 
     def __getitem__(self, field: str):
         return self.fields[field]
@@ -115,7 +116,7 @@ def decode(frame: bytes, session: int) -> Report | None:
     return Report(message.name, body[1], _unpack(message, content[2:]))
 
 
-def _unpack(message: Message, data: bytes) -> dict:
+def _unpack(message: Message, data: bytes) -> dict[str, Any]:
     values = list(struct.unpack(message.layout, data))
     fields = {}
     for name, count in message.fields:

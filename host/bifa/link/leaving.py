@@ -37,11 +37,11 @@ class Robot(Protocol):
 
 _inside: list[Robot] = []
 _earlier_handlers: dict[int, Any] = {}
-_earlier_hook: list[Callable] = []
+_earlier_hook: list[Callable[..., Any]] = []
 _held: list[int] = []
 _again: list[threading.Timer] = []
 _parents: list[int] = []  # who started this program, while their death ends it
-_whole: set = set()  # code of the functions that nothing interrupts
+_whole: set[Any] = set()  # code of the functions that nothing interrupts
 AGAIN_AFTER_S = 0.01
 _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
 _DEATH = getattr(signal, "SIGUSR2", None)  # a signal of its own: it also comes when the parent's thread alone ends
@@ -78,7 +78,7 @@ def leave(robot: Robot) -> None:
             _held.append(signal.SIGINT)
 
 
-def uninterrupted(function: Callable) -> Callable:
+def uninterrupted(function: Callable[..., Any]) -> Callable:
     """Decorates what must come to its end: a signal meanwhile raises KeyboardInterrupt only after it. If that end is an
     error, it is raised from the KeyboardInterrupt, so that nobody tries again."""
 

@@ -9,6 +9,7 @@ import random
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from bifa import __version__
 from bifa.link import frames
@@ -152,7 +153,7 @@ class Session:
             raise RestartedError("the Uno restarted; connect again and repeat")
         self.on_renewed()
 
-    def _greet(self, name: str, values: tuple, deadline: float) -> Hello:
+    def _greet(self, name: str, values: tuple[Any, ...], deadline: float) -> Hello:
         """Send an open message again and again until a hello comes."""
         message = frames.encode(COMMANDS[name], 0, values, frames.OPEN_SEED)
         self._hellos.clear()
@@ -205,7 +206,7 @@ class Session:
         """As call(); with the times between which the Uno carried the command out."""
         return self.call_all([(name, values)], timeout_s)[0]
 
-    def call_all(self, commands: Sequence[tuple[str, tuple]], timeout_s: float = 5.0) -> list[Answer]:
+    def call_all(self, commands: Sequence[tuple[str, tuple[Any, ...]]], timeout_s: float = 5.0) -> list[Answer]:
         """Carry out commands in order, several under way at once.
 
         `timeout_s` is the longest time without any progress. The first command that is refused raises RefusedError;
@@ -223,7 +224,7 @@ class Session:
         self._is_calling = False
         return answers
 
-    def _carry_out(self, queue: deque, timeout_s: float) -> list[Answer]:
+    def _carry_out(self, queue: deque[Any], timeout_s: float) -> list[Answer]:
         answers: list[Answer] = []
         refused: RefusedError | None = None
         progress_s = self.clock.now()
@@ -253,13 +254,13 @@ class Session:
             raise refused
         return answers
 
-    def _request(self, name: str, values: tuple) -> _Request:
+    def _request(self, name: str, values: tuple[Any, ...]) -> _Request:
         sequence = self._sequence
         self._sequence = (sequence + 1) % 256
         data = frames.encode(COMMANDS[name], sequence, values, frames.session_seed(self._key))
         return _Request(name, data, sequence, self.clock.now())
 
-    def _send_due(self, queue: deque) -> None:
+    def _send_due(self, queue: deque[Any]) -> None:
         """Send new commands while the window has room, and the unanswered ones again when they are due."""
         now = self.clock.now()
         if self._outstanding and self._outstanding[0].answer is None:

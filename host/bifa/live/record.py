@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from rich.progress import Progress
 
@@ -93,7 +93,7 @@ def _settings(steps: GaitFile) -> dict[str, object]:
 
 
 def record_telemetry(
-    open_rig: Callable, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
+    open_rig: Callable[..., Any], out: Path, gait_file: Path | None, duration_s: float | None, console: Console
 ) -> None:
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
@@ -121,7 +121,7 @@ def record_telemetry(
 
 
 def _record_until_gone(
-    open_rig: Callable, path: Path, parameters: dict[str, float], end_s: float, console: Console
+    open_rig: Callable[..., Any], path: Path, parameters: dict[str, float], end_s: float, console: Console
 ) -> None:
     uno = None
     try:
@@ -176,7 +176,7 @@ def _telemetry_file(path: Path) -> Iterator[TextIO]:
         ) from None
 
 
-def _row(uno: Uno, sample: Sample, marked: int) -> list:
+def _row(uno: Uno, sample: Sample, marked: int) -> list[Any]:
     time_s = sample.time_us / 1e6
     # An empty field where a chamber is off: neither positive nor vacuum.
     commands = ["" if command != command else f"{command:g}" for command in sample.command]

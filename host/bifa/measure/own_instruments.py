@@ -10,6 +10,7 @@ import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class Turn:
     number: int
     total: int
 
-    def told(self) -> dict:
+    def told(self) -> dict[str, Any]:
         """For `next.toml`: the trial, plain values."""
         planned, trial = self.planned, self.planned.as_trial()
         settings = {"actuator": planned.actuator, "pressure_psi": planned.pressure_psi, "rate_mm_s": planned.rate_mm_s}
@@ -63,8 +64,8 @@ class OwnInstruments:
         self._kept: Path | None = None
         self._step = ""
         self._experiment = ""
-        self._known: dict[Path, tuple] = {}
-        self._seen: dict[Path, tuple[tuple, float]] = {}
+        self._known: dict[Path, tuple[Any, ...]] = {}
+        self._seen: dict[Path, tuple[tuple[Any, ...], float]] = {}
         self._record: tuple[Path, dict[str, np.ndarray]] | None = None
 
     def begin(self, turn: Turn, kept: Path | None = None) -> None:

@@ -57,7 +57,7 @@ class PlannedTrial:
         """What it is called on the terminal: "static loading, large, 4 psi, 2 mm/s, repeat 1"."""
         return f"{self.as_trial().label}, repeat {self.repeat}"
 
-    def as_trial(self, columns: Mapping | None = None, **fields: Any) -> Trial:
+    def as_trial(self, columns: Mapping[str, Any] | None = None, **fields: Any) -> Trial:
         """The trial that this becomes once it is recorded."""
         return Trial(
             file=self.file,

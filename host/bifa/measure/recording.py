@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Recording:
     def __init__(self, rig, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
         self._instruments = instruments_of(rig)
         self._rig, self._uno, self._on_progress = rig, uno, on_progress
-        self.samples: list = []
+        self.samples: list[Any] = []
 
     def __enter__(self) -> Recording:
         self._uno.taken_samples()  # what is left of an earlier recording

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
@@ -102,11 +103,11 @@ class RobotSystem(System):
         self._unfitted = {name: p.value for name, p in self.model.parameters.items() if name not in self.fitted}
         self._shapes = {prefix: _picked(curve.names) for prefix, curve in self.curves.items()}
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: all but what is remembered."""
         return {n: value for n, value in vars(self).items() if n not in _REMEMBERED}
 
-    def __setstate__(self, state: dict) -> None:
+    def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._remember()
 
@@ -280,7 +281,7 @@ class RobotSystem(System):
             elsewhere=_PLACES.get(name, ()),
         )
 
-    def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple:
+    def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple[Any, ...]:
         """All that a plant depends on, hashable."""
         weights = tuple((prefix, shapes(theta)) for prefix, shapes in self._shapes.items())
         extra = tuple(
@@ -289,7 +290,7 @@ class RobotSystem(System):
         )
         return self._own_values(theta), weights, extra
 
-    def _plant_of(self, key: tuple) -> tuple[Plant, tuple[float, float]]:
+    def _plant_of(self, key: tuple[Any, ...]) -> tuple[Plant, tuple[float, float]]:
         """The compiled code's form of a model, and K's contracted zeros of body and small actuator."""
         named, weights, extra = key
         shapes = dict(weights)

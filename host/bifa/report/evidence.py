@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ MODEL_KEYS = (Key(BASE, "before"), Key(COMPLETED, "after"))
 _ROW_PX = 34
 
 
-def errors_chart(error: Mapping) -> Chart:
+def errors_chart(error: Mapping[str, Any]) -> Chart:
     """Before against after, against the floor, on a logarithmic axis.
 
     error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
@@ -63,7 +64,7 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
     )
 
 
-def learnt_chart(curve: Mapping) -> Chart:
+def learnt_chart(curve: Mapping[str, Any]) -> Chart:
     """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
     # Neither of the chambers' colours nor of the models': a row is a direction.
     colours = ("ink", "after", "before", "quiet")
@@ -80,7 +81,7 @@ def learnt_chart(curve: Mapping) -> Chart:
     return Chart([Column([panel])], keys, f"What was learnt: {curve['term']} over {curve['variable']}", across=1)
 
 
-def _bars(side: Mapping) -> dict[str, float]:
+def _bars(side: Mapping[str, Any]) -> dict[str, float]:
     bars = {"all fitted": side["fitted"], "all held out": side["held_out"]}
     if side.get("held_out_conditions") is not None:
         bars["new conditions"] = side["held_out_conditions"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -87,7 +88,7 @@ def _by_actuator(pairs) -> dict[str, list[tuple[Record, Channels]]]:
     return dict(sorted(groups.items()))
 
 
-def _pressures(pairs) -> dict[float, tuple]:
+def _pressures(pairs) -> dict[float, tuple[Any, ...]]:
     """A colour for each commanded pressure."""
     import matplotlib
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from bifa.report.words import channel_words
 _QUANTITIES = ("force", "displacement", "pressure")
 
 
-def residual_charts(traces: Sequence[Mapping]) -> dict[str, Chart]:
+def residual_charts(traces: Sequence[Mapping[str, Any]]) -> dict[str, Chart]:
     """By quantity, the one that the base model misses most first: a small plot a condition, the worst first.
 
     traces: as in residuals.json: label, channel, time_s, before, after, in units of the noise floor.
@@ -23,7 +24,7 @@ def residual_charts(traces: Sequence[Mapping]) -> dict[str, Chart]:
     return {q: _chart(q, groups[q]) for q in sorted(groups, key=lambda q: _size(groups[q][0]), reverse=True)}
 
 
-def _chart(what: str, traces: Sequence[Mapping]) -> Chart:
+def _chart(what: str, traces: Sequence[Mapping[str, Any]]) -> Chart:
     return Chart(
         [_column(trace) for trace in traces],
         MODEL_KEYS,
@@ -33,7 +34,7 @@ def _chart(what: str, traces: Sequence[Mapping]) -> Chart:
     )
 
 
-def _column(trace: Mapping) -> Column:
+def _column(trace: Mapping[str, Any]) -> Column:
     series = [
         Series((key,), *thinned(trace["time_s"], trace[side], 240), colour)
         for key, side, colour in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
@@ -42,11 +43,11 @@ def _column(trace: Mapping) -> Column:
     return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)
 
 
-def _label(trace: Mapping) -> str:
+def _label(trace: Mapping[str, Any]) -> str:
     """What the trial is called; records of earlier versions have only its file."""
     return trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
 
 
-def _size(trace: Mapping) -> float:
+def _size(trace: Mapping[str, Any]) -> float:
     """RMS of what the base model leaves."""
     return float(np.sqrt(np.mean(np.square(trace["before"]))))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bifa.robot.gait import Gait
 
@@ -40,7 +41,9 @@ def outputs(phases_rad: np.ndarray, gait: Gait) -> np.ndarray:
     return (np.mod(phases_rad, 2.0 * math.pi) > 2.0 * math.pi * duties(gait)).astype(np.int64)
 
 
-def phases(gait: Gait, time_s: np.ndarray, initial_rad, coupling_per_s: float = COUPLING_PER_S) -> np.ndarray:
+def phases(
+    gait: Gait, time_s: np.ndarray, initial_rad: ArrayLike, coupling_per_s: float = COUPLING_PER_S
+) -> np.ndarray:
     """(n, 3) phases at increasing times from `initial_rad` at time 0: eq. (9) by fourth-order Runge-Kutta steps."""
     time_s = np.asarray(time_s, dtype=float)
     state = np.array(initial_rad, dtype=float)

@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
@@ -41,7 +42,7 @@ class Gait:
     duty_head: float
     duty_tail: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in GAIT_NAMES:
             object.__setattr__(self, name, _checked(name, getattr(self, name)))
 
@@ -56,9 +57,9 @@ GAIT_NAMES = tuple(item.name for item in fields(Gait))
 BASELINE = Gait(5.7, 270.0, 90.0, 0.5, 0.5, 0.5)
 
 
-def save_gait(path: str | Path, gait: Gait, provenance: dict | None = None) -> None:
+def save_gait(path: str | Path, gait: Gait, provenance: dict[str, Any] | None = None) -> None:
     """Write a gait file; `provenance` is kept in a table of its own for the reader."""
-    document: dict = {"format": FORMAT, **gait.as_dict()}
+    document: dict[str, Any] = {"format": FORMAT, **gait.as_dict()}
     if provenance:
         document["provenance"] = provenance
     write_text(path, tomli_w.dumps(document))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bifa.robot.parameters import ModelParameterError
 
@@ -32,7 +33,7 @@ class LearntCurve:
     upper: float
     values: np.ndarray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         try:
             values = np.array(self.values, dtype=float)
             inside = float(self.lower) < float(self.upper)
@@ -42,9 +43,11 @@ class LearntCurve:
             raise ModelParameterError("a learnt curve needs lower below upper, and rows of two finite values or more")
         object.__setattr__(self, "values", values)
 
-    def at(self, where, row: int = 0):
+    def at(self, where: ArrayLike, row: int = 0) -> np.ndarray:
         """What is added at `where`, a number or an array, by one of the rows."""
-        return np.interp(where, np.linspace(self.lower, self.upper, self.values.shape[1]), self.values[row])
+        return np.interp(
+            np.asarray(where, dtype=float), np.linspace(self.lower, self.upper, self.values.shape[1]), self.values[row]
+        )
 
 
 def check(name: str, curve: LearntCurve) -> None:

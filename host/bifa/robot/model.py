@@ -23,7 +23,7 @@ class Covariance:
     names: tuple[str, ...]
     matrix: np.ndarray = field(repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, dtype=float)
         n = len(self.names)
         if matrix.shape != (n, n) or not np.all(np.isfinite(matrix)) or not np.allclose(matrix, matrix.T):
@@ -50,7 +50,7 @@ class Model:
     covariance: Covariance | None = None
     provenance: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         missing = [name for name in BASE_PARAMETERS if name not in self.parameters]
         unknown = [name for name in self.parameters if name not in BASE_PARAMETERS]
         if missing or unknown:

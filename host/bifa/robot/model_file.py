@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Set
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -13,7 +15,7 @@ from bifa.errors import BifaError
 from bifa.files import write_text
 from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Covariance, Model
-from bifa.robot.parameters import BASE_PARAMETERS
+from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter
 from bifa.robot.stiffness import StiffnessCurve
 from bifa.toml import parse_toml
 
@@ -49,7 +51,7 @@ def load_model(path: str | Path) -> Model:
 
 def save_model(path: str | Path, model: Model) -> None:
     """Write a model file that `load_model` reads back to the same numbers."""
-    document: dict = {"format": FORMAT, "name": model.name}
+    document: dict[str, Any] = {"format": FORMAT, "name": model.name}
     if model.provenance:
         document["provenance"] = model.provenance
     document["parameters"] = {name: _entry(parameter) for name, parameter in model.parameters.items()}
@@ -66,12 +68,12 @@ def save_model(path: str | Path, model: Model) -> None:
     write_text(path, tomli_w.dumps(document))
 
 
-def _entry(parameter) -> dict:
+def _entry(parameter: ModelParameter) -> dict[str, Any]:
     entry = {"value": parameter.value, "unit": parameter.unit, "source": parameter.source}
     return entry if parameter.sd is None else entry | {"sd": parameter.sd}
 
 
-def _curve(curve: StiffnessCurve) -> dict:
+def _curve(curve: StiffnessCurve) -> dict[str, Any]:
     return {"lower_m": curve.lower_m, "upper_m": curve.upper_m, "coefficients": list(curve.coefficients)}
 
 
@@ -88,7 +90,7 @@ def _parse(text: str, where: str) -> Model:
         raise ModelFileError(f"{where}: {error}") from None
 
 
-def _build(document: dict) -> Model:
+def _build(document: dict[str, Any]) -> Model:
     optional = {"provenance", "effects", "learnt", "covariance"}
     _only(document, "the file", {"format", "name", "parameters", "stiffness"}, optional)
     _only(document["stiffness"], "stiffness", {"body", "small"})
@@ -116,7 +118,7 @@ def _build(document: dict) -> Model:
     )
 
 
-def _parameter(name: str, entry: dict):
+def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
     base = BASE_PARAMETERS[name]
     _only(entry, f"parameters.{name}", {"value"}, {"unit", "source", "sd"})
     if entry.get("unit", base.unit) != base.unit:
@@ -127,7 +129,7 @@ def _parameter(name: str, entry: dict):
     return base.with_value(entry["value"], sd=sd, source=str(entry.get("source", base.source)))
 
 
-def _read_curve(name: str, entry: dict) -> StiffnessCurve:
+def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:
     _only(entry, f"stiffness.{name}", {"lower_m", "upper_m", "coefficients"})
     try:
         coefficients = tuple(float(value) for value in entry["coefficients"])
@@ -138,12 +140,12 @@ def _read_curve(name: str, entry: dict) -> StiffnessCurve:
     return curve
 
 
-def _learnt(name: str, entry: dict) -> LearntCurve:
+def _learnt(name: str, entry: dict[str, Any]) -> LearntCurve:
     _only(entry, f"learnt.{name}", {"lower", "upper", "values"})
     return LearntCurve(**entry)
 
 
-def _only(table: dict, where: str, required: set[str], optional: set[str] = frozenset()) -> None:
+def _only(table: dict[str, Any], where: str, required: set[str], optional: Set[str] = frozenset()) -> None:
     if not isinstance(table, dict):
         raise ModelFileError(f"{where} must be a table")
     unknown = sorted(set(table) - required - optional)

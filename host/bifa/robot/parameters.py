@@ -49,7 +49,16 @@ def check_bounds(name: str, value: float, lower: float, upper: float, unit: str 
 _SEARCHED = "found to reproduce the paper's reported speeds and forces"
 
 
-def _row(name, value, unit, lower, upper, plausible, meaning, source):
+def _row(
+    name: str,
+    value: float,
+    unit: str,
+    lower: float,
+    upper: float,
+    plausible: tuple[float, float],
+    meaning: str,
+    source: str,
+) -> tuple[str, ModelParameter]:
     return name, ModelParameter(name, value, unit, lower, upper, plausible, meaning, source)
 
 

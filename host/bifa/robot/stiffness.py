@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bifa.robot.parameters import ModelParameterError
 
@@ -30,7 +31,7 @@ class StiffnessCurve:
     lower_m: float
     upper_m: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         numbers = [*self.coefficients, self.lower_m, self.upper_m]
         if not 2 <= len(self.coefficients) <= DEGREE + 1 or not np.all(np.isfinite(numbers)):
             raise ModelParameterError(f"a stiffness curve has 2 to {DEGREE + 1} finite coefficients")
@@ -39,13 +40,13 @@ class StiffnessCurve:
                 f"a stiffness curve needs lower_m < upper_m, not {self.lower_m:g} and {self.upper_m:g}"
             )
 
-    def force(self, x_m):
+    def force(self, x_m: ArrayLike) -> np.ndarray:
         """K(x) in N, elementwise, with the straight continuation."""
         x = np.asarray(x_m, dtype=float)
         inside = np.clip(x, self.lower_m, self.upper_m)
         return self._polynomial(self._z(inside)) + self.slope(inside) * (x - inside)
 
-    def slope(self, x_m):
+    def slope(self, x_m: ArrayLike) -> np.ndarray:
         """dK/dx in N/m, elementwise."""
         inside = np.clip(np.asarray(x_m, dtype=float), self.lower_m, self.upper_m)
         return self._polynomial.deriv()(self._z(inside)) * 2.0 / (self.upper_m - self.lower_m)
@@ -98,5 +99,5 @@ class StiffnessCurve:
     def _polynomial(self) -> np.polynomial.Polynomial:
         return np.polynomial.Polynomial(self.coefficients)
 
-    def _z(self, x):
+    def _z(self, x: np.ndarray) -> np.ndarray:
         return 2.0 * (x - self.lower_m) / (self.upper_m - self.lower_m) - 1.0

@@ -31,17 +31,20 @@ def digest(*texts: str) -> str:
 
 def folder() -> Path:
     """Where generated code lives: BIFA_CACHE_DIR, else the user's cache, else a temporary one, the user's alone."""
-    chosen = os.environ.get("BIFA_CACHE_DIR")
-    if chosen is None:
-        chosen = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "bifa"
+    named = os.environ.get("BIFA_CACHE_DIR")
+    chosen = Path(named) if named is not None else _users_cache() / "bifa"
     with contextlib.suppress(OSError):
-        Path(chosen).mkdir(parents=True, exist_ok=True)
+        chosen.mkdir(parents=True, exist_ok=True)
         if os.access(chosen, os.W_OK):
-            return Path(chosen)
+            return chosen
     try:
         return _temporary_folder()
     except OSError as error:
         raise OSError("no folder can be written for compiled code; set BIFA_CACHE_DIR") from error
+
+
+def _users_cache() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
 
 @functools.cache
@@ -72,6 +75,8 @@ def load(stem: str, source: str) -> ModuleType:
         _write(path, source)
         forget_old(path.parent)
     spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is no module")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import learnt
 from bifa.simulate.tables import sealed
 
+if TYPE_CHECKING:
+    from bifa.simulate.plant import Plant  # which imports this
+
 _POINTS = 513  # of a row of `Plant.learnt`: fine enough for the lips of a pipe's joints
-_TABLES = {"body_spring": "body_curve", "small_spring": "small_curve"}
 _TERMS = {
     "filling": (learnt.FILLING, learnt.EMPTYING),
     "friction_speed": (learnt.FORWARD, learnt.BACKWARD),
@@ -21,10 +25,12 @@ _TERMS = {
 }
 
 
-def with_curve(plant, name: str, curve: LearntCurve):
+def with_curve(plant: Plant, name: str, curve: LearntCurve) -> Plant:
     """The plant with `curve` added to the term `name` (`bifa.robot.learnt.ROWS`)."""
-    if name in _TABLES:
-        return plant._replace(**{_TABLES[name]: _added(getattr(plant, _TABLES[name]), curve)})
+    if name == "body_spring":
+        return plant._replace(body_curve=_added(plant.body_curve, curve))
+    if name == "small_spring":
+        return plant._replace(small_curve=_added(plant.small_curve, curve))
     filled = plant.learnt.copy() if len(plant.learnt) else np.zeros((learnt.TERMS, 2 + _POINTS))
     at = np.linspace(curve.lower, curve.upper, _POINTS)
     for term, values in zip(_TERMS[name], curve.values, strict=True):

@@ -106,8 +106,8 @@ def _tunnel(model: Model, fast: Gait) -> list[Row]:
     rows = []
     for name, gait, passes in (("fastest", fast, False), ("6 s", SLOW, True)):
         through = passing(model, gait, tunnel(), Supports()).through
-        shown = ("yes" if t else "no" for t in (passes, through))
-        rows.append(Row(f"{name} gait through the tunnel", *shown, through == passes))
+        paper, ours = ("yes" if passed else "no" for passed in (passes, through))
+        rows.append(Row(f"{name} gait through the tunnel", paper, ours, through == passes))
     return rows
 
 

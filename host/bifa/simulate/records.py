@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline
 
 from bifa.robot.gait import Gait
@@ -25,6 +27,7 @@ from bifa.simulate.stepper import (
     X_SMALL_HEAD,
     X_SMALL_TAIL,
     X_TAIL,
+    Rig,
 )
 from bifa.simulate.timeline import NO_COMMANDS, Timeline, of_gait, timeline
 
@@ -71,8 +74,9 @@ def walk(
         if gait is None:
             raise SimulationError("a walk needs a gait or commands")
         commands = of_gait(gait, float(time_s[-1]) + gait.period_s)
-    place = {"inclinations_deg": [inclination_deg], "terrain": terrain}
-    return walks([model], [commands], [time_s], **place, tolerance_m=tolerance_m)[0]
+    return walks(
+        [model], [commands], [time_s], inclinations_deg=[inclination_deg], terrain=terrain, tolerance_m=tolerance_m
+    )[0]
 
 
 def walks(
@@ -96,7 +100,7 @@ def walks(
     return [SimulatedTrial("locomotion", *walked(*one)) for one in zip(flats, commands, rows, times_s, strict=True)]
 
 
-def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
+def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict[str, Any], ...]:
     start = flat.q[layout.BODY + layout.CONTRACTED]
     head_m, tail_m = (_as_stamped(flat, time_s, *rows[at : at + 2]) for at in (0, 2))
     columns = {
@@ -110,7 +114,7 @@ def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tup
     return (columns,)
 
 
-def _walked(flat: Plant, commands: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict, ...]:
+def _walked(flat: Plant, commands: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict[str, Any], ...]:
     (columns,) = _seen(flat, commands, rows[lanes.SEEN_OF_WALK], time_s)
     shown = commands.at(time_s).astype(float)
     shown[shown == OFF] = np.nan
@@ -273,7 +277,16 @@ def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> Simulated
     return SimulatedTrial("anchor_pull", columns, {"wound_N": rows[2], "holding_N": rows[3], "kinetic_N": rows[4]})
 
 
-def _marched(kind, flats, mounted, commands, times_s, tolerance_m, together, **pull) -> list[np.ndarray]:
+def _marched(
+    kind: int,
+    flats: Sequence[Plant],
+    mounted: Sequence[Rig],
+    commands: Sequence[Timeline],
+    times_s: Sequence[np.ndarray],
+    tolerance_m: float,
+    together: bool,
+    **pull: float,
+) -> list[np.ndarray]:
     switches = [_switches(one) for one in commands]
     what = lanes.Experiment(kind, mounted, switches, times_s, _tolerance(tolerance_m), **pull)
     return lanes.march(flats, what, together)
@@ -292,7 +305,7 @@ def _as_stamped(flat: Plant, time_s: np.ndarray, position_m: np.ndarray, velocit
     return path(inside_s) + beyond_m
 
 
-def _times(time_s) -> np.ndarray:
+def _times(time_s: ArrayLike) -> np.ndarray:
     time_s = np.ascontiguousarray(time_s, dtype=float)
     if time_s.ndim != 1 or time_s.size == 0 or not np.all(np.isfinite(time_s)):
         raise SimulationError("sample times must be a list of numbers")
@@ -307,7 +320,7 @@ def _tolerance(value: float) -> float:
     return float(value)
 
 
-def _switches(commands: Timeline):
+def _switches(commands: Timeline) -> lanes.Switches:
     return (
         np.ascontiguousarray(commands.time_s, dtype=float),
         np.ascontiguousarray(commands.chamber, dtype=np.int64),

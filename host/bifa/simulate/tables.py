@@ -90,8 +90,11 @@ def _equilibria(rows: np.ndarray) -> tuple[float, float, float]:
     if len(rising) < 2 or not between:
         raise ModelParameterError(NOT_BISTABLE)
     lower, _, per_width, _ = rows[0]
-    chosen = (rising[0], between[len(between) // 2], rising[-1])
-    return tuple(float(lower + (i + _zero(rows[i + 1].tolist())) / per_width) for i in chosen)
+    contracted, unstable, extended = (
+        float(lower + (i + _zero(rows[i + 1].tolist())) / per_width)
+        for i in (rising[0], between[len(between) // 2], rising[-1])
+    )
+    return contracted, unstable, extended
 
 
 def _zero(piece: list[float]) -> float:

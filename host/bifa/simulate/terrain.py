@@ -31,7 +31,7 @@ class Supports:
     lip_m: float = 0.02
     buckled_m: float = 0.01
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 0.0 <= self.buckling_N <= 1000.0:
             raise SimulationError(f"the supports' buckling force {self.buckling_N:g} is outside its range 0 to 1000 N")
 

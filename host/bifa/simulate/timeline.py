@@ -6,10 +6,12 @@ A timeline is a table of switches in order of time; a chamber that no switch has
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bifa.errors import BifaError
 from bifa.robot import cpg
@@ -63,7 +65,7 @@ def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
     return Timeline(times, chambers, states.astype(np.int64))
 
 
-def timeline(switches) -> Timeline:
+def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
     """From rows (time_s, chamber, command) in any order; of equal times the later row wins."""
     rows = np.array(list(switches), dtype=float).reshape(-1, 3)
     if not np.all(np.isfinite(rows)):
@@ -81,7 +83,9 @@ def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Time
     return gait_switches(row, np.array([duration_s], dtype=float), float(first_phase_rad))[0]
 
 
-def of_phases(gait: Gait, duration_s: float, initial_rad, coupling_per_s: float = cpg.COUPLING_PER_S) -> Timeline:
+def of_phases(
+    gait: Gait, duration_s: float, initial_rad: ArrayLike, coupling_per_s: float = cpg.COUPLING_PER_S
+) -> Timeline:
     """Switching of eq. (9) integrated from three initial phases, at the robot's 1 kHz."""
     time = np.arange(0.0, duration_s + 0.5 * _RESOLUTION_S, _RESOLUTION_S)
     phases = cpg.phases(gait, time, initial_rad, coupling_per_s)
@@ -174,7 +178,7 @@ def gait_switches(gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: fl
 
 
 @kernel
-def delayed(plant, times, chamber, command):
+def delayed(plant: Any, times: Any, chamber: Any, command: Any) -> Any:
     """When the valves switch, and the order in which they do. An edge that a later command overtakes ends with it."""
     late = times.copy()
     if plant.active & chains.DELAY:

@@ -86,7 +86,9 @@ def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment)
     return found
 
 
-def load(plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray):
+def load(
+    plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
+) -> list[np.ndarray]:
     """Rows (2, samples) of each robot's static loading: force in N, reading in psi."""
     found = _kernels_for(plants)
     if found is None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -65,7 +66,7 @@ class Experiment:
 class Kernel:
     """A compiled kernel of so many `lanes`. Its calls release the GIL."""
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         library = ctypes.CDLL(str(path))
         self.lanes = library.lanes_of_kernel()
         library.refused_effects.restype, library.refusals.restype = ctypes.c_int64, ctypes.c_char_p
@@ -91,7 +92,9 @@ class Kernel:
         del kept
         return rows
 
-    def load(self, plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray):
+    def load(
+        self, plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
+    ) -> list[np.ndarray]:
         """Rows (2, samples) of a static loading for each robot, force in N and reading in psi."""
         jobs, setting, kept = _jobs(plants, rigs)
         jobs["path"], jobs["sample_s"], jobs["samples"] = _addresses(paths_m), _address(sample_s), sample_s.size
@@ -101,12 +104,12 @@ class Kernel:
         return rows
 
     @staticmethod
-    def _call(function, setting, jobs) -> None:
+    def _call(function: Callable[..., int], setting: _Setting, jobs: np.ndarray) -> None:
         if function(ctypes.addressof(setting), _address(jobs), len(jobs)):
             raise MemoryError("no memory for a simulation")
 
 
-def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]):
+def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]) -> tuple[np.ndarray, _Setting, object]:
     """The jobs' robots and mountings, the setting, and what must live as long as they do."""
     jobs = np.zeros(len(plants), _JOB)
     learnt = [plant.learnt for plant in plants]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from bifa.simulate import actuator, layout, learnt, locomotion, march, stand, stepper, together
 from bifa.simulate.hooks import chains
@@ -36,7 +38,7 @@ _SHAPES = Shapes(
     },
     tables={"Learnt": "learnt_entry({}, {}, {})", "Terrain": "terrain_entry({}, {}, {})"},
 )
-_INTRINSICS = {
+_INTRINSICS: dict[Any, Intrinsic] = {
     actuator.reach: Intrinsic("reach_of({0})", ("F", "F", "F")),
     actuator.cubic: Intrinsic("row_of({0}, {1})", ("F", "F", "F", "F")),
     together.worst: Intrinsic("worst({m}, {0}, {1})", "F"),
@@ -65,7 +67,7 @@ _CALLED = (
 _SHARED = {f.py_func for f in (stepper.step, stepper._small, stepper._limit, stepper._first_to_start, march.pressures)}
 
 
-def _apart(function) -> bool:
+def _apart(function: Callable[..., Any]) -> bool:
     rare = function.__module__.startswith("bifa.effects") or function.__module__ == learnt.__name__
     return rare or function in _SHARED or function.__name__ == "_squeezed"
 
@@ -75,7 +77,7 @@ def source() -> str:
     """All of it, for any number of LANES. An effect that has no form in lanes is left out, and said to be."""
     refused: dict[str, str] = {}
 
-    def without(function, refusal: UntranslatableError) -> Intrinsic | None:
+    def without(function: Callable[..., Any], refusal: UntranslatableError) -> Intrinsic | None:
         if not function.__module__.startswith("bifa.effects."):
             return None
         refused[function.__module__.rpartition(".")[2]] = str(refusal)
@@ -83,7 +85,7 @@ def source() -> str:
             Intrinsic("nothing_twice()", ("F", "F")) if function.__name__ == "spring" else Intrinsic("nothing()", "F")
         )
 
-    intrinsics = {getattr(f, "py_func", f): how for f, how in _INTRINSICS.items()}
+    intrinsics: dict[Callable[..., Any], Intrinsic] = {getattr(f, "py_func", f): how for f, how in _INTRINSICS.items()}
     translator = Translator(_SHAPES, intrinsics, _apart, without)
     names = [
         f"#define {name} {translator.function(function, kinds, whole).name}" for name, function, kinds, whole in _CALLED

@@ -19,8 +19,9 @@ import ast
 import inspect
 import math
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,10 @@ _MATH = {
 }  # fmt: skip
 
 
+Kind = Any  # one of the kinds above; a tuple of them where a function returns several values
+_Coded = tuple[str, Kind]  # an expression in C, and its kind
+
+
 class UntranslatableError(Exception):
     """A function does what has no form in lanes; the text says where and what."""
 
@@ -51,7 +56,7 @@ class Shapes:
     """
 
     fields: Mapping[str, Mapping[str, str]]
-    sizes: Mapping[tuple[str, str], str]
+    sizes: Mapping[tuple[str, int], str]
     tables: Mapping[str, str]
 
 
@@ -60,7 +65,7 @@ class Intrinsic:
     """C of a function that is not translated: `{m}` the mask, `{0}` ... the arguments (numbers as `F`)."""
 
     code: str
-    returns: str | tuple[str, ...]
+    returns: Kind
 
 
 @dataclass
@@ -68,12 +73,12 @@ class Translated:
     """One function for one choice of the arguments' kinds."""
 
     name: str
-    returns: str | tuple[str, ...] | None
+    returns: Kind
     text: str = ""
     arguments: list[str] = field(default_factory=list)
 
 
-def c_type(kind: str) -> str:
+def c_type(kind: Kind) -> str:
     if kind in C_TYPES:
         return C_TYPES[kind]
     if kind.startswith("F["):
@@ -91,17 +96,17 @@ class Translator:
     def __init__(
         self,
         shapes: Shapes,
-        intrinsics: Mapping[Callable, Intrinsic],
-        apart: Callable[[Callable], bool] = lambda function: False,
-        instead: Callable[[Callable, UntranslatableError], Intrinsic | None] = lambda function, refusal: None,
+        intrinsics: Mapping[Callable[..., Any], Intrinsic],
+        apart: Callable[[Callable[..., Any]], bool] = lambda function: False,
+        instead: Callable[[Callable[..., Any], UntranslatableError], Intrinsic | None] = lambda function, refusal: None,
     ):
         self.shapes, self.intrinsics, self.apart, self.instead = shapes, intrinsics, apart, instead
         self.texts: list[str] = []
-        self._done: dict[tuple, Translated] = {}
+        self._done: dict[tuple[Any, ...], Translated] = {}
         self._arrays: dict[str, str] = {}
         self._count = 0
 
-    def function(self, function: Callable, kinds: tuple[str, ...], whole: bool = True) -> Translated:
+    def function(self, function: Callable[..., Any], kinds: tuple[str, ...], whole: bool = True) -> Translated:
         """The translation for arguments of these kinds. `whole`: of all lanes; else the mask is its first argument."""
         function = getattr(function, "py_func", function)
         key = (function, kinds, whole)
@@ -139,7 +144,9 @@ class _Loop:
 class _Body:
     """One function on its way into C."""
 
-    def __init__(self, translator: Translator, function: Callable, kinds, whole: bool, name: str):
+    def __init__(
+        self, translator: Translator, function: Callable[..., Any], kinds: tuple[Kind, ...], whole: bool, name: str
+    ):
         self.translator, self.shapes, self.whole, self.name = translator, translator.shapes, whole, name
         self.function = function
         try:
@@ -151,8 +158,8 @@ class _Body:
         if len(self.parameters) != len(kinds):
             raise self._no(self.tree, f"takes {len(self.parameters)} arguments, not {len(kinds)}")
         self.given = dict(zip(self.parameters, kinds, strict=True))
-        self.kinds: dict[str, str] = dict(self.given)
-        self.returned: list[str] | None = None
+        self.kinds: dict[str, Kind] = dict(self.given)
+        self.returned: list[Kind] | None = None
         self.single = True
 
     def _no(self, node: ast.AST, what: str) -> UntranslatableError:
@@ -175,7 +182,7 @@ class _Body:
                 return self._finished(inline)
 
     def _finished(self, inline: str) -> Translated:
-        returns = None if self.returned is None else (self.returned[0] if self.single else tuple(self.returned))
+        returns: Kind = None if self.returned is None else (self.returned[0] if self.single else tuple(self.returned))
         many = isinstance(returns, tuple)
         result = "void" if returns is None else (f"{self.name}_result" if many else c_type(returns))
         arguments = [] if self.whole else ["const Mask m_in"]
@@ -213,7 +220,7 @@ class _Body:
         self.count += 1
         return f"{stem}{self.count}_"
 
-    def _block(self, statements) -> None:
+    def _block(self, statements: Sequence[ast.stmt]) -> None:
         for statement in statements:
             method = getattr(self, f"_do_{type(statement).__name__.lower()}", None)
             if method is None:
@@ -226,10 +233,12 @@ class _Body:
         code, _ = self._value(node.value)
         self._emit(f"{code};")
 
-    def _do_pass(self, node) -> None:
+    def _do_pass(self, node: ast.Pass) -> None:
         pass
 
     def _do_annassign(self, node: ast.AnnAssign) -> None:
+        if node.value is None:
+            raise self._no(node, "declares a name without a value")
         self._store(node.target, *self._value(node.value))
 
     def _do_assign(self, node: ast.Assign) -> None:
@@ -255,7 +264,7 @@ class _Body:
         for one, (code, kind) in zip(target.elts, held, strict=True):
             self._store(one, code, kind)
 
-    def _tuple(self, node: ast.expr) -> list[tuple[str, str]]:
+    def _tuple(self, node: ast.expr) -> list[_Coded]:
         if isinstance(node, ast.Tuple):
             return [self._value(one) for one in node.elts]
         if isinstance(node, ast.IfExp):
@@ -274,7 +283,7 @@ class _Body:
         ast.copy_location(both, node)
         self._store(node.target, *self._value(both))
 
-    def _store(self, target: ast.expr, code: str, kind) -> None:
+    def _store(self, target: ast.expr, code: str, kind: Kind) -> None:
         match target:
             case ast.Name(id=name):
                 self._store_name(target, name, code, kind)
@@ -295,7 +304,7 @@ class _Body:
             return f"{place} = {code}"
         return f"{place} = {select}({self.region.mask}, {code}, {place})"
 
-    def _store_name(self, node: ast.AST, name: str, code: str, kind) -> None:
+    def _store_name(self, node: ast.AST, name: str, code: str, kind: Kind) -> None:
         if isinstance(kind, tuple):
             raise self._no(node, f"gives several values to {name}")
         if name == "_":
@@ -322,8 +331,7 @@ class _Body:
         if node.value is not None:
             self._remember_result(node, parts)
         plain = self.region.mask == "m" and self.region.loop is None
-        for i, (code, kind) in enumerate(parts):
-            joined = self.returned[i]
+        for i, ((code, kind), joined) in enumerate(zip(parts, self.returned or (), strict=False)):
             code = _as(code, kind, joined)
             if joined in ("F", "B") and not (plain and not self.assigned_result):
                 select = "sel" if joined == "F" else "sel_mask"
@@ -337,7 +345,7 @@ class _Body:
             self._emit(f"gone = or_(gone, {self.region.mask});")
             self.jumped = True
 
-    def _returned_parts(self, node: ast.expr) -> list[tuple[str, str]]:
+    def _returned_parts(self, node: ast.expr) -> list[_Coded]:
         if isinstance(node, ast.Tuple):
             self.single = False
             return [self._value(one) for one in node.elts]
@@ -352,7 +360,7 @@ class _Body:
             return [(f"{name}.r{i}", one) for i, one in enumerate(kind)]
         return [(code, kind)]
 
-    def _remember_result(self, node: ast.AST, parts) -> None:
+    def _remember_result(self, node: ast.AST, parts: list[_Coded]) -> None:
         differs = self.region.mask != "m" or self.jumped or self.region.loop is not None
         kinds = [_varying(kind) if differs and kind in _SAME_IN_ALL else kind for _, kind in parts]
         if self.returned is None:
@@ -396,7 +404,7 @@ class _Body:
             self._take_out(outer)
         self.jumped = jumped or self.jumped
 
-    def _uniform(self, statements) -> None:
+    def _uniform(self, statements: Sequence[ast.stmt]) -> None:
         """A branch that all lanes of the region take, or none."""
         outer = self.region
         self.region = _Region(outer.mask, outer.full, outer.loop)
@@ -462,13 +470,13 @@ class _Body:
         else:
             self.jumped = jumped
 
-    def _do_break(self, node) -> None:
+    def _do_break(self, node: ast.Break) -> None:
         self._leave(node, "left")
 
-    def _do_continue(self, node) -> None:
+    def _do_continue(self, node: ast.Continue) -> None:
         self._leave(node, "skipped")
 
-    def _leave(self, node, which: str) -> None:
+    def _leave(self, node: ast.stmt, which: str) -> None:
         if self.region.loop is None:
             raise self._no(node, "leaves no loop")
         lanes = getattr(self.region.loop, which)
@@ -477,16 +485,16 @@ class _Body:
 
     # -- expressions -----------------------------------------------------------------------------------------
 
-    def _value(self, node: ast.expr) -> tuple[str, str]:
+    def _value(self, node: ast.expr) -> _Coded:
         method = getattr(self, f"_of_{type(node).__name__.lower()}", None)
         if method is None:
             raise self._no(node, f"has a {type(node).__name__}, which is not understood")
         return method(node)
 
-    def _of_constant(self, node: ast.Constant) -> tuple[str, str]:
+    def _of_constant(self, node: ast.Constant) -> _Coded:
         return self._constant(node, node.value)
 
-    def _constant(self, node, value) -> tuple[str, str]:
+    def _constant(self, node: ast.expr, value: object) -> _Coded:
         if isinstance(value, (bool, np.bool_)):
             return str(int(value)), "b"
         if isinstance(value, (int, np.integer)):
@@ -497,12 +505,12 @@ class _Body:
             return f"({float(value)!r})" if value < 0 else repr(float(value)), "f"
         raise self._no(node, f"uses {value!r}, which is no number")
 
-    def _of_name(self, node: ast.Name) -> tuple[str, str]:
+    def _of_name(self, node: ast.Name) -> _Coded:
         if node.id in self.kinds:
             return f"x_{node.id}", self.kinds[node.id]
         return self._constant(node, self._object(node))
 
-    def _object(self, node: ast.expr):
+    def _object(self, node: ast.expr) -> Any:
         """A constant, a function or a module that the source names."""
         if isinstance(node, ast.Attribute):
             return getattr(self._object(node.value), node.attr)
@@ -513,8 +521,8 @@ class _Body:
                     return scope[node.id]
         raise self._no(node, f"uses {ast.unparse(node)}, which is nowhere")
 
-    def _of_attribute(self, node: ast.Attribute) -> tuple[str, str]:
-        root = node
+    def _of_attribute(self, node: ast.Attribute) -> _Coded:
+        root: ast.expr = node
         while isinstance(root, ast.Attribute):
             root = root.value
         if isinstance(root, ast.Name) and root.id not in self.kinds:
@@ -531,14 +539,14 @@ class _Body:
         direct = found in _SAME_IN_ALL or found in ("F",) or found.startswith("F[")
         return f"{code}->{node.attr}" if direct else f"&{code}->{node.attr}", found
 
-    def _size(self, node, code: str, kind: str) -> str:
+    def _size(self, node: ast.expr, code: str, kind: Kind) -> str:
         if kind == "f[]":
             return f"{code}.size"
         if kind.startswith("F[") and kind != "F[]":
             return kind[2:-1]
         raise self._no(node, f"asks for the size of {kind}")
 
-    def _of_subscript(self, node: ast.Subscript) -> tuple[str, str]:
+    def _of_subscript(self, node: ast.Subscript) -> _Coded:
         match node.value:
             case ast.Attribute(value=table, attr="shape"):
                 code, kind = self._value(table)
@@ -557,14 +565,14 @@ class _Body:
             at = ast.literal_eval(node.slice)
             return f"{code}.r{at}", kind[at]
         if kind in self.shapes.tables:
-            row, column = (_as(*self._value(part), "F") for part in node.slice.elts)
+            row, column = (_as(*self._value(part), "F") for part in self._pair(node.slice))
             return self.shapes.tables[kind].format(f"({code})", row, column), "F"
         return self._place(node), "f" if kind == "f[]" else "F"
 
     def _place(self, node: ast.Subscript) -> str:
         code, kind = self._value(node.value)
         if kind == "Rows":
-            row, column = (self._index(part) for part in node.slice.elts)
+            row, column = (self._index(part) for part in self._pair(node.slice))
             return f"({code})->at[({row}) * ({code})->columns + ({column})]"
         at = self._index(node.slice)
         if kind == "f[]":
@@ -573,13 +581,18 @@ class _Body:
             raise self._no(node, f"looks into a {kind}")
         return f"({code})[{at}]"
 
+    def _pair(self, node: ast.expr) -> list[ast.expr]:
+        if not isinstance(node, ast.Tuple) or len(node.elts) != 2:
+            raise self._no(node, "looks into a table not by row and column")
+        return node.elts
+
     def _index(self, node: ast.expr) -> str:
         at, kind = self._value(node)
         if kind not in ("i", "b"):
             raise self._no(node, "looks up a place that differs from lane to lane")
         return at
 
-    def _of_unaryop(self, node: ast.UnaryOp) -> tuple[str, str]:
+    def _of_unaryop(self, node: ast.UnaryOp) -> _Coded:
         if isinstance(node.op, ast.Not):
             code, kind = self._truth(node.operand)
             return (f"(!({code}))", "b") if kind == "b" else (f"not_({code})", "B")
@@ -588,13 +601,13 @@ class _Body:
             raise self._no(node, "has an operator that is not understood")
         return f"(-({_as(code, kind, 'f' if kind == 'b' else kind)}))", kind
 
-    def _of_binop(self, node: ast.BinOp) -> tuple[str, str]:
+    def _of_binop(self, node: ast.BinOp) -> _Coded:
         (a, ka), (b, kb) = self._value(node.left), self._value(node.right)
         if isinstance(node.op, ast.BitAnd) and ka == "Active" and kb == "i":
             return f"having({a}, {b})", "B"
         if isinstance(node.op, (ast.BitAnd, ast.BitOr, ast.LShift)) and ka == kb == "i":
-            sign = {ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<"}[type(node.op)]
-            return f"({a} {sign} {b})", "i"
+            bits = {ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<"}[type(node.op)]
+            return f"({a} {bits} {b})", "i"
         for kind in (ka, kb):
             if kind not in ("f", "i", "b", "F", "B"):
                 raise self._no(node, f"calculates with a {kind}")
@@ -613,7 +626,7 @@ class _Body:
         kind = "f" if "f" in (ka, kb) else "i"
         return f"({a} {sign} {b})", kind
 
-    def _of_compare(self, node: ast.Compare) -> tuple[str, str]:
+    def _of_compare(self, node: ast.Compare) -> _Coded:
         parts = [self._value(one) for one in (node.left, *node.comparators)]
         found = []
         for operation, (a, ka), (b, kb) in zip(node.ops, parts, parts[1:], strict=False):
@@ -626,7 +639,7 @@ class _Body:
                 found.append((f"{name}({_as(a, ka, 'F')}, {_as(b, kb, 'F')})", "B"))
         return self._all_of(found, "and_", "&&")
 
-    def _all_of(self, parts, function: str, sign: str) -> tuple[str, str]:
+    def _all_of(self, parts: list[_Coded], function: str, sign: str) -> _Coded:
         code, kind = parts[0]
         for other, other_kind in parts[1:]:
             if kind == other_kind == "b":
@@ -635,11 +648,11 @@ class _Body:
                 code, kind = f"{function}({_as(code, kind, 'B')}, {_as(other, other_kind, 'B')})", "B"
         return code, kind
 
-    def _of_boolop(self, node: ast.BoolOp) -> tuple[str, str]:
+    def _of_boolop(self, node: ast.BoolOp) -> _Coded:
         parts = [self._truth(one) for one in node.values]
         return self._all_of(parts, *(("and_", "&&") if isinstance(node.op, ast.And) else ("or_", "||")))
 
-    def _truth(self, node: ast.expr) -> tuple[str, str]:
+    def _truth(self, node: ast.expr) -> _Coded:
         code, kind = self._value(node)
         if kind in ("b", "B"):
             return code, kind
@@ -651,13 +664,13 @@ class _Body:
             return f"having({code}, ~0L)", "B"
         raise self._no(node, f"asks whether a {kind} holds")
 
-    def _of_ifexp(self, node: ast.IfExp) -> tuple[str, str]:
+    def _of_ifexp(self, node: ast.IfExp) -> _Coded:
         truth, kind = self._truth(node.test)
         if truth in ("0", "1"):
             return self._value(node.body if truth == "1" else node.orelse)
         return self._chosen(truth, kind, self._value(node.body), self._value(node.orelse))
 
-    def _chosen(self, truth: str, kind: str, yes, no) -> tuple[str, str]:
+    def _chosen(self, truth: str, kind: str, yes: _Coded, no: _Coded) -> _Coded:
         (a, ka), (b, kb) = yes, no
         joined = _joined(ka, kb)
         if joined is None:
@@ -671,7 +684,7 @@ class _Body:
         select = "sel" if joined == "F" else "sel_mask"
         return f"{select}({_as(truth, kind, 'B')}, {_as(a, ka, joined)}, {_as(b, kb, joined)})", joined
 
-    def _of_call(self, node: ast.Call) -> tuple[str, str]:
+    def _of_call(self, node: ast.Call) -> _Coded:
         if node.keywords:
             raise self._no(node, "names arguments in a call")
         function = self._object(node.func)
@@ -728,7 +741,7 @@ def _varying(kind: str) -> str:
     return {"f": "F", "i": "F", "b": "B"}.get(kind, kind)
 
 
-def _joined(a: str | None, b: str) -> str | None:
+def _joined(a: Kind | None, b: Kind) -> Kind | None:
     """The kind that holds both, None if there is none."""
     if a is None or a == b:
         return b
