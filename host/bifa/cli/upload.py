@@ -52,14 +52,14 @@ def upload(
     console = Console()
     with writable(), open_rig(port) as rig:
         try:
-            with console.status("waiting for the Uno"), Uno(rig.transport, rig.clock) as uno:
+            with console.status("waiting for the Uno") as shown, Uno(rig.transport, rig.clock) as uno:
                 hello = uno.connect()
                 uno.upload(parameters, save=save)
                 done = ", ".join(["read back equal", *(["saved as " + save] if save else [])])
                 console.print(f"{gait.name} is on the Uno (firmware {hello.firmware}): {done}")
                 if run:
                     console.print("walking; Ctrl-C ends" if seconds is None else f"walking for {seconds:g} s")
-                    walk(uno, rig.clock, seconds)
+                    walk(uno, rig.clock, seconds, shown.update)
         except KeyboardInterrupt:
             if not run:
                 raise

@@ -5,25 +5,45 @@ import math
 import os
 import select
 import sys
+from collections.abc import Callable
 
 from bifa.link import Clock, LinkError, Uno
+from bifa.link.table import CHAMBERS
 from bifa.live.pace import Pace
 
 LOOK_EVERY_S = 0.5
 
 
-def walk(uno: Uno, clock: Clock, duration_s: float | None) -> None:
-    """Walk for `duration_s`, or until an exception. Raises LinkError if the Uno stops by itself, with its reason, and
-    BrokenPipeError once nobody can read any more what is printed."""
+def walk(
+    uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable[[str], None] = lambda said: None
+) -> None:
+    """Walk for `duration_s`, or until an exception; `on_progress` is told time, cycle and pressures.
+
+    Raises LinkError if the Uno stops by itself, with its reason, and BrokenPipeError once nobody can read any more what
+    is printed.
+    """
+    period_s = uno.parameters()["period_s"]
     uno.run()
-    pace, end_s = Pace(clock), math.inf if duration_s is None else clock.now() + duration_s
+    began_s = clock.now()
+    pace, end_s = Pace(clock), math.inf if duration_s is None else began_s + duration_s
     while (left_s := end_s - clock.now()) > 0:
         uno.samples(min(left_s, LOOK_EVERY_S))
         _look_for_a_reader()
         status = uno.status()
         if status.state != "running":
-            raise LinkError(f"the robot walks no more: it is {status.state} (fault: {status.fault}); see bifa console")
+            raise LinkError(
+                f"the robot stopped walking: it is {status.state} (fault: {status.fault}); see bifa console"
+            )
+        on_progress(_in_words(clock.now() - began_s, duration_s, period_s, status.pressure_psi))
         pace.wait()
+
+
+def _in_words(
+    walked_s: float, duration_s: float | None, period_s: float, pressure_psi: tuple[float, float, float]
+) -> str:
+    until = "" if duration_s is None else f" of {duration_s:g}"
+    pressures = "  ".join(f"{name} {psi:+.1f}" for name, psi in zip(CHAMBERS, pressure_psi, strict=True))
+    return f"walking: {walked_s:.0f}{until} s, cycle {int(walked_s / period_s) + 1}, psi: {pressures}"
 
 
 def _look_for_a_reader() -> None:
