@@ -11,11 +11,12 @@ bin := .venv/bin
 stamps := build/stamps
 python := .venv/installed
 ARGS ?=
+quick = $(filter --quick,$(ARGS))
 
 .PHONY: help
 help:
 	@echo "make demo     the whole loop on a virtual robot with an undeclared effect, and its report"
-	echo "make test     every test: native, sanitized, in the simulated ATmega328P, Python"
+	echo "make test     every test: native, sanitized, in the simulated ATmega328P, Python (ARGS=--quick: two minutes of them)"
 	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
 	echo "make soak     the long proofs and fuzzers"
 	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
@@ -32,10 +33,10 @@ demo: setup
 
 test: setup
 	@failed=
-	$(MAKE) $(stamps)/browser || echo "The tests of the pages are skipped: they need a browser"
-	$(bin)/python tools/unity_suites.py native || failed="$$failed native"
-	$(bin)/python tools/unity_suites.py sanitized || failed="$$failed sanitized"
-	$(bin)/python tools/unity_suites.py simavr || failed="$$failed simavr"
+	test -n "$(quick)" || $(MAKE) $(stamps)/browser || echo "The tests of the pages are skipped: they need a browser"
+	for environment in native $(if $(quick),,sanitized simavr); do
+	    $(bin)/python tools/unity_suites.py $$environment || failed="$$failed $$environment"
+	done
 	(cd host && ../$(bin)/pytest -n 2 $(ARGS)) || failed="$$failed pytest"
 	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
 

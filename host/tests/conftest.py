@@ -36,9 +36,17 @@ def figure(record_property) -> Callable[[str], None]:
     return partial(record_property, "figure")
 
 
-def pytest_collection_modifyitems(items) -> None:
+def pytest_addoption(parser) -> None:
+    parser.addoption("--quick", action="store_true", help="leave out what is slow or runs in real time")
+
+
+def pytest_collection_modifyitems(config, items) -> None:
     """Tests in real time get a second chance. In another order where BIFA_TEST_ORDER is set, to a seed: the files
-    shuffled, and the tests in each."""
+    shuffled, and the tests in each. With --quick the slow ones and those in real time are left out."""
+    if config.getoption("quick"):
+        left_out = [item for item in items if any(map(item.get_closest_marker, ("slow", "real_time")))]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
     for item in items:
         if item.get_closest_marker("real_time"):
             item.add_marker(pytest.mark.flaky(reruns=1))

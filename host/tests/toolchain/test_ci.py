@@ -1,14 +1,16 @@
 """`.ci/run`: checks, tests as elsewhere and tests are all run, whatever the first says; each can fail it."""
 
+import shutil
 import subprocess
 
+import portability
 import pytest
 
 
 @pytest.mark.parametrize("failing", [(), ("lint",), ("portability",), ("test",), ("lint", "test")])
 def test_each_is_run_and_each_can_fail_it(project, tmp_path, failing):
     fake = tmp_path / "make"
-    fake.write_text(f'#!/bin/sh\necho "ran $1"\ncase " {" ".join(failing)} " in *" $1 "*) exit 2;; esac\n')
+    fake.write_text(f'#!/bin/sh\necho "ran $*"\ncase " {" ".join(failing)} " in *" $1 "*) exit 2;; esac\n')
     fake.chmod(0o755)
     done = subprocess.run(
         [project / ".ci" / "run"],
@@ -18,4 +20,20 @@ def test_each_is_run_and_each_can_fail_it(project, tmp_path, failing):
         check=False,
     )
     assert (done.returncode == 0) == (not failing)
-    assert done.stdout == "ran lint\nran portability\nran test\n"
+    assert done.stdout == "ran lint\nran portability ARGS=--another-blas\nran test ARGS=\n"
+
+
+@pytest.mark.parametrize("ran", [True, False])
+def test_the_estimation_is_tested_once(project, tmp_path, ran):
+    """Not again on this machine where it has been tested as on another; here where it could not be."""
+    shutil.copytree(project / ".ci", tmp_path / ".ci")
+    fake = tmp_path / "make"
+    touch = "mkdir -p build/portability; touch build/portability/ran" if ran else "true"
+    fake.write_text(f'#!/bin/sh\ncase $1 in portability) {touch};; test) echo "$2";; esac\n')
+    fake.chmod(0o755)
+    (tmp_path / "build" / "portability").mkdir(parents=True)
+    (tmp_path / "build" / "portability" / "ran").touch()  # of an earlier run, which says nothing
+    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin"}
+    done = subprocess.run([tmp_path / ".ci" / "run"], env=environment, capture_output=True, text=True, check=True)
+    left_out = [f"--ignore=tests/{folder}" for folder in portability.ESTIMATION] if ran else []
+    assert done.stdout == f"ARGS={' '.join(left_out)}\n"
