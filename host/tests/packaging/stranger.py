@@ -64,4 +64,4 @@ def lowest(wheels: list[Path], *names: str) -> list[str]:
 def _lower_bounds(wheel: Path) -> list[tuple[str, str]]:
     with zipfile.ZipFile(wheel) as archive:
         (metadata,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
-        return re.findall(r"^Requires-Dist: ([\w-]+)>=([\d.]+)", archive.read(metadata).decode(), re.MULTILINE)
+        return re.findall(r"^Requires-Dist: ([\w-]+)>=([\d.]+)(?:;.*)?$", archive.read(metadata).decode(), re.MULTILINE)

@@ -28,6 +28,11 @@ for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
     if not module.name.endswith("__main__"):
         importlib.import_module(module.name)
 """
+AS_TABLES = """
+import pathlib, pandas
+tables = {path.name: pandas.read_csv(path) for path in sorted(pathlib.Path("records").iterdir())}
+assert [e.name for e in lacuna.diagnose(system, tables).effects] == [e.name for e in verdict.effects]
+"""
 PAGE_S = 0.005  # the step of the page's simulate
 
 
@@ -56,8 +61,10 @@ def test_the_wheels_work_in_an_empty_environment(root, built, index, tmp_path, v
     """The engine first, by itself; then the robot's packages beside it."""
     stranger = Stranger(tmp_path)
     engine, *robots = (built[name] for name in FOLDERS)
-    pinned = lowest([engine, *robots], "numpy", "scipy", "numba", "matplotlib") if versions == "oldest" else []
-    stranger.install(engine, *(pin for pin in pinned if not pin.startswith("numba")))
+    pinned = (
+        lowest([engine, *robots], "numpy", "scipy", "pandas", "numba", "matplotlib") if versions == "oldest" else []
+    )
+    stranger.install(f"{engine}[tables]", *(pin for pin in pinned if not pin.startswith("numba")))
     stranger.run("python", "-c", IMPORT_ALL, "lacuna")
     ten_minutes(root, stranger)
     stranger.install(*robots, *pinned)
@@ -73,13 +80,13 @@ def ten_minutes(root: Path, stranger: Stranger) -> None:
     page = (root / "docs" / "adding-your-own-system.md").read_text()
     code = re.search(r"## Ten minutes.*?```python\n(.*?)```", page, re.DOTALL)[1]
     assert 'verdict.report("report.html")' in page
-    (stranger.here / "page.py").write_text(code + 'verdict.report("report.html")\n')
+    (stranger.here / "page.py").write_text(code + AS_TABLES + 'verdict.report("report.html")\n')
     (stranger.here / "records").mkdir()
     draw = np.random.default_rng(4)
     for height_N in (1.0, 2.0, 3.0, 4.0):
         for repeat in (1, 2, 3):
             file = stranger.here / "records" / f"push {height_N:.0f} N_{repeat}.csv"
-            np.savetxt(file, pushes(height_N, draw), delimiter=",", header="time_s,force_N,position_mm")
+            np.savetxt(file, pushes(height_N, draw), delimiter=",", header="time_s,force_N,position_mm", comments="")
     assert "identified" in (said := stranger.run("python", "page.py")), said
     assert "coulomb" in said
     assert "coulomb" in (stranger.here / "report.html").read_text(encoding="utf-8")
