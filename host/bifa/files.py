@@ -59,7 +59,7 @@ def _refuse_same(files: tuple[Path | None, ...], folders: tuple[Path | None, ...
     taken: set[Path] = set()
     for path in (path.resolve() for path in files if path is not None):
         if path in taken:
-            raise TargetError(f"{path} is named for two different files; give each a name of its own")
+            raise TargetError(f"{path} is used for two outputs; choose different paths")
         taken.add(path)
     for path in folders:
         if path is not None and path.resolve() in taken:

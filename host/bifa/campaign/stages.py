@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import bifa
-from bifa.data.layout import RAW, TABLE_FILE
 from bifa.errors import BifaError
 from bifa.files import is_stray, write_text
 from bifa.toml import parse_toml
@@ -69,6 +68,8 @@ def digest(path: Path) -> str:
 
 
 def _that_count(folder: Path) -> list[Path]:
+    from bifa.data.layout import RAW, TABLE_FILE  # numpy comes with it: errors of usage do not wait for that
+
     files = [path for path in folder.rglob("*") if path.is_file() and not is_stray(path.name)]
     try:
         listed = [trial["file"] for trial in parse_toml((folder / TABLE_FILE).read_text("utf-8"))["trial"]]

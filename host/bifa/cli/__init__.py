@@ -24,7 +24,7 @@ class _Commands(typer.core.TyperGroup):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            typer.echo("\nstopped; nothing is half-written: what was finished is named above", err=True)
+            typer.echo("\nInterrupted. Finished results are listed above; no partial files remain.", err=True)
             raise typer.Exit(130) from None
 
 

@@ -26,9 +26,9 @@ def diagnose(
     dataset: Annotated[Path, DATASET],
     json: Annotated[Path | None, typer.Option(help="Write the verdict as JSON.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write the model, completed by the effects found.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with the evidence.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report with the evidence.")] = None,
     model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the search; the same seed gives the same verdict.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same verdict.")] = 0,
     resolve: Annotated[
         bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and continue.")
     ] = False,

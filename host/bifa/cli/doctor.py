@@ -33,6 +33,6 @@ def doctor(
         console.print(f"[{colours[finding.state]}]{finding.state:9}[/] {finding.what:22} ", end="")
         console.out(finding.found)
         if finding.remedy:
-            console.out(f"{'':10}to do: {finding.remedy}")
+            console.out(f"{'':10}fix: {finding.remedy}")
     if missing:
         raise typer.Exit(1)

@@ -51,7 +51,7 @@ def experiment(
     inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
     repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
     quick: Annotated[
-        bool, typer.Option("--quick", help="The same conditions twice each, faster: for a first try.")
+        bool, typer.Option("--quick", help="Quick run: two repeats instead of three, at higher speed.")
     ] = False,
     profile: Annotated[Profile | None, PROFILE] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Of a virtual rig: its noise.")] = None,

@@ -21,7 +21,7 @@ def fit(
     dataset: Annotated[Path, DATASET],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
     model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a page (HTML, self-contained) with all of it.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report.")] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
     """Identify the model (the paper's section IV): what static loadings, rests and sensors say by themselves, then

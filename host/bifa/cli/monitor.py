@@ -25,7 +25,9 @@ def monitor(
     web: Annotated[bool, typer.Option("--web", help="On a page in the browser, with sliders for the gait.")] = False,
     web_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = _WEB_PORT,
     model: Annotated[Path | None, file_option("Model for the page's predictions; the nominal one if left out.")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="End after this time; otherwise Ctrl-C.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.1, help="Stop after this many seconds (default: until Ctrl-C).")
+    ] = None,
 ) -> None:
     """Watch the robot: pressures over the last seconds, valves, phases, and samples lost on the link.
 

@@ -25,12 +25,12 @@ def register(app: typer.Typer) -> None:
 def optimize(
     out: Annotated[Path, typer.Option(help="Gait file to write.", show_default=False)],
     model: Annotated[Path | None, file_option("Model file; the paper's nominal robot if left out.")] = None,
-    method: Annotated[Method, typer.Option(help="Of the search; bo is the paper's, and slow.")] = "de",
+    method: Annotated[Method, typer.Option(help="Search method; bo is the paper's, and slow.")] = "de",
     robust: Annotated[
         bool,
         typer.Option("--robust/--nominal", help="Maximise the speed that 9 robots in 10 reach, or the model's own."),
     ] = True,
-    seed: Annotated[int, typer.Option(min=0, help="Of the search and of the draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the search and of the sampled robots.")] = 0,
     evaluations: Annotated[
         int | None, typer.Option(min=20, help="Gaits to evaluate per run; 1000 for bo.", show_default=False)
     ] = None,

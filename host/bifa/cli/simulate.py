@@ -23,11 +23,13 @@ def simulate(
     model: Annotated[Path | None, file_option("Model file; the nominal model if left out.")] = None,
     gait: Annotated[Path | None, file_option("Gait file; the paper's baseline if left out.")] = None,
     cycles: Annotated[int, typer.Option(min=1, max=1000, help="Cycles to walk, from rest.")] = _CYCLES,
-    inclination: Annotated[float, typer.Option(help="Of the pipe, degrees, uphill positive.", min=-90, max=90)] = 0.0,
-    payload: Annotated[float, typer.Option(help="Pulled by the tail, kg.", min=0.0)] = 0.0,
+    inclination: Annotated[
+        float, typer.Option(help="Pipe inclination in degrees (positive = uphill).", min=-90, max=90)
+    ] = 0.0,
+    payload: Annotated[float, typer.Option(help="Payload towed by the tail, in kg.", min=0.0)] = 0.0,
     obstacle: Annotated[
         Obstacle | None,
-        typer.Option(help="One of the paper's, 10 cm ahead.", show_default=False),
+        typer.Option(help="Obstacle from the paper, placed 10 cm ahead.", show_default=False),
     ] = None,
     buckling: Annotated[float, typer.Option(help="Force that buckles a ring of supports, N (assumed).")] = _BUCKLING_N,
     pictures: Annotated[Path | None, PICTURES] = None,

@@ -183,7 +183,7 @@ def stop_until_confirmed(session: Session, ask: Callable[[float], Report], timeo
     Raises NoAnswerError after `timeout_s`, and a ConnectionError if the port is gone.
     """
     deadline, attempt_s = session.clock.now() + timeout_s, FIRST_ATTEMPT_S
-    reason = NoAnswerError("the Uno answers the stop with valves that are on")
+    reason = NoAnswerError("the Uno acknowledged the stop but still reports open valves")
     while True:
         session.send_stop()
         try:

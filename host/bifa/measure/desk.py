@@ -64,7 +64,7 @@ class Desk:
             self._lines.put(_END)
             if self._watch is None:
                 raise NobodyError(
-                    "nobody can answer: the input has ended. Start it in a terminal, or name a folder to --watch"
+                    "stdin is closed; no one can answer the prompts. Start it in a terminal, or --watch a folder"
                 )
             return None
         return line.strip()

@@ -149,7 +149,7 @@ def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
     monkeypatch.setattr("bifa.data.read_dataset", interrupted)
     result = invoke("check", ".")
     assert result.exit_code == 130
-    assert "stopped; nothing is half-written" in result.output
+    assert "Interrupted. Finished results are listed above" in result.output
 
 
 def completed(shell: str, words: str) -> str:

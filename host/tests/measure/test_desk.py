@@ -48,7 +48,7 @@ def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp
     typed(b"")
     desk = Desk(lambda text: None)
     desk.ask("mount", "Mount it.")
-    with pytest.raises(NobodyError, match="nobody can answer"):
+    with pytest.raises(NobodyError, match="no one can answer"):
         waited(desk.answer)
     watching = Desk(lambda text: None, tmp_path)
     watching.ask("mount", "Mount it.", {"trial": 3})

@@ -69,7 +69,7 @@ def library(chosen: Target) -> Path:
     path = generated.folder() / name
     if not path.exists():
         compiler()
-        print(f"bifa: compiling the simulator for {chosen.lanes} at once, this once", file=sys.stderr, flush=True)
+        print(f"Compiling the {chosen.lanes}-lane simulator (first run only)...", file=sys.stderr, flush=True)
         compile_to(path, chosen)
         generated.forget_old(path.parent)
     return path

@@ -169,5 +169,5 @@ def kernels() -> tuple[Kernel, Kernel] | None:
         print(f"bifa: simulations run one at a time, in numba: {e}", file=sys.stderr)
         return None
     if found[0].refused:
-        print(f"bifa: what has no form in lanes runs one at a time, in numba: {found[0].refusals}", file=sys.stderr)
+        print(f"bifa: these effects cannot be vectorised and run serially: {found[0].refusals}", file=sys.stderr)
     return found
