@@ -71,7 +71,8 @@ KNOWN = typer.Option(
     autocompletion=known_names,
 )
 RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
-WATCH = typer.Option(help="Folder in which your instruments' CSV files appear (serial port).")
+WATCH = typer.Option(help="Folder in which your instruments' files appear, or below it (serial port).")
+BENCH = typer.Option(help="File that says how your instruments write theirs (bifa instrument).")
 PROFILE = typer.Option(help="Of a virtual robot; ideal: the paper's equations and white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")

@@ -28,7 +28,7 @@ def campaign(
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path,
-        typer.Option(help="File of values measured on the bench; you are asked once (serial port).", show_default=True),
+        typer.Option(help="File of what you measured once, and of how your instruments write (serial port)."),
     ] = Path("bench.toml"),
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     profile: Annotated[Profile, PROFILE] = "realistic",
@@ -37,7 +37,8 @@ def campaign(
     """Run the whole loop on a robot; a virtual one has an undisclosed effect.
 
     On a serial port your own camera and testing machine measure: the campaign says what to mount and start, reads the
-    CSV that they save, aligns it with the Uno by the strobe, shows it, and repeats the trial on request: docs/bench.md.
+    files that they save (as declared: bifa instrument), aligns them with the Uno by the strobe, shows each trial, and
+    repeats it on request: docs/bench.md.
 
     Every stage can be interrupted and resumed, even days later, and is rerun only when something that it depends on
     has changed. Only the stages that measure need the robot. What you have weighed or measured yourself is declared in
@@ -125,14 +126,15 @@ def _attended(console, bench, watch: Path | None, bench_file: Path | None):
 
     from bifa.measure.bench_file import known_on
 
-    desk, hands = at_desk(console, watch)
+    desk, hands = at_desk(console, watch, bench_file)
     known = {**(known_on(bench_file, desk) if bench_file else {}), **bench.known}
     return replace(bench, known=known, hands=hands)
 
 
-def at_desk(console, watch: Path | None):
+def at_desk(console, watch: Path | None, bench_file: Path | None = None):
     """The desk on this terminal, and who works the instruments there (`bifa.measure.by_hand`)."""
     from bifa.errors import BifaError
+    from bifa.measure.bench_file import read_exports
     from bifa.measure.by_hand import ByHand
     from bifa.measure.desk import Desk
 
@@ -140,7 +142,7 @@ def at_desk(console, watch: Path | None):
         raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
     plain = not console.encoding.lower().startswith("utf")
     desk = Desk(lambda text: console.print(text, markup=False, highlight=False), watch)
-    return desk, ByHand(desk, watch, plain)
+    return desk, ByHand(desk, watch, plain, read_exports(bench_file) if bench_file else {})
 
 
 def _kept(out: Path) -> str:

@@ -154,7 +154,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
 
     made = {**measured.provenance, **measured.provenance.get("options", {})}
     options = {key: made[key] for key in SPECIMEN if key in made} if port == "virtual" else {}
-    desk = cache(lambda: at_desk(console, watch)[1])  # one for all: each reads the terminal on
+    desk = cache(lambda: at_desk(console, watch, Path("bench.toml"))[1])  # one for all: each reads the terminal on
 
     @contextmanager
     def opened(number: int):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import KNOWN, PORT, PROFILE, WATCH, Profile, file_option, stoppable
+from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, file_option, stoppable
 from bifa.computer import EXAMPLE_PORT
 
 EPILOG = f"""Examples:  bifa experiment all --port virtual --out out/bench   |
@@ -57,7 +57,8 @@ def experiment(
     seed: Annotated[int | None, typer.Option(min=0, help="Of a virtual rig: its noise.")] = None,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     watch: Annotated[Path | None, WATCH] = None,
-    instrument: Annotated[Path | None, file_option("CSV of your own instrument, instead of a rig's.")] = None,
+    bench: Annotated[Path, BENCH] = Path("bench.toml"),
+    instrument: Annotated[Path | None, file_option("File of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[
         Path | None, typer.Option(help="The Uno's telemetry from the same time (bifa record).", exists=True)
     ] = None,
@@ -70,7 +71,7 @@ def experiment(
     Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments
     have their own clocks, synchronised with the Uno's by its sampling strobe (D10); each trial records how well.
     On a serial port your own instruments measure: you are told what to mount and start, trial by trial, and the
-    CSV that they save is the record (docs/bench.md).
+    file that they save is the record, as it is declared in bench.toml (bifa instrument; docs/bench.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
     from bifa.files import check_targets
@@ -111,11 +112,11 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add)
+        _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add, bench)
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {_kept(out)}; run the same command to resume"):
-        _run(console, port, options, out, trials, name.value, parse_known(known), watch)
+        _run(console, port, options, out, trials, name.value, parse_known(known), watch, bench)
 
 
 def _check_within(option: str, value: float, low: float, high: float, unit: str) -> None:
@@ -141,7 +142,7 @@ def _load(path: Path):
     return file.gait
 
 
-def _run(console, port, options, out, trials, name, known, watch) -> None:
+def _run(console, port, options, out, trials, name, known, watch, bench) -> None:
     from contextlib import nullcontext
 
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -161,7 +162,7 @@ def _run(console, port, options, out, trials, name, known, watch) -> None:
     with open_rig(port, **options) as rig:
         by_hand = rig.instruments is None
         if by_hand:
-            at_desk(console, watch)[1].equip(rig)
+            at_desk(console, watch, bench)[1].equip(rig)
         bars = Progress(*columns, console=console)
         task = bars.add_task(name, total=len(trials))
 
@@ -201,14 +202,17 @@ def _only(trials):
     return first[0]
 
 
-def _import(console, instrument, telemetry, planned, out, known, add) -> None:
+def _import(console, instrument, telemetry, planned, out, known, add, bench) -> None:
+    from bifa.data.export import ROLES
+    from bifa.measure.bench_file import read_exports
     from bifa.measure.instrument_csv import import_trial
 
     if telemetry is None:
         raise typer.BadParameter(
             "--instrument needs --telemetry: the Uno's record of the same time, from `bifa record`"
         )
-    dataset, clock = import_trial(instrument, telemetry, planned, out, known, add=add)
+    export = read_exports(bench).get(ROLES[planned.experiment])
+    dataset, clock = import_trial(instrument, telemetry, planned, out, known, add=add, export=export)
     trial = dataset.trials[-1]
     console.print(
         f"{out}: {trial.file}, {len(trial.time_s)} samples; synchronised over {clock.edges} edges to "

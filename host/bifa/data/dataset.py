@@ -74,7 +74,7 @@ class Trial:
         return ", ".join(parts)
 
     def to_pandas(self):
-        """The columns as a DataFrame over time; the condition and the repeat in its `attrs`. Needs pandas."""
+        """The columns as a DataFrame over time; the condition and the repeat in its `attrs`."""
         return tables.to_pandas(self)
 
     def plot(self, axes=None):
@@ -84,13 +84,15 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """Trials and what the lab measured directly (`known`: model parameter -> value, SI unless suffixed)."""
+    """Trials and what the lab measured directly (`known`: model parameter -> value, SI unless suffixed). `exports`: how
+    the instruments wrote the files, where that is declared; what bifa writes is in the data set's own form."""
 
     path: Path | None
     name: str
     known: dict[str, float]
     trials: tuple[Trial, ...]
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    exports: Mapping[str, Any] = field(default_factory=dict)
 
     def of(self, experiment: str, actuator: str | None = None) -> tuple[Trial, ...]:
         """The trials of one experiment, of one actuator where given."""
@@ -103,7 +105,7 @@ class Dataset:
         return max((trial.repeat for trial in self.trials if trial.condition == condition), default=0)
 
     def to_pandas(self):
-        """All trials below one another, by file and time. Needs pandas."""
+        """All trials below one another, by file and time."""
         return tables.stacked(self.trials)
 
     def repeats(self) -> Iterator[tuple[Trial, ...]]:

@@ -16,7 +16,7 @@ class DatasetError(BifaError):
         place = [
             file,
             None if line is None else f"line {line}",
-            None if column is None else f"column {column}" if str(file).endswith(".csv") else column,
+            None if column is None else f"column {column}" if not str(file).endswith(".toml") else column,
         ]
         found = ", ".join(printable(part, keep="") for part in place if part)
         super().__init__(f"{found}: {problem}" if found else problem)

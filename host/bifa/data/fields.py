@@ -10,9 +10,11 @@ from .layout import TABLE_FILE
 
 
 class Source:
-    """The text of dataset.toml, kept to name lines. Lines are given only where they are certain."""
+    """The text of dataset.toml, or of another `file`, kept to name lines. Lines are given only where they are
+    certain."""
 
-    def __init__(self, text: str, trials: int):
+    def __init__(self, text: str, trials: int, file: str = TABLE_FILE):
+        self.file = file
         self._lines = text.split("\n")
         starts = [n for n, line in enumerate(self._lines, 1) if re.match(r"\s*\[\[\s*trial\s*\]\]", line)]
         bounds = itertools.pairwise([*starts, len(self._lines) + 1])
@@ -60,12 +62,12 @@ class Fields:
 
     def error(self, key: str | None, problem: str) -> DatasetError:
         """The error for `key` of this table, its line found."""
-        path = tuple(part for part in (self._table, key) if part)
+        path = tuple(part for part in (*(self._table or "").split("."), key) if part)
         where = [".".join(path)] if path else []
         if self._trial is not None:
             where.insert(0, f"trial {self._trial}")
         line = self._source.line(self._trial, path)
-        return DatasetError(problem, file=TABLE_FILE, line=line, column=", ".join(where) or None)
+        return DatasetError(problem, file=self._source.file, line=line, column=", ".join(where) or None)
 
     def __contains__(self, key: str) -> bool:
         return key in self._values

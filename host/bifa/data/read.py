@@ -4,13 +4,17 @@ import itertools
 import os
 import tomllib
 from pathlib import Path, PurePosixPath, PureWindowsPath
+from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from bifa.ranges import RANGES
 from bifa.toml import parse_toml
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError
+from .export import ROLES, Export, parse_exports, read_export
 from .fields import Fields, Source
 from .layout import (
     ACTUATORS,
@@ -26,7 +30,7 @@ from .layout import (
     TABLE_FILE,
     is_command,
 )
-from .table import read_table
+from .table import check_values, read_table
 
 _CHAMBERS = tuple(c.removeprefix("command_") for c in EXPERIMENTS["locomotion"].columns if is_command(c))
 _CLOCK_S = 0.1  # by which a time may be outside its trial: of the order of a command's age
@@ -51,17 +55,40 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     listed = top.take("trial")
     if not isinstance(listed, list) or not listed:
         raise top.error("trial", "must be a list of [[trial]] tables with at least one")
-    top.finish(also=("known", "provenance"))
+    exports = _exports(top, source)
+    top.finish(also=("known", "provenance", "instrument"))
     heads = [_trial_head(entry, source, number) for number, entry in enumerate(listed, start=1)]
-    paths = [_inside(folder, head, source, number) for number, head in enumerate(heads, start=1)]
+    paths = [_inside(folder, head, source, number, exports) for number, head in enumerate(heads, start=1)]
     _refuse_duplicates(heads, paths, source)
     trials = [
-        Trial(**{**head, "columns": read_table(file, head["file"], EXPERIMENTS[head["experiment"]])})
-        for head, file in zip(heads, paths, strict=True)
+        Trial(**{**head, "columns": _columns(file, head, exports)}) for head, file in zip(heads, paths, strict=True)
     ]
     for number, trial in enumerate(trials, start=1):
         _check_switches(trial, source, number)
-    return Dataset(folder, name, known, tuple(trials), provenance)
+    return Dataset(folder, name, known, tuple(trials), provenance, exports)
+
+
+def _exports(top: Fields, source: Source) -> dict[str, Export]:
+    if "instrument" not in top:
+        return {}
+    return parse_exports(Fields(top.take("instrument"), source, table="instrument"), source)
+
+
+def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> dict[str, np.ndarray]:
+    """Of a file in the data set's own form, or as the instrument of its experiment is declared to write it."""
+    layout = EXPERIMENTS[head["experiment"]]
+    export = exports.get(ROLES[head["experiment"]])
+    if export is None:
+        return read_table(path, head["file"], layout)
+    columns, sheet, rows = read_export(path, export, layout.columns, layout.optional_columns, head["file"])
+    for name, values in columns.items():
+        if not np.isfinite(values).all():
+            row = rows[np.flatnonzero(~np.isfinite(values))[0]]
+            raise sheet.error("the value is missing", row, export.columns.get(name, name))
+    if len(rows) < 2:
+        raise sheet.error(f"{len(rows)} rows of data; at least two are needed")
+    check_values(columns, head["file"], [sheet.line(row) for row in rows])
+    return columns
 
 
 def _read_toml(folder: Path) -> tuple[Fields, Source]:
@@ -165,13 +192,15 @@ def _gait(fields: Fields) -> dict[str, float]:
     return gait
 
 
-def _inside(folder: Path, head: dict[str, Any], source: Source, number: int) -> Path:
+def _inside(
+    folder: Path, head: dict[str, Any], source: Source, number: int, exports: dict[str, Export] = MappingProxyType({})
+) -> Path:
     """The path of a trial's file, certain to be a regular file within the folder."""
     file = head["file"]
     place = {"file": TABLE_FILE, "line": source.line(number, ("file",)), "column": f"trial {number}, file"}
     if PurePosixPath(file).is_absolute() or PureWindowsPath(file).anchor or ".." in Path(file).parts:
         raise DatasetError(f"{file!r} is outside the data set; name a file within the folder", **place)
-    if not file.endswith(".csv"):
+    if not file.endswith(".csv") and ROLES[head["experiment"]] not in exports:
         raise DatasetError(f"{file!r} is not a .csv file", **place)
     try:
         resolved = (folder / file).resolve()

@@ -1,16 +1,16 @@
 """One CSV file: read fast; where that fails, find the line and the column at fault."""
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from lacuna.decimals import BLANKS, DECIMAL
+
 from .errors import DatasetError
 from .layout import Layout, is_command
+from .sheet import fast_numbers
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_NUMERIC_BYTES = b"0123456789+-.eE, \t\n"
-_BLANKS = " \t"
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}  # that other programs write
 LARGEST = 1e12  # in any unit: no measurement, and small enough to be squared and averaged
 SHORTEST_STEP_S = 1e-6
@@ -22,16 +22,16 @@ def read_table(path: Path, file: str, layout: Layout) -> dict[str, np.ndarray]:
     `file` is the name used in errors. Raises DatasetError naming file, line and column for anything that is
     not exactly the format: nothing is skipped, filled or converted.
     """
-    text = _decode(path, file)
-    lines = text.split("\n")
-    if lines[-1] == "":
-        lines.pop()  # the file ends with a newline
-    names = _header(lines, file, layout)
-    values = _parse(lines[1:], len(names))
+    values = _read_fast(path, file, layout)
     if values is None:
-        values = _parse_slowly(lines, names, file)
+        lines = _decode(path, file).split("\n")
+        if lines[-1] == "":
+            lines.pop()  # the file ends with a newline
+        names = _header(lines, file, layout)
+        values = names, _parse_slowly(lines, names, file)
+    names, values = values
     columns = {name: np.ascontiguousarray(values[:, index]) for index, name in enumerate(names)}
-    _check_values(columns, file)
+    check_values(columns, file)
     return columns
 
 
@@ -57,7 +57,7 @@ def _decode(path: Path, file: str) -> str:
 
 
 def _header(lines: list[str], file: str, layout: Layout) -> list[str]:
-    names = [name.strip(_BLANKS) for name in lines[0].split(",")]
+    names = [name.strip(BLANKS) for name in lines[0].split(",")]
     expected = ", ".join(layout.all_columns)
     if names[0].startswith("#"):
         problem = 'the header begins with #, as numpy.savetxt writes it; have it written with comments=""'
@@ -86,24 +86,25 @@ def _header(lines: list[str], file: str, layout: Layout) -> list[str]:
     return names
 
 
-def _parse(rows: list[str], width: int) -> np.ndarray | None:
-    """Numbers of shape (rows, width) by NumPy's C reader, or None where it cannot have read every row."""
-    text = "\n".join(rows)
-    if not text.isascii() or text.encode("ascii").translate(None, _NUMERIC_BYTES):
-        return None
+def _read_fast(path: Path, file: str, layout: Layout) -> tuple[list[str], np.ndarray] | None:
+    """The columns' names and all numbers; None where anything is not as it should be."""
     try:
-        values = np.loadtxt(rows, delimiter=",", comments=None, ndmin=2)
-    except ValueError:
+        with path.open("rb") as lines:
+            first = lines.readline()
+        if not first.isascii() or b"\r" in first.rstrip(b"\r\n"):
+            return None
+        names = _header([first.decode().rstrip("\r\n"), "", ""], file, layout)
+        values = fast_numbers(path, len(first), len(names))
+    except (OSError, DatasetError):
         return None
-    complete = values.shape == (len(rows), width) and np.isfinite(values).all()
-    return values if complete else None
+    return None if values is None or len(values) < 2 else (names, values)
 
 
 def _parse_slowly(lines: list[str], names: list[str], file: str) -> np.ndarray:
     """Parse field by field, so that the first fault is named by line and column."""
     rows = []
     for number, text in enumerate(lines[1:], start=2):
-        if not text.strip(_BLANKS):
+        if not text.strip(BLANKS):
             raise DatasetError("a blank line among the data", file=file, line=number)
         fields = text.split(",")
         if len(fields) != len(names):
@@ -120,8 +121,8 @@ def _parse_slowly(lines: list[str], names: list[str], file: str) -> np.ndarray:
 
 
 def _number(field: str, file: str, line: int, column: str) -> float:
-    stripped = field.strip(_BLANKS)
-    if not _NUMBER.fullmatch(stripped):
+    stripped = field.strip(BLANKS)
+    if not DECIMAL.fullmatch(stripped):
         if not stripped:
             problem = "the value is missing"
         elif stripped.strip("+-").lower() in ("nan", "inf", "infinity"):
@@ -139,13 +140,18 @@ def _shown(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
-def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
+def check_values(columns: dict[str, np.ndarray], file: str, lines: Sequence[int] | None = None) -> None:
+    """Raise DatasetError for what cannot have been measured; `lines` of the file, by row, else from the second on."""
+
+    def line(row: int) -> int:
+        return row + 2 if lines is None else lines[row]
+
     for name, values in columns.items():
         large = np.flatnonzero(np.abs(values) > LARGEST)
         if large.size:
             row = int(large[0])
             problem = f"{values[row]:g} is beyond any measurement (largest: {LARGEST:g})"
-            raise DatasetError(problem, file=file, line=row + 2, column=name)
+            raise DatasetError(problem, file=file, line=line(row), column=name)
     time_s = columns["time_s"]
     back = np.flatnonzero(np.diff(time_s) <= 0)
     if back.size:
@@ -154,7 +160,7 @@ def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
         raise DatasetError(
             f"time {verb}: {float(time_s[row])} after {float(time_s[row - 1])}",
             file=file,
-            line=row + 2,
+            line=line(row),
             column="time_s",
         )
     close = np.flatnonzero(np.diff(time_s) < SHORTEST_STEP_S)
@@ -163,7 +169,7 @@ def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
         problem = (
             f"time advances by {time_s[row] - time_s[row - 1]:g} s, less than the minimum of {SHORTEST_STEP_S:g} s"
         )
-        raise DatasetError(problem, file=file, line=row + 2, column="time_s")
+        raise DatasetError(problem, file=file, line=line(row), column="time_s")
     for name, values in columns.items():
         if is_command(name):
             wrong = np.flatnonzero((values != 0) & (values != 1))
@@ -171,6 +177,6 @@ def _check_values(columns: dict[str, np.ndarray], file: str) -> None:
                 raise DatasetError(
                     f"command {values[wrong[0]]:g} is neither 1 (positive) nor 0 (vacuum)",
                     file=file,
-                    line=int(wrong[0]) + 2,
+                    line=line(int(wrong[0])),
                     column=name,
                 )

@@ -6,15 +6,14 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from .errors import DatasetError
-
 if TYPE_CHECKING:
     from .dataset import Trial
 
 
 def to_pandas(trial: Trial) -> Any:
-    """A DataFrame over `time_s`. Raises DatasetError without pandas."""
-    pandas = _pandas()
+    """A DataFrame over `time_s`."""
+    import pandas
+
     columns = {name: column for name, column in trial.columns.items() if name != "time_s"}
     frame = pandas.DataFrame(columns, index=pandas.Index(trial.time_s, name="time_s"))
     frame.attrs = {"file": trial.file, "experiment": trial.experiment, "condition": trial.label, "repeat": trial.repeat}
@@ -22,8 +21,10 @@ def to_pandas(trial: Trial) -> Any:
 
 
 def stacked(trials: Sequence[Trial]) -> Any:
-    """One DataFrame over (file, time_s). Raises DatasetError without pandas."""
-    return _pandas().concat({trial.file: trial.to_pandas() for trial in trials}, names=["file"])
+    """One DataFrame over (file, time_s)."""
+    import pandas
+
+    return pandas.concat({trial.file: trial.to_pandas() for trial in trials}, names=["file"])
 
 
 def plot(trial: Trial, axes: Any = None) -> Any:
@@ -48,11 +49,3 @@ def plot(trial: Trial, axes: Any = None) -> Any:
     figure = axes[0].figure
     figure.align_ylabels()
     return figure
-
-
-def _pandas() -> Any:
-    try:
-        import pandas
-    except ImportError:
-        raise DatasetError("tables need pandas: pip install pandas") from None
-    return pandas

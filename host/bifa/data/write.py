@@ -126,6 +126,11 @@ def _remove_strays(folder: Path) -> None:
 def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
     """Add one trial to a data set on disk; returns the larger one. On an error nothing of it is listed. Raises
     DatasetError where it breaks the format."""
+    if dataset.exports:
+        raise DatasetError(
+            f"{dataset.path} declares how instruments write its files ([instrument]), and trials are added in the data "
+            "set's own form: add to a copy of it, write_dataset(folder, read_dataset(...))"
+        )
     grown = replace(dataset, trials=(*dataset.trials, trial))
     probe = dataset.path / f"{_PROBE}{secrets.token_hex(4)}"
     write_dataset(probe, replace(dataset, path=None, trials=(trial,)))

@@ -1,8 +1,12 @@
-"""What a lab knows of its bench, asked for once and kept in a file (TOML): masses, supply, vacuum.
+"""What a lab knows of its bench, kept in a file (TOML): masses, supply, vacuum, asked for once; and how its instruments
+write their files, which `bifa instrument` proposes.
 
 ```toml
 [known]
 head_mass_kg = 0.182
+
+[instrument.machine]
+preset = "bluehill"
 ```
 """
 
@@ -11,9 +15,12 @@ from __future__ import annotations
 import time
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 
+from bifa.data.export import Export, parse_exports
+from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.files import write_text
 from bifa.measure.desk import Desk
@@ -28,20 +35,40 @@ ASKED = {
     "supply_negative_psi": "vacuum at the valves, gauged, in psi (negative)",
 }
 _LOOK_S = 0.1
+_TABLES = {"known", "instrument"}
 
 
 class BenchFileError(BifaError):
     """The bench's file cannot be used; the text says why."""
 
 
-def read_bench(path: Path) -> dict[str, float]:
-    """The known values in the file. BenchFileError where it cannot be read or a value is unknown or out of bounds."""
+def _read(path: Path) -> tuple[dict[str, Any], str]:
     try:
-        document = parse_toml(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        document = parse_toml(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BenchFileError(f"cannot read the bench's file {path}: {error}") from None
-    if set(document) - {"known"} or not isinstance(document.get("known", {}), dict):
-        raise BenchFileError(f"{path}: a bench's file has one table, [known]; it has {', '.join(document)}")
+    if set(document) - _TABLES or not all(isinstance(table, dict) for table in document.values()):
+        raise BenchFileError(
+            f"{path}: a bench's file has the tables [known] and [instrument.machine], "
+            f"[instrument.camera]; it has {', '.join(document)}"
+        )
+    return document, text
+
+
+def read_exports(path: Path) -> dict[str, Export]:
+    """How the bench's instruments write their files, by "machine" and "camera"; none where there is no file. Raises
+    DatasetError, with the line, for a declaration that is wrong."""
+    if not path.exists():
+        return {}
+    document, text = _read(path)
+    source = Source(text, 0, str(path))
+    return parse_exports(Fields(document.get("instrument", {}), source, table="instrument"), source)
+
+
+def read_bench(path: Path) -> dict[str, float]:
+    """The known values in the file. BenchFileError where it cannot be read or a value is unknown or out of bounds."""
+    document, _ = _read(path)
     try:
         return parse_known(f"{name}={value}" for name, value in document.get("known", {}).items())
     except ModelParameterError as error:
@@ -49,8 +76,9 @@ def read_bench(path: Path) -> dict[str, float]:
 
 
 def known_on(path: Path, desk: Desk) -> dict[str, float]:
-    """The known values of the bench; where its file does not exist they are asked for at the desk, and written."""
-    if path.exists():
+    """The known values of the bench; where its file does not have them they are asked for at the desk, and written."""
+    document, before = _read(path) if path.exists() else ({}, "")
+    if "known" in document:
         return read_bench(path)
     desk.say(f"Which of these have you measured directly? You are asked once; the answers are kept in {path}.")
     known: dict[str, float] = {}
@@ -59,7 +87,7 @@ def known_on(path: Path, desk: Desk) -> dict[str, float]:
             known |= _asked(desk, name, meaning)
     finally:
         desk.clear()
-    write_text(path, tomli_w.dumps({"known": known}))
+    write_text(path, tomli_w.dumps({"known": known}) + (f"\n{before}" if before else ""))
     desk.say(f"Saved in {path}; edit that file to correct a value.")
     return known
 

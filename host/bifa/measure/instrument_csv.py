@@ -1,25 +1,26 @@
-"""Bring in the record of a lab's own instrument: a CSV of what it measured, lined up with the Uno's telemetry.
+"""Bring in the record of a lab's own instrument: a file of what it measured, lined up with the Uno's telemetry.
 
-The instrument's file has `time_s` by its own clock and its channels under the data set's names (`displacement_mm`,
-`force_N`, `displacement_head_mm` ...). Beside it lies `<name>.sync.csv` with one column `sync_time_s`: when its sync
-input saw the strobe of D10 rise, by the same clock. The instrument is started before `bifa record`: that has the Uno
-leave out ten strobes and notes which samples these were (`strobe` = 0), so that both records show the same pause.
-Telemetry without that column is lined up by the Uno's restart when `bifa record` opened the port: the first edge after
-that pause is sample 1.
+The instrument's file has times by its own clock and its channels, under the data set's names (`time_s`,
+`displacement_mm`, `force_N`, `displacement_head_mm` ...) or as its export is declared. Beside it lies
+`<name>.sync.csv` with one column `sync_time_s`: when its sync input saw the strobe of D10 rise, by the same clock.
+The instrument is started before `bifa record`: that has the Uno leave out ten strobes and notes which samples these
+were (`strobe` = 0), so that both records show the same pause. Telemetry without that column is lined up by the Uno's
+restart when `bifa record` opened the port: the first edge after that pause is sample 1.
 """
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
+from bifa.data.export import OWN_NAMES, Export, read_export, sync_edges
 from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
+from bifa.data.sheet import Sheet
 from bifa.data.write import add_trial
 from bifa.errors import BifaError
 from bifa.link.table import CHAMBERS
@@ -56,17 +57,18 @@ def import_trial(
     known: Mapping[str, float] | None = None,
     *,
     add: bool = False,
+    export: Export | None = None,
 ) -> tuple[Dataset, ClockLine]:
-    """Write a data set of one trial, `planned`, from an instrument's CSV and the folder or file of telemetry; or `add`
+    """Write a data set of one trial, `planned`, from an instrument's file and the folder or file of telemetry; or `add`
     it to the data set that there is, as the next repeat of its condition.
 
-    known: what was measured directly (`bifa.measure.known`).
+    known: what was measured directly (`bifa.measure.known`). export: how the instrument writes its files, if declared.
 
     Raises InstrumentFileError where a column is missing, the two do not overlap, their clocks do not line up, or the
     data set has this record already; DatasetError where `folder` exists, or is no data set to be added to.
     """
     recorded = _added_to(folder, known) if add else None
-    measured, edges = read_instrument(instrument, CHANNELS[planned.experiment])
+    measured, edges = read_instrument(instrument, CHANNELS[planned.experiment], export)
     uno = _read_telemetry(_telemetry_file(telemetry), planned)
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
@@ -107,41 +109,62 @@ def _refuse_copy(recorded: Dataset, trial: Trial, instrument: Path) -> None:
             raise InstrumentFileError(f"{instrument} is in {recorded.path} already, as {old.file}")
 
 
-def read_instrument(path: Path, channels: tuple[str, ...]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s] from the
-    file beside it; both rise. A tail that was not tracked at all is no column. Raises InstrumentFileError."""
-    columns, edges = _whole(path, ("time_s", *channels)), _whole(sync_file(path), ("sync_time_s",))
-    _refuse_falling(path, columns, "time_s")
-    _refuse_falling(sync_file(path), edges, "sync_time_s")
-    _refuse_codes(path, columns, channels)
-    if _HEAD in channels and _TAIL in columns:
+def read_instrument(
+    path: Path, channels: tuple[str, ...], export: Export | None = None
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s], from
+    the file beside it or as `export` declares; both rise. A tail that was not tracked at all is no column. `export`:
+    how the file is written; None: under the data set's names. Raises InstrumentFileError."""
+    columns, sheet, rows = _declared(path, channels, export or OWN_NAMES)
+    lines = [sheet.line(row) for row in rows]
+    _refuse_few(path, lines)
+    _refuse_gaps(path, columns, ("time_s", *channels), _LOST, lines)
+    _refuse_falling(path, columns, "time_s", lines)
+    _refuse_codes(path, columns, lines)
+    if _TAIL in columns:
         if np.isnan(columns[_TAIL]).all():
             del columns[_TAIL]
         else:
-            _refuse_gaps(path, columns, (_TAIL,), _LOST)
-    return columns, edges["sync_time_s"]
+            _refuse_gaps(path, columns, (_TAIL,), _LOST, lines)
+    if export is None or export.needs_sync_file:
+        return columns, _read_edges(sync_file(path))
+    try:
+        return columns, sync_edges(export, columns, sheet, rows)
+    except DatasetError as error:
+        raise InstrumentFileError(str(error)) from None
 
 
-def _refuse_codes(path: Path, columns: dict[str, np.ndarray], channels: tuple[str, ...]) -> None:
-    for name in (*channels, *((_TAIL,) if _TAIL in columns else ())):
-        if (coded := codes(columns[name])).any():
+def _declared(path: Path, channels: tuple[str, ...], export: Export) -> tuple[dict[str, np.ndarray], Sheet, np.ndarray]:
+    optional = (_TAIL,) if _HEAD in channels else ()
+    try:
+        return read_export(path, export, ("time_s", *channels), optional)
+    except DatasetError as error:
+        raise InstrumentFileError(str(error)) from None
+
+
+def _read_edges(path: Path) -> np.ndarray:
+    edges = read_columns(path, ("sync_time_s",))
+    _refuse_gaps(path, edges, ("sync_time_s",), _LOST)
+    _refuse_falling(path, edges, "sync_time_s")
+    return edges["sync_time_s"]
+
+
+def _refuse_codes(path: Path, columns: dict[str, np.ndarray], lines: Sequence[int]) -> None:
+    for name, values in columns.items():
+        if name != "time_s" and (coded := codes(values)).any():
             row = int(np.flatnonzero(coded)[0])
             raise InstrumentFileError(
-                f"{path}, line {row + 2}, column {name}: {columns[name][row]:g} stands for no value (a lost marker?); "
+                f"{path}, line {lines[row]}, column {name}: {values[row]:g} stands for no value (a lost marker?); "
                 "fill the gap by the instrument's own means, or record again"
             )
 
 
 def sync_file(path: Path) -> Path:
     """Where the edges of the strobe stand that belong to the record in `path`."""
+    for name in (f"{path.stem}.sync{path.suffix}", f"{path.stem}.sync.CSV"):
+        if path.suffix.lower() == ".csv" and (there := path.with_name(name)).exists():
+            return there
     return path.with_suffix(".sync.csv")
-
-
-def _whole(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """As `read_columns`, with a value in every field of what is required."""
-    columns = read_columns(path, required)
-    _refuse_gaps(path, columns, required, _LOST)
-    return columns
 
 
 def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
@@ -158,20 +181,33 @@ def _commanded(planned: PlannedTrial) -> tuple[str, ...]:
     return (CHAMBER_OF[planned.actuator],) if planned.experiment == "step_response" else ()
 
 
-def _refuse_gaps(path: Path, columns: dict[str, np.ndarray], names: tuple[str, ...], problem: str) -> None:
+def _refuse_gaps(
+    path: Path, columns: dict[str, np.ndarray], names: tuple[str, ...], problem: str, lines: Sequence[int] | None = None
+) -> None:
     for name in names:
         if not np.isfinite(columns[name]).all():
-            line = int(np.flatnonzero(~np.isfinite(columns[name]))[0]) + 2
-            raise InstrumentFileError(f"{path}, line {line}, column {name}: {problem}")
+            row = int(np.flatnonzero(~np.isfinite(columns[name]))[0])
+            raise InstrumentFileError(f"{path}, line {_line(row, lines)}, column {name}: {problem}")
 
 
-def _refuse_falling(path: Path, columns: dict[str, np.ndarray], name: str) -> None:
+def _refuse_falling(path: Path, columns: dict[str, np.ndarray], name: str, lines: Sequence[int] | None = None) -> None:
     steps = np.diff(columns[name])
     if (steps <= 0.0).any():
-        line = int(np.flatnonzero(steps <= 0.0)[0]) + 3
+        row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
         raise InstrumentFileError(
-            f"{path}, line {line}, column {name}: not later than the line before; times rise from line to line"
+            f"{path}, line {_line(row, lines)}, column {name}: not later than the line before; times rise from line to "
+            "line"
         )
+
+
+def _refuse_few(path: Path, lines: Sequence[int]) -> None:
+    if len(lines) < 2:
+        raise InstrumentFileError(f"{path} holds {len(lines)} samples: nothing to synchronise")
+
+
+def _line(row: int, lines: Sequence[int] | None) -> int:
+    """Without `lines` the rows stand below one line of names."""
+    return row + 2 if lines is None else lines[row]
 
 
 def _telemetry_file(path: Path) -> Path:
@@ -187,56 +223,19 @@ def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]
     """Columns of numbers; an empty field is NaN (a chamber that is off), columns of text that nobody asks for are left
     out."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:  # a spreadsheet begins its files with a mark
-            rows = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InstrumentFileError(f"{path} cannot be read as a CSV: {error}") from None
-    while rows and not any(rows[-1]):
-        rows.pop()
-    header = rows[0] if rows else []
-    _refuse_shape(path, header, rows)
-    missing = [name for name in required if name not in header]
-    if missing:
-        raise InstrumentFileError(f"{path} lacks the column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
-    columns = {}
-    for place, name in enumerate(header):
-        try:
-            columns[name] = np.array([float(row[place]) if row[place] else np.nan for row in rows[1:]])
-        except (ValueError, IndexError):
-            cells = [row[place] for row in rows[1:] if len(row) > place and row[place]]
-            if name not in required and cells and not any(map(_is_number, cells)):
-                continue  # text
-            line = next(i for i, row in enumerate(rows[1:], 2) if len(row) <= place or not _is_number(row[place]))
-            raise InstrumentFileError(f"{path}, line {line}, column {name}: not a number") from None
-    if len(rows) < 3:
-        raise InstrumentFileError(f"{path} holds {max(len(rows) - 1, 0)} samples: nothing to synchronise")
+        sheet = Sheet(path)
+        labels = sheet.labels()
+        if missing := [name for name in required if name not in labels]:
+            raise InstrumentFileError(
+                f"{path} lacks the column {', '.join(missing)}; it has {sheet.listed() or 'none'}"
+            )
+        places = {name: sheet.find(name) for name in labels if name}
+        kept = {name: place for name, place in places.items() if name in required or not sheet.is_text(place)}
+        columns = {name: sheet.numbers(place, name) for name, place in kept.items()}
+    except DatasetError as error:
+        raise InstrumentFileError(str(error)) from None
+    _refuse_few(path, range(len(sheet)))
     return columns
-
-
-def _refuse_shape(path: Path, header: list[str], rows: list[list[str]]) -> None:
-    """Other separators, columns of one name, and lines with more fields than there are names."""
-    for mark, name in ((";", "semicolons"), ("\t", "tabs")):
-        if len(header) == 1 and mark in header[0]:
-            raise InstrumentFileError(
-                f"{path}: its columns are separated by {name}; save it with commas between columns, points in numbers"
-            )
-    for name in header:
-        if name and header.count(name) > 1:
-            raise InstrumentFileError(f"{path} has the column {name} more than once; keep the right one")
-    for line, row in enumerate(rows[1:], 2):
-        if any(row[len(header) :]):
-            raise InstrumentFileError(
-                f"{path}, line {line}: {len(row)} fields, but {len(header)} columns; are there commas in the numbers? "
-                "Save it with decimal points"
-            )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text or "nan")
-    except ValueError:
-        return False
-    return True
 
 
 def _line_up(edges_s: np.ndarray, uno: dict[str, np.ndarray], instrument: Path, telemetry: Path) -> ClockLine:

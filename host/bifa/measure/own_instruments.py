@@ -1,24 +1,31 @@
-"""A lab's own instruments as files: what to mount and start is said, the CSV that comes is the record.
+"""A lab's own instruments as files: what to mount and start is said, the file that comes is the record.
 
-The CSV has `time_s` and the channels under the data set's names; `<name>.sync.csv` beside it has `sync_time_s`, the
-rising edges of the strobe that its sync input saw. It appears in the watched folder, or its path is typed.
+It has `time_s` and the channels under the data set's names, or is written as declared; `<name>.sync.csv` beside it has
+`sync_time_s`, the rising edges of the strobe that its sync input saw, unless the declaration has them elsewhere. It
+appears in the watched folder or below it, or its path is typed. What has appeared and cannot be used is said.
 """
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from bifa.measure.desk import Desk
+from bifa.data.export import ROLES, Export
+from bifa.files import is_stray
+from bifa.measure.desk import ANSWER, ASKS, Desk
 from bifa.measure.instrument_csv import InstrumentFileError, read_instrument, sync_file
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PULL_MM, PlannedTrial
 
+TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
 SETTLED_S = 0.5  # a file whose size and time stay for so long has been written to its end
 STOP = ("q", "quit", "stop")
 
@@ -58,8 +65,11 @@ class Turn:
 class OwnInstruments:
     """`AskedInstruments` that are worked by whoever is at `desk`; `watch` is the folder of their files, if any."""
 
-    def __init__(self, desk: Desk, watch: Path | None = None) -> None:
-        self._desk, self._watch = desk, watch
+    def __init__(
+        self, desk: Desk, watch: Path | None = None, exports: Mapping[str, Export] = MappingProxyType({})
+    ) -> None:
+        self._desk, self._watch, self._exports = desk, watch, exports
+        self._told: dict[Path, tuple] = {}
         self._turn: Turn | None = None
         self._kept: Path | None = None
         self._step = ""
@@ -86,7 +96,7 @@ class OwnInstruments:
 
     def start(self) -> None:
         """See Instruments."""
-        self._known = dict(self._signatures())
+        self._known, self._told = dict(self._signatures()), dict(self._alone())
         machine = on_machine(self._experiment)
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
@@ -131,12 +141,13 @@ class OwnInstruments:
             (f"to {self._watch} ", "") if self._watch is not None else ("", ", then type the path of the first")
         )
         name = Path(self._turn.planned.file).stem
-        channels = ", ".join(("time_s", *CHANNELS[self._experiment]))
-        self._ask(
-            "save",
-            f"Valves are off. Stop the recording and save it {where}as {name}.csv ({channels}) and {name}.sync.csv "
-            f"(sync_time_s){then}.",
-        )
+        export = self._export
+        if export is None:
+            what = f"{name}.csv ({', '.join(('time_s', *CHANNELS[self._experiment]))})"
+        else:
+            what = f"{name}, as [instrument.{export.name}] declares it,"
+        sync = f" and {name}.sync.csv (sync_time_s)" if self._needs_sync_file else ""
+        self._ask("save", f"Valves are off. Stop the recording and save it {where}as {what}{sync}{then}.")
 
     def stop(self) -> dict[str, np.ndarray]:
         """See Instruments; {} where the recording was broken off."""
@@ -147,24 +158,85 @@ class OwnInstruments:
         if self._record is None:
             return
         folder.mkdir(parents=True, exist_ok=True)
-        target = folder / self._turn.planned.file
+        target = (folder / self._turn.planned.file).with_suffix(self._record[0].suffix)
         shutil.copyfile(self._record[0], target)
-        shutil.copyfile(sync_file(self._record[0]), sync_file(target))
+        if self._needs_sync_file:
+            shutil.copyfile(sync_file(self._record[0]), target.with_suffix(".sync.csv"))
+
+    @property
+    def _export(self) -> Export | None:
+        """How the instrument of this experiment writes its files."""
+        return self._exports.get(ROLES[self._experiment])
+
+    @property
+    def _needs_sync_file(self) -> bool:
+        return self._export is None or self._export.needs_sync_file
 
     def _ask(self, step: str, text: str) -> None:
         self._step = step
         self._desk.ask(step, text, self._turn.told())
 
+    def _files(self) -> list[Path]:
+        """What lies in the watched folder and below, without what is bifa's or an operating system's."""
+        if self._watch is None:
+            return []
+        found = (path for path in self._watch.rglob("*") if path.name not in (ASKS, ANSWER))
+        return sorted(path for path in found if not is_stray(path.name) and path.is_file())
+
     def _signatures(self):
-        for path in sorted(self._watch.glob("*.csv")) if self._watch is not None else ():
-            if not path.name.endswith(".sync.csv") and (sync := sync_file(path)).exists():
-                try:
-                    yield path, tuple((s.st_mtime_ns, s.st_size) for s in (path.stat(), sync.stat()))
-                except FileNotFoundError:  # gone meanwhile
+        """Records with all that belongs to them."""
+        for path in self._files():
+            if not _is_sync(path) and path.suffix.lower() in self._suffixes:
+                sync = sync_file(path)
+                if self._needs_sync_file and not sync.exists():
                     continue
+                with contextlib.suppress(FileNotFoundError):  # gone meanwhile
+                    parts = (path, sync) if self._needs_sync_file else (path,)
+                    yield path, tuple(_signature(part) for part in parts)
+
+    def _alone(self):
+        """Files of which no record can be made yet, or at all."""
+        whole = {path for path, _ in self._signatures()}
+        whole |= {sync_file(path) for path in whole}
+        for path in self._files():
+            if path not in whole:
+                with contextlib.suppress(FileNotFoundError):
+                    yield path, _signature(path)
+
+    @property
+    def _suffixes(self) -> tuple[str, ...]:
+        """What the name of a record may end with."""
+        if self._export is None:
+            return (".csv",)
+        return (".xlsx",) if self._export.form.format == "xlsx" else TEXT_SUFFIXES
+
+    def _tell_of_others(self) -> None:
+        """What has come and cannot be used, once for each version of it."""
+        for path, signature in self._alone():
+            if self._told.get(path) == signature:
+                continue
+            before, since_s = self._seen.get(path, (None, 0.0))
+            if before != signature:
+                self._seen[path] = (signature, time.monotonic())
+            elif time.monotonic() - since_s >= SETTLED_S:
+                self._told[path] = signature
+                self._desk.say(self._why_not(path))
+
+    def _why_not(self, path: Path) -> str:
+        if _is_sync(path):
+            return f"{path} is there; the record that it belongs to is not, yet: save that, too."
+        if path.suffix.lower() in self._suffixes:
+            return f"{path} is there; {sync_file(path).name} (sync_time_s), beside it, is not, yet: save that, too."
+        role = ROLES[self._experiment]
+        kinds = ", ".join(self._suffixes)
+        return (
+            f"{path} is there, but a record of the {role} ends with {kinds}: save it as such, or declare with "
+            f"`bifa instrument {path.name}` how the {role} writes its files."
+        )
 
     def _take_new(self) -> bool:
         """Take the file that has come since the start, once it is whole; what cannot be used is said, once."""
+        self._tell_of_others()
         for path, signature in self._signatures():
             if self._known.get(path) == signature:
                 continue
@@ -187,13 +259,13 @@ class OwnInstruments:
         except (OSError, RuntimeError, ValueError):  # too long a name, a user who is not known
             there = False
         if not answer or not there:
-            self._desk.say(f"There is no file {answer!r}. Type the path of the CSV, or q to stop.")
+            self._desk.say(f"There is no file {answer!r}. Type the path of the record, or q to stop.")
             return False
         return self._take(path)
 
     def _take(self, path: Path) -> bool:
         try:
-            columns, edges = read_instrument(path, CHANNELS[self._experiment])
+            columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
             self._refuse_earlier(path)
         except InstrumentFileError as error:
             self._desk.say(f"{error}. Correct it and save it again.")
@@ -204,10 +276,20 @@ class OwnInstruments:
 
     def _refuse_earlier(self, path: Path) -> None:
         """A file that an earlier trial was kept with: somebody saved or named the wrong one."""
-        data = path.read_bytes()
-        for old in sorted(self._kept.glob("*.csv")) if self._kept is not None else ():
-            if old.name != self._turn.planned.file and old.read_bytes() == data:
+        data, own = path.read_bytes(), Path(self._turn.planned.file).stem
+        for old in sorted(self._kept.glob("*")) if self._kept is not None else ():
+            if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:
                 raise InstrumentFileError(f"{path} is the record of an earlier trial, {old.name}")
+
+
+def _is_sync(path: Path) -> bool:
+    return path.name.lower().endswith(".sync.csv")
+
+
+def _signature(path: Path) -> tuple[int, int]:
+    """What changes while a file is written."""
+    stat = path.stat()
+    return stat.st_mtime_ns, stat.st_size
 
 
 def on_machine(experiment: str) -> bool:

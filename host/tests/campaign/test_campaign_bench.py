@@ -54,7 +54,7 @@ def test_known_values_are_asked_once_and_kept(tmp_path):
     [
         ("[known]\nhead_mass_kg = 50.0\n", "outside its range"),
         ("[known]\nweight = 1.0\n", "no parameter 'weight'"),
-        ("head_mass_kg = 0.2\n", r"one table, \[known\]"),
+        ("head_mass_kg = 0.2\n", r"has the tables \[known\]"),
         ("[known\n", "cannot read"),
     ],
 )

@@ -1,0 +1,304 @@
+"""How an instrument writes its files, declared once: read as they come, in the data set's own names and units.
+
+```toml
+[instrument.machine]
+preset = "bluehill"             # of bifa/data/presets; what stands below takes its place
+columns = { displacement_mm = "Extension", force_N = "Load" }
+units = { force_N = "kN" }      # of the file
+sign = { force_N = -1 }
+```
+
+What is declared is read, and nothing is guessed: a column under another name needs its unit, and where the file has a
+row of units it has to say the same.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .clocks import DATE, FRAME, SECONDS, dated, first_that_is_none, zone_of
+from .fields import Fields
+from .layout import EXPERIMENTS, is_command
+from .sheet import SEPARATORS, Form, Sheet, listed
+
+MACHINE, CAMERA = "machine", "camera"
+ROLES = {"static_loading": MACHINE, "anchor_pull": MACHINE, "step_response": CAMERA, "locomotion": CAMERA}
+_LENGTHS = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "in": 25.4, "um": 1e-3}
+_FORCES = {"N": 1.0, "kN": 1000.0, "mN": 1e-3, "lbf": 4.4482216152605, "kgf": 9.80665, "gf": 9.80665e-3}
+_PRESSURES = {"psi": 1.0, "kPa": 0.1450377377, "bar": 14.50377377, "mbar": 0.01450377377, "MPa": 145.0377377}
+UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": SECONDS}  # by what a column's name ends with
+_SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", "inch": "in", "lb": "lbf", "volts": "v"}
+_SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
+_FORM_KEYS = ("separator", "decimal", "encoding", "skip_rows", "header", "header_rows", "units_rows", "sheet")
+_KEYS = ("preset", "format", *_FORM_KEYS, "columns", "units", "factor", "sign", "rate_hz", "date_format", "zone")
+_OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
+_SYNC_FILE, _SYNC_FRAMES = "file", "frames"
+_THRESHOLD = 2.5  # V, of a strobe of 5 V
+SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
+
+
+@dataclass(frozen=True)
+class Export:
+    """What is declared of an instrument's files. `columns`: the export's own names, by the data set's; `units`,
+    `factor` and `sign` likewise; `where`: values of other columns in the rows that count; `sync`: "file" (beside it),
+    "frames" (every row was exposed at a strobe), or the name of the column in which the strobe was sampled."""
+
+    name: str
+    form: Form
+    columns: Mapping[str, str]
+    units: Mapping[str, str] = field(default_factory=dict)
+    factor: Mapping[str, float] = field(default_factory=dict)
+    sign: Mapping[str, int] = field(default_factory=dict)
+    where: Mapping[str, Any] = field(default_factory=dict)
+    rate_hz: float | None = None
+    date_format: str | None = None
+    zone: str | None = None
+    sync: str = _SYNC_FILE
+    threshold: float = _THRESHOLD
+
+    @property
+    def needs_sync_file(self) -> bool:
+        """Whether the strobe's edges stand in a file of their own."""
+        return self.sync == _SYNC_FILE
+
+
+OWN_NAMES = Export("", Form(), {})
+
+
+def read_export(
+    path: Path, export: Export, wanted: Iterable[str], optional: Iterable[str] = (), file: str | None = None
+) -> tuple[dict[str, np.ndarray], Sheet, np.ndarray]:
+    """Columns of a file by the data set's names and in its units, NaN where a cell is empty; the sheet, and which of
+    its rows these are. Raises DatasetError naming file, line, column and cell."""
+    sheet = Sheet(path, export.form, file)
+    rows = _rows(sheet, export)
+    columns = {}
+    for name in wanted:
+        columns[name] = _column(sheet, export, name)[rows]
+    for name in optional:
+        if name in export.columns or _has(sheet, name):
+            columns[name] = _column(sheet, export, name)[rows]
+    return columns, sheet, rows
+
+
+def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray) -> np.ndarray:
+    """When the strobe rose, by the record's own clock [s]; shape (edges,)."""
+    time_s = columns["time_s"]
+    if export.sync == _SYNC_FRAMES:
+        return time_s
+    level = sheet.numbers(sheet.find(export.sync), export.sync)[rows]
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else np.inf
+    if step_s > SLOWEST_SYNC_S:
+        raise sheet.error(
+            f"{export.sync} was sampled every {1e3 * step_s:.3g} ms: the strobe is high for 2.6 ms, so that it needs "
+            f"{1.0 / SLOWEST_SYNC_S:.0f} samples a second; sample it faster, or have its edges stamped in a sync file"
+        )
+    high = level > export.threshold
+    return time_s[1:][high[1:] & ~high[:-1]]
+
+
+def _rows(sheet: Sheet, export: Export) -> np.ndarray:
+    keep = np.ones(len(sheet), bool)
+    for name, value in export.where.items():
+        cells = sheet.cells(sheet.find(name))
+        keep &= np.array([_same(cell, value) for cell in cells], bool)
+    if export.where and not keep.any():
+        raise sheet.error(f"no row has {', '.join(f'{name} = {value!r}' for name, value in export.where.items())}")
+    return np.flatnonzero(keep)
+
+
+def _same(cell: str, value: Any) -> bool:
+    try:
+        return float(cell) == value if not isinstance(value, str) else cell.strip() == value
+    except ValueError:
+        return False
+
+
+def _has(sheet: Sheet, name: str) -> bool:
+    return name in sheet.labels()
+
+
+def _column(sheet: Sheet, export: Export, name: str) -> np.ndarray:
+    source = export.columns.get(name, name)
+    unit = export.units.get(name)
+    if unit == DATE:
+        return _dates(sheet, export, source)
+    place = sheet.find(source)
+    _refuse_other_unit(sheet, place, name, unit)
+    values = sheet.numbers(place, source)
+    return values * _scale(export, name)
+
+
+def _scale(export: Export, name: str) -> float:
+    unit = export.units.get(name)
+    size = 1.0 / export.rate_hz if unit == FRAME else _sizes(name).get(unit, 1.0)
+    return size * export.factor.get(name, 1.0) * export.sign.get(name, 1)
+
+
+def _dates(sheet: Sheet, export: Export, source: str) -> np.ndarray:
+    """Of one column, or of several that make one date together ("Date + Time")."""
+    parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
+    cells = [" ".join(part) for part in zip(*parts, strict=True)]
+    zone = zone_of(export.zone) if export.zone else None
+    if (row := first_that_is_none(cells, export.date_format, zone)) is not None:
+        form = f"of the form {export.date_format!r}" if export.date_format else "as ISO 8601 writes it"
+        raise sheet.error(f"{cells[row]!r} is no date {form}", row, source)
+    return dated(cells, export.date_format, zone)
+
+
+def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
+    """Where the file has rows of units, they and the declaration agree."""
+    told = unit_in(sheet.units[place] or sheet.names[place][-1])
+    if told and unit and unit in _sizes(name) and told != unit and told in {u for s in UNITS.values() for u in s}:
+        raise sheet.error(
+            f"the file says {told}, and units.{name} is declared as {unit}: correct the declaration",
+            -1,
+            sheet.labels()[place],
+        )
+
+
+def unit_in(text: str) -> str | None:
+    """The unit that a name or a row of units ends with, in brackets or alone; None where there is none."""
+    found = re.search(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$", text)
+    word = (found[1] if found else text).strip()
+    word = _SPELT.get(word.lower(), word)
+    known = {unit for sizes in UNITS.values() for unit in sizes}
+    return word if word in known else None
+
+
+def _sizes(name: str) -> Mapping[str, float]:
+    return UNITS.get(name.rsplit("_", 1)[-1], {})
+
+
+# -- the declaration ------------------------------------------------------------------------------------------------
+
+
+def parse_export(fields: Fields, name: str) -> Export:
+    """The declaration in a table; DatasetError, with its line, for what is unknown, missing or out of range."""
+    given = dict(_preset(fields)) if "preset" in fields else {}
+    own = {key: fields.take(key) for key in (*_KEYS[1:], "where", "sync") if key in fields}
+    fields.finish(also=(*_KEYS, "where", "sync"))
+    for key in ("columns", "units", "factor", "sign", "where"):
+        if not isinstance(own.get(key, {}), dict):
+            raise fields.error(key, "must be a table")
+        merged = given.get(key, {}) | own.get(key, {})
+        own[key] = merged
+    given |= own
+    export = _export(fields, name, given)
+    _check_columns(fields, export)
+    return export
+
+
+def _export(fields: Fields, name: str, given: dict[str, Any]) -> Export:
+    form = _form(fields, given)
+    sync, threshold = given.get("sync", _SYNC_FILE), _THRESHOLD
+    if isinstance(sync, dict):
+        threshold, sync = sync.get("threshold", _THRESHOLD), sync.get("column")
+        if not isinstance(sync, str) or not isinstance(threshold, int | float):
+            raise fields.error("sync", 'must be "file", "frames" or { column = "NAME", threshold = 2.5 }')
+    elif sync not in (_SYNC_FILE, _SYNC_FRAMES):
+        raise fields.error("sync", 'must be "file", "frames" or { column = "NAME", threshold = 2.5 }')
+    for key, kind in (("rate_hz", int | float), ("date_format", str), ("zone", str)):
+        if key in given and (isinstance(given[key], bool) or not isinstance(given[key], kind)):
+            raise fields.error(key, f"must be {'a number' if key == 'rate_hz' else 'a string'}")
+    rate_hz = given.get("rate_hz")
+    if rate_hz is not None and not 0.0 < rate_hz < 1e6:
+        raise fields.error("rate_hz", f"{rate_hz:g} is not a rate")
+    try:
+        if "zone" in given:
+            zone_of(given["zone"])
+    except ValueError as error:
+        raise fields.error("zone", str(error)) from None
+    tables = {key: given[key] for key in ("columns", "units", "factor", "sign", "where")}
+    rest = {key: given.get(key) for key in ("date_format", "zone")}
+    return Export(name, form, **tables, **rest, rate_hz=rate_hz, sync=sync, threshold=float(threshold))
+
+
+def _form(fields: Fields, given: Mapping[str, Any]) -> Form:
+    how: dict[str, Any] = {"format": given.get("format", "csv")}
+    if how["format"] not in ("csv", "xlsx"):
+        raise fields.error("format", "must be csv or xlsx")
+    for key in _FORM_KEYS:
+        if key not in given:
+            continue
+        value = given[key]
+        whole = key in ("skip_rows", "header_rows", "units_rows")
+        if isinstance(value, bool) or not isinstance(value, int if whole else str):
+            raise fields.error(key, f"must be {'a whole number' if whole else 'a string'}")
+        if whole and not (key == "header_rows") <= value < 10_000:
+            raise fields.error(key, f"{value} is outside {int(key == 'header_rows')} to 9999")
+        how[key] = value
+    how["separator"] = SEPARATORS.get(how.get("separator", ","), how.get("separator", ","))
+    if how["separator"] not in SEPARATORS.values():
+        raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
+    if how.get("decimal", ".") not in (".", ",") or how.get("decimal") == how["separator"]:
+        raise fields.error("decimal", 'must be "." or ",", and another than the separator')
+    try:
+        "".encode(how.get("encoding", "utf-8"))
+    except LookupError:
+        raise fields.error("encoding", f"{how['encoding']!r} is unknown; utf-8, cp1252, latin-1, utf-16 ...") from None
+    return Form(**how)
+
+
+def _check_columns(fields: Fields, export: Export) -> None:
+    for key in ("columns", "units", "factor", "sign"):
+        for name, value in getattr(export, key).items():
+            if name not in _OWN:
+                raise fields.error(key, f"{name} is no column of the data set; there are {listed(sorted(_OWN))}")
+            _check_value(fields, export, key, name, value)
+    for name in export.columns:
+        if not is_command(name) and name not in export.units and name not in export.factor:
+            allowed = " | ".join([*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())])
+            raise fields.error("units", f"{name} has none: say in which unit the file has it ({allowed}), or a factor")
+
+
+def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any) -> None:
+    if key == "columns" and not (isinstance(value, str) and value.strip()):
+        raise fields.error(key, f"{name} must be the export's own name of the column, a string")
+    if key == "factor" and (isinstance(value, bool) or not isinstance(value, int | float) or not value):
+        raise fields.error(key, f"{name} must be a number other than 0")
+    if key == "sign" and (value not in (1, -1) or isinstance(value, bool)):
+        raise fields.error(key, f"{name} must be 1 or -1")
+    if key == "units":
+        allowed = [*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())]
+        if value not in allowed:
+            raise fields.error(key, f"{name} is {value!r}; it must be one of {', '.join(allowed)}")
+        if value == FRAME and export.rate_hz is None:
+            raise fields.error("rate_hz", "must be given, in frames a second, where time_s counts frames")
+
+
+def _preset(fields: Fields) -> Mapping[str, Any]:
+    name = fields.text("preset")
+    if name not in presets():
+        raise fields.error("preset", f"{name!r} is unknown; there are {', '.join(presets())}")
+    return {key: value for key, value in presets()[name].items() if key in (*_KEYS, "where", "sync")}
+
+
+@cache
+def presets() -> dict[str, dict[str, Any]]:
+    """The declarations that ship with bifa, by name: one file each."""
+    folder = files("bifa.data") / "presets"
+    found = {Path(file.name).stem: tomllib.loads(file.read_text("utf-8")) for file in folder.iterdir()}
+    return dict(sorted(found.items()))
+
+
+def parse_exports(fields: Fields, source: Any) -> dict[str, Export]:
+    """The tables [instrument.machine] and [instrument.camera], by these names."""
+    declared = {}
+    for role in (MACHINE, CAMERA):
+        if role in fields:
+            declared[role] = parse_export(Fields(fields.take(role), source, table=f"instrument.{role}"), role)
+    for name in fields.remaining():
+        raise fields.error(
+            name, f"must be {MACHINE} (static loadings, pulls) or {CAMERA} (steps, walks): whose files they are"
+        )
+    return declared

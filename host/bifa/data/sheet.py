@@ -1,0 +1,341 @@
+"""The one desk for tables that programs write: which cells there are, by what names, and what number stands in each.
+
+pandas reads; whatever it cannot read as plain numbers is gone through cell by cell, so that the first fault is named by
+line, column and cell. Nothing is guessed: how the file is written says its `Form`.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lacuna.decimals import BLANKS, decimal, number
+
+from .errors import DatasetError
+
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+_NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
+_HEAD = 1 << 18  # bytes in which a header has to be found
+_MOST_NAMED = 8
+NUMERIC_BYTES = b"0123456789+-.eE, \t\r\n"
+
+
+@dataclass(frozen=True)
+class Form:
+    """How a file is written. The names of columns stand in `header_rows` rows, from `skip_rows` on, or, where `header`
+    is given, in those that end with the line that begins with this text; below them `units_rows` rows that are no data.
+    `encoding` is Python's name of it. `sheet` is of a workbook."""
+
+    format: str = "csv"
+    separator: str = ","
+    decimal: str = "."
+    encoding: str = "utf-8"
+    skip_rows: int = 0
+    header: str | None = None
+    header_rows: int = 1
+    units_rows: int = 0
+    sheet: str | None = None
+
+
+OWN = Form()
+
+
+def fast_numbers(path: Path, skip: int, width: int) -> np.ndarray | None:
+    """Numbers of shape (rows, width) below the first `skip` bytes of a file in the data set's own form, or None where
+    pandas cannot have read every cell."""
+    import pandas
+
+    with path.open("rb") as file:
+        file.seek(skip)
+        for block in iter(lambda: file.read(1 << 20), b""):
+            if block.translate(None, NUMERIC_BYTES):
+                return None
+        file.seek(skip)
+        try:
+            frame = pandas.read_csv(
+                file,
+                header=None,
+                skip_blank_lines=False,
+                keep_default_na=False,
+                dtype=float,
+                **_exact(),
+            )
+        except (ValueError, pandas.errors.ParserError, OverflowError):
+            return None
+    values = frame.to_numpy()
+    return values if values.shape[1] == width and np.isfinite(values).all() else None
+
+
+class Sheet:
+    """A table as it was written. `names`: the parts of each column's name, one a header row; `units`: what the rows of
+    units say of it; `first`: the line of the first row of numbers. Raises DatasetError for what is no table."""
+
+    def __init__(self, path: Path, form: Form = OWN, file: str | None = None) -> None:
+        self._path, self._form, self.file = path, form, str(path) if file is None else file
+        self._encoding = codecs.lookup(form.encoding).name.removesuffix("-sig")
+        heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()
+        header, units = heads[: len(heads) - form.units_rows], heads[len(heads) - form.units_rows :]
+        width = max([len(row) for row in heads], default=0)
+        self.names = [_parts(header, place) for place in range(width)]
+        self.units = [" ".join(_parts(units, place)) for place in range(width)]
+        self._refuse_twice()
+
+    # -- reading ---------------------------------------------------------------------------------------------------
+
+    def _raw(self) -> bytes:
+        try:
+            return self._path.read_bytes()
+        except OSError as error:
+            raise self._error(f"cannot be read ({error.strerror})") from None
+
+    def _text(self) -> tuple[list[list[str]], Any]:
+        raw = self._raw()
+        if self._encoding.startswith(("utf-16", "utf-32")):
+            raw, self._encoding = self._decoded(raw).encode(), "utf-8"
+        elif self._encoding == "utf-8":
+            raw = raw.removeprefix(codecs.BOM_UTF8)  # a spreadsheet begins its files with a mark
+        if b"\r" in raw[:_HEAD] and b"\n" not in raw[:_HEAD]:
+            raw = raw.replace(b"\r", b"\n")
+        lines = raw[:_HEAD].split(b"\n")
+        begin = self._first_head([line.decode(self._encoding, "replace") for line in lines])
+        count = self._form.header_rows + self._form.units_rows
+        self.first = begin + count + 1
+        heads = [self._cells(self._decoded(line)) for line in lines[begin : begin + count]]
+        offset = sum(len(line) + 1 for line in lines[: begin + count])
+        return heads, raw[offset:]
+
+    def _decoded(self, raw: bytes) -> str:
+        encoding = self._encoding
+        try:
+            return raw.decode(encoding).removeprefix("\ufeff")
+        except UnicodeDecodeError as error:
+            whole = self._raw()
+            at = whole.find(raw) + error.start
+            name = {"utf-8": "UTF-8"}.get(encoding, encoding)
+            raise self._error(
+                f"byte 0x{raw[error.start]:02x} is not {name}; save the file as UTF-8 text, or declare its encoding"
+                ' (encoding = "cp1252", "utf-16" ...)',
+                whole.count(b"\n", 0, at) + 1,
+            ) from None
+
+    def _first_head(self, lines: Sequence[str]) -> int:
+        form = self._form
+        if form.header is None:
+            return form.skip_rows
+        for place, line in enumerate(lines):
+            cells = self._cells(line) if place >= form.skip_rows and form.header in line else []
+            if cells and cells[0].strip() == form.header and place + 1 >= form.header_rows:
+                return place - form.header_rows + 1
+        raise self._error(f"no line begins with {form.header!r}, where the names of the columns should stand")
+
+    def _cells(self, line: str) -> list[str]:
+        if self._form.separator == " ":
+            return line.split()
+        try:
+            return next(csv.reader([line.rstrip("\r")], delimiter=self._form.separator, skipinitialspace=True), [])
+        except csv.Error as error:
+            raise self._error(f"cannot be read as a CSV: {error}") from None
+
+    def _workbook(self) -> tuple[list[list[str]], Any]:
+        import pandas
+
+        try:
+            frame = pandas.read_excel(self._path, sheet_name=self._form.sheet or 0, header=None, engine="openpyxl")
+        except Exception as error:  # openpyxl's own, and zipfile's
+            raise self._error(f"cannot be read as a workbook (.xlsx): {error}") from None
+        rows = [["" if value != value or value is None else str(value) for value in row] for row in frame.values]
+        begin = self._first_head([self._form.separator.join(row) for row in rows])
+        count = self._form.header_rows + self._form.units_rows
+        self.first = begin + count + 1
+        return rows[begin : begin + count], frame.iloc[begin + count :].reset_index(drop=True)
+
+    @cached_property
+    def _frame(self) -> Any:
+        """Columns by their place; numbers where pandas could read all of a column as such."""
+        frame = self._rows if self._form.format == "xlsx" else self._parsed()
+        width = len(self.names)
+        if frame.shape[1] > width:
+            beyond = frame.iloc[:, width:].notna().to_numpy().any(axis=1)
+            if beyond.any():
+                self._refuse_beyond(int(np.flatnonzero(beyond)[0]))
+        empty = frame.isna().to_numpy().all(axis=1)
+        last = len(frame) - int(np.argmin(empty[::-1])) if len(frame) and not empty.all() else 0
+        return frame.iloc[:last]
+
+    def _parsed(self, **how: Any) -> Any:
+        import pandas
+
+        how = {
+            "header": None,
+            "sep": r"\s+" if self._form.separator == " " else self._form.separator,
+            "decimal": self._form.decimal,
+            "encoding": self._encoding,
+            "skip_blank_lines": False,
+            "skipinitialspace": True,
+            "keep_default_na": False,
+            "na_values": [""],
+            **_exact(),
+            **how,
+        }
+        try:
+            return pandas.read_csv(io.BytesIO(self._rows), **how)
+        except pandas.errors.EmptyDataError:
+            return pandas.DataFrame(index=range(0), columns=range(len(self.names)), dtype=float)
+        except pandas.errors.ParserError:
+            lines = self._rows.split(b"\n")
+            cells = [len(self._cells(self._decoded(line))) for line in lines]
+            return pandas.read_csv(io.BytesIO(self._rows), **how, names=range(max(cells)))
+        except UnicodeDecodeError:
+            self._decoded(self._rows)
+            raise
+
+    # -- names -----------------------------------------------------------------------------------------------------
+
+    def _refuse_twice(self) -> None:
+        """Only of one row of names: with several, each is found by its own."""
+        if self._form.separator != " " and self._form.format == "csv" and len(self.names) == 1 and self.names[0]:
+            for mark in set(_NAMES_OF) - {" ", self._form.separator}:
+                if mark in self.names[0][0]:
+                    raise self._error(
+                        f"its columns are separated by {_NAMES_OF[mark]}; save it with commas between columns, points "
+                        "in numbers, or declare how it is written (bifa instrument)"
+                    )
+
+    def labels(self) -> list[str]:
+        """What each column is called, the parts of its name together."""
+        return [" / ".join(parts) for parts in self.names]
+
+    def listed(self) -> str:
+        """The first names, and how many more there are."""
+        return listed(label for label in self.labels() if label)
+
+    def find(self, name: str) -> int:
+        """The place of the column of this name: of some of its parts, in order, and "X [2]" the second of that name.
+        DatasetError where there is none, or several."""
+        bare, _, which = name.removesuffix("]").rpartition(" [")
+        chosen = int(which) if name.endswith("]") and bare and which.isdecimal() else None
+        places = [place for place, parts in enumerate(self.names) if _is_called(parts, name)]
+        if not places and chosen is not None:
+            named = [place for place, parts in enumerate(self.names) if _is_called(parts, bare)]
+            places = named[chosen - 1 : chosen]
+        if not places:
+            raise self._error(f"lacks the column {name}; it has {self.listed() or 'none'}")
+        if len(places) > 1:
+            found = listed(self.labels()[place] for place in places)
+            raise self._error(
+                f"has the column {name} more than once ({found}): keep the right one, or write more of its name, or "
+                f'"{name} [1]" for the first'
+            )
+        return places[0]
+
+    # -- cells -----------------------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self._frame)
+
+    def line(self, row: int) -> int:
+        """The line of the file in which a row stands."""
+        return self.first + int(row)
+
+    def numbers(self, place: int, name: str) -> np.ndarray:
+        """A column, shape (rows,), NaN where a cell is empty. DatasetError where one is no number."""
+        if place >= self._frame.shape[1]:
+            return np.full(len(self), np.nan)
+        column = self._frame.iloc[:, place]
+        if column.dtype.kind in "fiu" and not (self._form.decimal == "," and b"." in self._rows):
+            return column.to_numpy(float)
+        return np.array([self._number(cell, row, name) for row, cell in enumerate(self.cells(place))], float)
+
+    def cells(self, place: int) -> list[str]:
+        """A column as it was written."""
+        if place >= self._frame.shape[1]:
+            return [""] * len(self)
+        if self._form.format == "xlsx":
+            return ["" if cell != cell or cell is None else str(cell) for cell in self._frame.iloc[:, place]]
+        column = self._parsed(usecols=[place], dtype=str).iloc[: len(self), 0]
+        return ["" if cell != cell else str(cell) for cell in column]
+
+    def is_text(self, place: int) -> bool:
+        """Whether no cell of a column is a number."""
+        if place < self._frame.shape[1] and self._frame.iloc[:, place].dtype.kind in "fiu":
+            return False
+        return not any(cell and number(cell) is not None for cell in self.cells(place))
+
+    def _number(self, cell: str, row: int, name: str) -> float:
+        mark = self._form.decimal
+        cell = cell.strip(BLANKS)
+        found = number(cell if mark == "." else cell.replace(".", " ").replace(mark, "."))
+        if found is None and cell:
+            comma = mark == "." and cell.count(",") == 1 and decimal(cell.replace(",", ".")) is not None
+            hint = '; a decimal comma? Write points, or declare decimal = ","' if comma else ""
+            raise self.error(f"{_shown(cell)} is not a number{hint}", row, name)
+        return np.nan if found is None else found
+
+    def error(self, problem: str, row: int | None = None, column: str | None = None) -> DatasetError:
+        """The error at a row of the data."""
+        return self._error(problem, None if row is None else self.line(row), column)
+
+    def _error(self, problem: str, line: int | None = None, column: str | None = None) -> DatasetError:
+        return DatasetError(problem, file=self.file, line=line, column=column)
+
+    def _refuse_beyond(self, row: int) -> None:
+        width = len(self.names)
+        cells = self._cells(self._rows.split(b"\n")[row].decode(errors="replace")) if self._form.format == "csv" else []
+        raise self.error(
+            f"{max(len(cells), width + 1)} fields, but {width} columns; are there commas in the numbers, or lines "
+            "above the names of the columns? Save it with decimal points and without them, or declare how it is "
+            "written (bifa instrument)",
+            row,
+        )
+
+
+def _exact() -> dict[str, str]:
+    """What makes pandas read a decimal as the nearest double; later versions do, and warn of being asked."""
+    import pandas
+
+    old = tuple(int(part) for part in pandas.__version__.split(".")[:2]) < (3, 1)
+    return {"float_precision": "round_trip"} if old else {}
+
+
+def listed(names: Iterable[str]) -> str:
+    """The first names, and how many more there are."""
+    names = list(names)
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return ", ".join(names[:_MOST_NAMED]) + more
+
+
+def _parts(rows: Sequence[Sequence[str]], place: int) -> tuple[str, ...]:
+    """Of a column's name, from top to bottom. Above the last row a name that spans several columns (a marker's, over
+    its X, Y and Z) stands in the first of them."""
+    found = [_cell(row, place) or _spanning(row, place) for row in rows[:-1]] + [_cell(row, place) for row in rows[-1:]]
+    return tuple(part for part in found if part)
+
+
+def _cell(row: Sequence[str], place: int) -> str:
+    return row[place].strip() if place < len(row) else ""
+
+
+def _spanning(row: Sequence[str], place: int) -> str:
+    """The name left of an empty cell, in a row that leaves out the first columns."""
+    before = [cell.strip() for cell in row[:place] if cell.strip()]
+    return before[-1] if before and not _cell(row, 0) else ""
+
+
+def _is_called(parts: Sequence[str], name: str) -> bool:
+    """Whether `name` is the parts, or some of them in order."""
+    if name == " / ".join(parts):
+        return True
+    rest = iter(parts)
+    return bool(parts) and all(any(wanted == part for part in rest) for wanted in name.split(" / "))
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")

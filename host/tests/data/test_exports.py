@@ -1,0 +1,303 @@
+"""Files as instruments write them: each named program by its preset, each key of a declaration, faults by cell."""
+
+import tempfile
+from contextlib import suppress
+from datetime import datetime, timedelta
+from pathlib import Path
+from zoneinfo import ZoneInfo
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bifa.data import DatasetError, read_dataset
+from bifa.data.export import parse_exports, presets, read_export, sync_edges, unit_in
+from bifa.data.fields import Fields, Source
+from bifa.data.write import add_trial
+from bifa.toml import parse_toml
+from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
+
+TIME_S = np.round(np.arange(0.0, 2.0, 0.01), 6)
+RECORD = {
+    "time_s": TIME_S,
+    "displacement_mm": np.round(20.0 * np.sin(3.0 * TIME_S), 3),
+    "displacement_head_mm": np.round(20.0 * np.sin(3.0 * TIME_S), 3),
+    "displacement_tail_mm": np.round(5.0 * np.cos(3.0 * TIME_S), 3),
+    "force_N": np.round(-30.0 * np.cos(TIME_S), 3),
+}
+MACHINE = ("time_s", "displacement_mm", "force_N")
+
+
+def declared(text, role="machine"):
+    source = Source(text, 0, "bench.toml")
+    return parse_exports(Fields(parse_toml(text)["instrument"], source, table="instrument"), source)[role]
+
+
+def by_preset(name, role, more=""):
+    return declared(f'[instrument.{role}]\npreset = "{preset_of(name)}"\n{more}', role)
+
+
+def written(folder, name, record):
+    path = folder / f"trial{EXPORTS[name].suffix}"
+    path.write_bytes(EXPORTS[name].write(record))
+    return path
+
+
+def test_every_preset_has_an_export_here_that_it_reads():
+    assert {preset_of(name) for name in EXPORTS} == set(presets())
+    assert all(preset["program"] for preset in presets().values())
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_testing_machines_export_comes_in_by_its_preset(tmp_path, name):
+    record = {key: RECORD[key] for key in MACHINE}
+    found, _, _ = read_export(written(tmp_path, name, record), by_preset(name, "machine"), MACHINE)
+    for key in MACHINE:
+        np.testing.assert_allclose(found[key], record[key], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_cameras_export_comes_in_by_its_preset(tmp_path, name):
+    for wanted in ("displacement_mm", "displacement_head_mm"):
+        tail = ("displacement_tail_mm",) if wanted == "displacement_head_mm" and name in ("qualisys", "vicon") else ()
+        record = {key: RECORD[key] for key in ("time_s", wanted, *tail)}
+        path, export = written(tmp_path, name, record), by_preset(name, "camera")
+        found, sheet, rows = read_export(path, export, ("time_s", wanted, *tail))
+        assert len(rows) == len(TIME_S)
+        np.testing.assert_allclose(found["time_s"] - found["time_s"][0], TIME_S, atol=1e-6)
+        for key in (wanted, *tail):
+            np.testing.assert_allclose(found[key], record[key], atol=1e-3)
+        assert path.read_bytes().split(b"\n")[sheet.line(rows[0]) - 1]
+
+
+SIMPLE = """[instrument.machine]
+columns = { time_s = "t", displacement_mm = "x", force_N = "F" }
+units = { time_s = "s", displacement_mm = "mm", force_N = "N" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("units", "factors"),
+    [
+        ({"time_s": "ms", "displacement_mm": "cm", "force_N": "kN"}, (1e-3, 10.0, 1000.0)),
+        ({"time_s": "us", "displacement_mm": "m", "force_N": "lbf"}, (1e-6, 1000.0, 4.4482216)),
+        ({"time_s": "min", "displacement_mm": "in", "force_N": "kgf"}, (60.0, 25.4, 9.80665)),
+    ],
+)
+def test_units_factors_and_signs_of_the_file_are_converted(tmp_path, units, factors):
+    (tmp_path / "a.csv").write_text("t,x,F\n1,2,3\n4,5,6\n")
+    text = SIMPLE.replace('"s"', f'"{units["time_s"]}"').replace('"mm"', f'"{units["displacement_mm"]}"')
+    text = (
+        text.replace('"N"', f'"{units["force_N"]}"') + "sign = { force_N = -1 }\nfactor = { displacement_mm = 0.5 }\n"
+    )
+    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    time_s, x, force = factors
+    np.testing.assert_allclose(found["time_s"], np.array([1.0, 4.0]) * time_s)
+    np.testing.assert_allclose(found["displacement_mm"], np.array([2.0, 5.0]) * x * 0.5)
+    np.testing.assert_allclose(found["force_N"], np.array([-3.0, -6.0]) * force, rtol=1e-7)
+
+
+@pytest.mark.parametrize("zone", ["Europe/Berlin", "America/New_York", "UTC"])
+@pytest.mark.parametrize("form", [None, "%d.%m.%Y %H:%M:%S.%f"])
+def test_dates_are_read_as_the_moments_that_they_are(tmp_path, zone, form):
+    """Across the hour in which clocks are put back."""
+    begin = datetime(2026, 10, 25, 0, 59, 59, tzinfo=ZoneInfo("UTC"))
+    moments = [begin + timedelta(milliseconds=250 * k) for k in range(8)]
+    told = [m.isoformat() if form is None else m.astimezone(ZoneInfo("UTC")).strftime(form) for m in moments]
+    text = SIMPLE.replace('time_s = "s"', 'time_s = "date"') + (
+        f'date_format = "{form}"\nzone = "UTC"\n' if form else ""
+    )
+    (tmp_path / "a.csv").write_text("t,x,F\n" + "".join(f"{t},1,2\n" for t in told))
+    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    np.testing.assert_allclose(found["time_s"], 0.25 * np.arange(8))
+    local = [moment.astimezone(ZoneInfo(zone)).isoformat() for moment in moments]
+    (tmp_path / "a.csv").write_text("t,x,F\n" + "".join(f"{t},1,2\n" for t in local))
+    found, _, _ = read_export(tmp_path / "a.csv", declared(SIMPLE.replace('time_s = "s"', 'time_s = "date"')), MACHINE)
+    np.testing.assert_allclose(found["time_s"], 0.25 * np.arange(8))
+
+
+def test_a_date_in_two_columns_and_one_that_is_none(tmp_path):
+    text = SIMPLE.replace('"t"', '"Date + Time"').replace('time_s = "s"', 'time_s = "date"')
+    text += 'date_format = "%Y/%m/%d %H:%M:%S.%f"\n'
+    (tmp_path / "a.csv").write_text("Date,Time,x,F\n2026/11/25,10:00:00.5,1,2\n2026/11/25,10:00:01.0,1,2\n")
+    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    assert found["time_s"].tolist() == [0.0, 0.5]
+    (tmp_path / "a.csv").write_text("Date,Time,x,F\n2026/11/25,10:00:00.5,1,2\n25.11.2026,10:00:01.0,1,2\n")
+    with pytest.raises(
+        DatasetError, match=r"line 3, column Date \+ Time: '25\.11\.2026 10:00:01\.0' is no date of the"
+    ):
+        read_export(tmp_path / "a.csv", declared(text), MACHINE)
+
+
+def test_the_strobe_may_be_a_column_or_clock_every_frame(tmp_path):
+    time_s = np.arange(0.0, 1.0, 0.001)
+    volts = np.where(np.arange(1000) % 10 < 3, 5.0, 0.1)
+    rows = "".join(f"{t:.3f},0,0,{v}\n" for t, v in zip(time_s, volts, strict=True))
+    (tmp_path / "a.csv").write_text("t,x,F,strobe\n" + rows)
+    export = declared(SIMPLE + 'sync = { column = "strobe", threshold = 2.5 }\n')
+    assert not export.needs_sync_file
+    edges = sync_edges(export, *read_export(tmp_path / "a.csv", export, MACHINE))
+    np.testing.assert_allclose(edges, np.arange(0.01, 1.0, 0.01), atol=1e-9)
+    slow = "".join(f"{t:.3f},0,0,0\n" for t in time_s[::10])
+    (tmp_path / "a.csv").write_text("t,x,F,strobe\n" + slow)
+    with pytest.raises(DatasetError, match=r"strobe was sampled every 10 ms.*500 samples a second"):
+        sync_edges(export, *read_export(tmp_path / "a.csv", export, MACHINE))
+    export = declared(SIMPLE + 'sync = "frames"\n')
+    edges = sync_edges(export, *read_export(tmp_path / "a.csv", export, MACHINE))
+    np.testing.assert_allclose(edges, time_s[::10])
+
+
+def test_a_workbook_comes_in(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    table = pandas.DataFrame({"t": TIME_S, "x": RECORD["displacement_mm"], "F": RECORD["force_N"]})
+    table.to_excel(tmp_path / "a.xlsx", sheet_name="data", index=False, startrow=2)
+    export = declared(SIMPLE + 'format = "xlsx"\nskip_rows = 2\nsheet = "data"\n')
+    found, _, _ = read_export(tmp_path / "a.xlsx", export, MACHINE)
+    np.testing.assert_allclose(found["force_N"], RECORD["force_N"])
+    table["x"] = [*table["x"][:3], "n.a.", *table["x"][4:]]
+    table.to_excel(tmp_path / "a.xlsx", sheet_name="data", index=False, startrow=2)
+    with pytest.raises(DatasetError, match=r"a\.xlsx, line 7, column x: 'n\.a\.' is not a number"):
+        read_export(tmp_path / "a.xlsx", export, MACHINE)
+    (tmp_path / "a.xlsx").write_bytes(b"no workbook")
+    with pytest.raises(DatasetError, match="cannot be read as a workbook"):
+        read_export(tmp_path / "a.xlsx", export, MACHINE)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,x\n0,1\n1,2\n", r"lacks the column F; it has t, x"),
+        ("t,x,F\n0,1,2\n1,x,3\n", r"line 3, column x: 'x' is not a number"),
+        ('t,x,F\n0,1,2\n1,"2,5",3\n', r"line 3, column x: '2,5' is not a number; a decimal comma\?"),
+        ("t,x,F\n0,1,2\n1,1_5,3\n", r"line 3, column x: '1_5' is not a number"),
+        ("t,x,F\n0,1,2\n1,１,3\n", r"line 3, column x: '１' is not a number"),
+        ("t,x,F\n0,1,2\n1,#N/A,3\n", r"line 3, column x: '#N/A' is not a number"),
+        ("t,x,x,F\n0,1,2,3\n", r"has the column x more than once \(x, x\).*\"x \[1\]\""),
+        ("t,x,F\n0,1,2\n1,2,3,4\n", r"line 3: 4 fields, but 3 columns"),
+        ("t;x;F\n0;1;2\n", r"separated by semicolons"),
+    ],
+)
+def test_a_fault_is_named_by_line_column_and_cell(tmp_path, text, said):
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(DatasetError, match=rf"a\.csv.*{said}"):
+        read_export(tmp_path / "a.csv", declared(SIMPLE), MACHINE)
+
+
+def test_points_in_a_file_with_decimal_commas_are_no_thousands(tmp_path):
+    (tmp_path / "a.csv").write_text("t;x;F\n0,0;1.234;2\n1,0;2,5;3\n")
+    with pytest.raises(DatasetError, match=r"line 2, column x: '1\.234' is not a number"):
+        read_export(tmp_path / "a.csv", declared(SIMPLE + 'separator = ";"\ndecimal = ","\n'), MACHINE)
+
+
+def test_an_encoding_that_is_another_is_said_with_how_to_declare_it(tmp_path):
+    (tmp_path / "a.csv").write_bytes("t,x,F,µ\n0,1,2,3\n".encode("cp1252"))
+    with pytest.raises(DatasetError, match=r'line 1: byte 0xb5 is not UTF-8.*encoding = "cp1252"'):
+        read_export(tmp_path / "a.csv", declared(SIMPLE), MACHINE)
+    read_export(tmp_path / "a.csv", declared(SIMPLE + 'encoding = "cp1252"\n'), MACHINE)
+    for encoding in ("utf-16", "utf-8-sig"):
+        (tmp_path / "a.csv").write_text("t,x,F\n0,1,2\n1,2,3\n", encoding=encoding)
+        found, _, _ = read_export(tmp_path / "a.csv", declared(SIMPLE + f'encoding = "{encoding}"\n'), MACHINE)
+        assert found["force_N"].tolist() == [2.0, 3.0]
+
+
+def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,F\n(s),(mm),(kN)\n0,1,2\n")
+    with pytest.raises(DatasetError, match=r"line 2, column F: the file says kN, and units.force_N is declared as N"):
+        read_export(tmp_path / "a.csv", declared(SIMPLE + "units_rows = 1\n"), MACHINE)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SIMPLE.replace("force_N =", "force_kN ="), r"instrument\.machine\.columns: force_kN is no column"),
+        (
+            SIMPLE.replace('force_N = "N"', 'force_N = "mm"'),
+            r"line 3, .*units: force_N is 'mm'; it must be one of N, kN",
+        ),
+        (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has none: say in which unit.*N \| kN"),
+        (SIMPLE + "skip_row = 2\n", r"line 4, .*skip_row: unknown key"),
+        (SIMPLE + "skip_rows = -2\n", r"skip_rows: -2 is outside"),
+        (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; there are arduino"),
+        (SIMPLE + 'encoding = "latin1-de"\n', r"encoding: 'latin1-de' is unknown"),
+        (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
+        (SIMPLE + 'decimal = ","\n', r"decimal: must be"),
+        (SIMPLE + "sign = { force_N = 2 }\n", r"sign: force_N must be 1 or -1"),
+        (SIMPLE + 'zone = "Berlin"\n', r"zone: there is no zone 'Berlin'"),
+        (SIMPLE + 'sync = "edges"\n', r"sync: must be"),
+        (SIMPLE.replace('time_s = "s"', 'time_s = "frame"'), r"rate_hz: must be given"),
+        (SIMPLE.replace("machine", "robot"), r"instrument\.robot: must be machine .* or camera"),
+    ],
+)
+def test_a_declaration_that_is_wrong_is_named_by_line_and_key(text, said):
+    with pytest.raises(DatasetError, match=rf"bench\.toml, .*{said}"):
+        declared(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("(mm)", "mm"), ("Load [kN]", "kN"), ("sec", "s"), ("Extension (inch)", "in"), ("Time", None), ("Force", None)],
+)
+def test_units_are_recognised_where_they_are_written(text, unit):
+    assert unit_in(text) == unit
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=20), st.sampled_from(["comma", "semicolon", "tab"]))
+def test_any_number_is_read_to_the_last_bit(values, separator):
+    mark = {"comma": ",", "semicolon": ";", "tab": "\t"}[separator]
+    text = f"t{mark}x{mark}F\n" + "".join(f"{v!r}{mark}{v!r}{mark}1\n" for v in values)
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "a.csv").write_text(text)
+        export = declared(SIMPLE + f'separator = "{separator}"\n')
+        found, _, _ = read_export(Path(folder) / "a.csv", export, MACHINE)
+    assert found["displacement_mm"].tolist() == values
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.binary(max_size=200))
+def test_any_bytes_are_read_or_refused(raw):
+    with tempfile.TemporaryDirectory() as folder:
+        for text in (raw, b"t,x,F\n" + raw):
+            (Path(folder) / "a.csv").write_bytes(text)
+            with suppress(DatasetError):
+                read_export(Path(folder) / "a.csv", declared(SIMPLE), MACHINE)
+
+
+# -- in a data set -----------------------------------------------------------------------------------------------
+
+TABLE = """format = 1
+name = "as it came"
+[instrument.machine]
+preset = "testxpert"
+columns = { pressure_psi = "Druck" }
+units = { pressure_psi = "kPa" }
+[[trial]]
+file = "raw/one.TRA"
+experiment = "static_loading"
+actuator = "large"
+pressure_psi = 0.0
+rate_mm_s = 2.0
+repeat = 1
+"""
+
+
+def test_a_data_set_reads_exports_as_they_came(tmp_path):
+    (tmp_path / "raw").mkdir()
+    (tmp_path / "dataset.toml").write_text(TABLE)
+    lines = ["Prüfzeit;Standardweg;Standardkraft;Druck", "s;mm;N;kPa", "0,00;0,0;1,5;6,894757", "0,02;0,04;1,6;0"]
+    path = tmp_path / "raw" / "one.TRA"
+    path.write_text("\r\n".join(lines), encoding="cp1252")
+    dataset = read_dataset(tmp_path)
+    (trial,) = dataset.trials
+    assert trial.columns["force_N"].tolist() == [1.5, 1.6]
+    assert trial.columns["pressure_psi"] == pytest.approx([1.0, 0.0], abs=1e-6)
+    with pytest.raises(DatasetError, match="declares how instruments write its files"):
+        add_trial(dataset, trial)
+    path.write_text("\r\n".join(lines).replace("0,04;1,6", "0,04;"), encoding="cp1252")
+    with pytest.raises(DatasetError, match=r"raw/one\.TRA, line 4, column Standardkraft: the value is missing"):
+        read_dataset(tmp_path)
+    path.write_text("\r\n".join([*lines, "0,01;1;1;1"]), encoding="cp1252")
+    with pytest.raises(DatasetError, match=r"raw/one\.TRA, line 5, column time_s: time goes backwards"):
+        read_dataset(tmp_path)
