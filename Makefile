@@ -20,7 +20,7 @@ help:
 	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
 	echo "make soak     the long proofs and fuzzers"
 	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
-	echo "make blind    diagnosis of sealed data sets: rates against what is required and baselines (ARGS='--help')"
+	echo "make blind    diagnosis of sealed data sets: rates against what is required and baselines (ARGS='--help', ARGS='systems --help')"
 	echo "make lint     formatters and static checks; make format applies the formatters"
 	echo "make wheels   sdists and wheels of the three packages, into dist/"
 	echo "make setup    only install what is needed: Debian packages, .venv, PlatformIO's packages"

@@ -2,6 +2,7 @@
 
     python -m bench.blind --truth own|realistic|foreign --singles 60 --none 20 [--jobs 2] [--out FOLDER]
                           [--records FILE [--print]] [--table FOLDER]
+    python -m bench.blind systems [...]     other systems than robots: python -m bench.small_systems
 
 Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or measured through the real firmware by
 `python -m bench.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the library
@@ -27,7 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import blind_records
+from bench import blind_records, small_systems
 from bench.blind_figures import BASELINES, CLOSE, name_of, report, said_of, table
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
@@ -141,6 +142,8 @@ def _bic(candidate) -> float:
 
 
 def main() -> None:
+    if sys.argv[1:2] == ["systems"]:
+        raise SystemExit(small_systems.main(sys.argv[2:]))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     counts = {"singles": ("single", 60), "none": ("none", 20), "outside": ("outside", 22), "pairs": ("pair", 20)}
     for name, (_, count) in counts.items():

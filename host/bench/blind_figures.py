@@ -105,7 +105,7 @@ def table(records: Mapping[str, Sequence[dict]]) -> str:
     for title in titles:
         cells = []
         for truth, of in records.items():
-            value = f"{_mean_size(of):.2f}" if title == _SIZE else _share(found[truth].get(title, []))
+            value = f"{_mean_size(of):.2f}" if title == _SIZE else share_text(found[truth].get(title, []))
             cells.append(f"{value} | {_REQUIRED[title][truth]}")
         lines.append(f"| {title.format('1.2 (foreign: 1.3)')} | {' | '.join(cells)} |")
     each = [_spent(of) for of in records.values()]
@@ -130,7 +130,7 @@ def _mean_size(records: Sequence[dict]) -> float:
     return sum(sizes) / max(len(sizes), 1)
 
 
-def _share(hits: Sequence[bool]) -> str:
+def share_text(hits: Sequence[bool]) -> str:
     """How many of how many, with the interval; empty where there is none to count."""
     if not hits:
         return ""
@@ -140,7 +140,7 @@ def _share(hits: Sequence[bool]) -> str:
 
 def _print_share(what: str, hits: Sequence[bool]) -> None:
     if hits:
-        print(f"{what:78} {_share(hits)}")
+        print(f"{what:78} {share_text(hits)}")
 
 
 def _first(record: dict) -> str | None:

@@ -35,3 +35,8 @@ def brief(record: dict) -> dict:
     error = {of: {e: record["error"][of][e] for e in _ERRORS} for of in ("before", "after", "noise_floor")}
     rest = {"effects": effects, "base_parameters": known, "error": error}
     return {k: record[k] for k in kept} | rest | {"remainder": {"matters": record["remainder"]["matters"]}}
+
+
+def losses_beside(path: Path) -> Path:
+    """Where what was tried is kept: packed, beside the records of a trial."""
+    return path.with_suffix(".losses.jsonl.gz")

@@ -1,7 +1,8 @@
-"""What a long trial found, a line of JSON a robot, so that it goes on from there on another machine."""
+"""What a long trial found, a line of JSON a set, packed where the name ends in .gz, so that it goes on elsewhere."""
 
 from __future__ import annotations
 
+import gzip
 import json
 from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
@@ -10,15 +11,23 @@ from typing import Any
 
 def read(path: Path, place: Callable[[dict], Hashable]) -> dict[Any, dict]:
     """Records by their `place` in the trial; none where there is no file."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return {place(record): record for record in map(json.loads, lines)}
+    if not path.exists():
+        return {}
+    with _opened(path, path, "rt") as lines:
+        return {place(record): record for record in map(json.loads, lines)}
 
 
 def write(path: Path, records: Iterable[dict]) -> None:
     """The file is the old one or the new one."""
     new = path.with_suffix(".new")
-    new.write_text("".join(f"{json.dumps(rounded(record))}\n" for record in records), encoding="utf-8")
+    with _opened(new, path, "wt") as lines:
+        lines.writelines(f"{json.dumps(rounded(record))}\n" for record in records)
     new.replace(path)
+
+
+def _opened(path: Path, named: Path, how: str) -> Any:
+    opened = gzip.open if named.suffix == ".gz" else open
+    return opened(path, how, encoding="utf-8")
 
 
 def rounded(value: Any) -> Any:

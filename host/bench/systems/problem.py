@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,11 +19,18 @@ Predict = Callable[[Record], np.ndarray]
 class Terms:
     """The right-hand side as a sum, for sparse regression: `inertia` x acceleration = `of[inertia]`, what drives, less
     the sum of `parameter` x `of[parameter]`. Each function takes position, speed and the `inputs`, shape (n,) each, in
-    SI units. Candidates that are no such term are not in it."""
+    SI units. Candidates that are no such term are not in it. `order`: of the equation, where 1 the rate in place of the
+    acceleration, and no speed; `unit` of the output in SI."""
 
     of: Mapping[str, Callable[..., np.ndarray]]
     inertia: str
     inputs: tuple[str, ...]
+    order: int = 2
+    unit: float = 1e-3
+
+    def only(self, names: Collection[str]) -> Terms:
+        """Those of `names`."""
+        return replace(self, of={name: term for name, term in self.of.items() if name in names})
 
 
 @dataclass(frozen=True)
@@ -77,8 +84,12 @@ class Problem:
         return np.asarray(self.simulate(record, self.theta(record, found))[self.output])
 
     def residual(self, found: Mapping[str, float], records: Sequence[Record]) -> np.ndarray:
-        """Predicted less measured, of all `records` in a row."""
-        return np.concatenate([self.predict(r, found) - r.channels[self.output] for r in records])
+        """Predicted less measured, of all `records` in a row, without samples that are missing."""
+        return np.concatenate([(self.predict(r, found) - r.channels[self.output])[self.there(r)] for r in records])
+
+    def there(self, record: Record) -> np.ndarray:
+        """Which of its samples were measured."""
+        return np.isfinite(record.channels[self.output])
 
     def error_percent(self, predict: Predict) -> float:
         """RMS error on the conditions that nobody fitted, in percent of the standard deviation of what was measured."""

@@ -12,22 +12,22 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from bench.systems.problem import Answer, Problem
-from bench.systems.rivals.best_subset import fit
+from bench.systems.rivals.best_subset import STARTS, fit
 from lacuna import Record
 
 POINTS = 600  # of all samples fitted: what a process of this kind can take
 
 
-def solve(problem: Problem) -> Answer:
+def solve(problem: Problem, points: int = POINTS, starts: int = STARTS) -> Answer:
     """The process learns the residual of the free run, and is given nothing that was measured when it predicts."""
-    base = fit(problem)
+    base = fit(problem, starts=starts)
 
     def features(record: Record) -> np.ndarray:
         return _features(problem, record, problem.predict(record, base))
 
-    known = np.vstack([features(r) for r in problem.fitted])
+    known = np.vstack([features(r)[problem.there(r)] for r in problem.fitted])
     left = -problem.residual(base, problem.fitted)
-    chosen = np.random.default_rng(0).permutation(len(left))[:POINTS]
+    chosen = np.random.default_rng(0).permutation(len(left))[:points]
     kernel = RBF(np.ones(known.shape[1]), (1e-2, 1e3)) + WhiteKernel(0.1)
     process = make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=0))
     with warnings.catch_warnings():

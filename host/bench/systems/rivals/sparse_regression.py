@@ -41,7 +41,7 @@ def path(problem: Problem, terms: Terms, window: int) -> list[dict[str, float]]:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Sparsity parameter is too big", UserWarning)  # the end of the path
             model.fit(states, t=sample_s, x_dot=rates, u=inputs)
-        return dict(zip(offered, model.coefficients()[1], strict=True))  # of the acceleration
+        return dict(zip(offered, model.coefficients()[-1], strict=True))  # of the highest derivative
 
     largest = max(abs(c) * norms[name] for name, c in coefficients(0.0).items())
     found = [_parameters(coefficients(threshold * largest), terms.inertia) for threshold in THRESHOLDS]
@@ -58,13 +58,13 @@ def _parameters(coefficients: dict[str, float], inertia: str) -> dict[str, float
 
 
 def _derived(record: Record, output: str, terms: Terms, window: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position and speed, their rates, and the inputs, shape (n, 2), (n, 2), (n, inputs), in SI units. Inputs are
-    smoothed like the position, so that what the filter takes off is missing on both sides."""
+    """The states (position and speed), their rates, and the inputs, shape (n, order), (n, order), (n, inputs), in SI
+    units. Inputs are smoothed like the position, so that what the filter takes off is missing on both sides."""
     sample_s = float(np.median(np.diff(record.time_s)))
 
     def filtered(column: np.ndarray, order: int = 0) -> np.ndarray:
         return savgol_filter(column, window, ORDER, deriv=order, delta=sample_s)
 
-    x, v, a = (filtered(1e-3 * record.channels[output], order) for order in (0, 1, 2))
+    derived = [filtered(terms.unit * record.channels[output], order) for order in range(terms.order + 1)]
     inputs = np.column_stack([filtered(record[name]) for name in terms.inputs])
-    return np.column_stack([x, v]), np.column_stack([v, a]), inputs
+    return np.column_stack(derived[:-1]), np.column_stack(derived[1:]), inputs
