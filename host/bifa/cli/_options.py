@@ -8,7 +8,7 @@ from typing import Literal
 import typer
 
 Profile = Literal["ideal", "realistic", "worn"]
-Method = Literal["de", "cma", "bo"]  # bifa.gait.methods.METHODS, which would be seconds to import
+Method = Literal["cma", "de", "bo"]  # bifa.gait.methods.METHODS, which would be seconds to import
 Obstacle = Literal["tunnel", "subtunnels", "arcs"]  # bifa.simulate.obstacles
 
 

@@ -12,7 +12,7 @@ from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
 from bifa.files import named
 
 EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
-bifa optimize --out fast.toml --nominal --method cma   |
+bifa optimize --out fast.toml --nominal --method de   |
 bifa optimize --out paper.toml --nominal --method bo --evaluations 200   |
 bifa optimize --out GAIT.toml --dask tcp://scheduler:8786"""
 
@@ -25,14 +25,14 @@ def register(app: typer.Typer) -> None:
 def optimize(
     out: Annotated[Path, typer.Option(help="Gait file to write.", show_default=False)],
     model: Annotated[Path | None, file_option("Model file; the paper's nominal robot if left out.")] = None,
-    method: Annotated[Method, typer.Option(help="Search method; bo is the paper's, and slow.")] = "de",
+    method: Annotated[Method, typer.Option(help="Search method; bo is the paper's, and slow.")] = "cma",
     robust: Annotated[
         bool,
         typer.Option("--robust/--nominal", help="Maximise the speed that 9 robots in 10 reach, or the model's own."),
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the search and of the sampled robots.")] = 0,
     evaluations: Annotated[
-        int | None, typer.Option(min=20, help="Gaits to evaluate per run; 1000 for bo.", show_default=False)
+        int | None, typer.Option(min=20, help="Most gaits to evaluate per run; 1000 for bo.", show_default=False)
     ] = None,
     runs: Annotated[
         int | None,
@@ -97,6 +97,8 @@ def _best(console, robot, pool, settings):
         with search_progress(console) as progress:
             optima.append(optimise(robot, pool, one, progress(f"seed {one.seed}")))
         console.print(_line(optima[-1]), highlight=False)
+        if optima[-1].doubt:
+            console.print(f"[yellow]warning[/yellow] {optima[-1].doubt}", highlight=False)
     return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
 
 

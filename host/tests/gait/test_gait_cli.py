@@ -49,7 +49,7 @@ def test_bad_input_names_the_range(tmp_path, arguments, words):
 def test_a_method_that_does_not_exist_is_refused_before_anything_is_loaded(tmp_path):
     result = invoke("optimize", "--out", tmp_path / "gait.toml", "--method", "sgd")
     assert result.exit_code == 2
-    assert "'sgd' is not one of 'de', 'cma'" in result.output
+    assert "'sgd' is not one of 'cma', 'de'" in result.output
     assert tuple(METHODS) == get_args(_options.Method)
 
 

@@ -5,6 +5,6 @@ from .cma_es import cma_es
 from .common import Found, Objective, Report
 from .evolution import differential_evolution
 
-METHODS = {"de": differential_evolution, "cma": cma_es, "bo": bayesian_optimisation}
+METHODS = {"cma": cma_es, "de": differential_evolution, "bo": bayesian_optimisation}
 
 __all__ = ["METHODS", "Found", "Objective", "Report", "bayesian_optimisation", "cma_es", "differential_evolution"]

@@ -21,6 +21,7 @@ def bayesian_optimisation(
     evaluations: int,
     seed: int,
     report: Report | None = None,
+    screen: Objective | None = None,
 ) -> Found:
     """Maximise `objective` with `evaluations` calls, one at a time; `wraps` (dimensions,) marks full turns.
 

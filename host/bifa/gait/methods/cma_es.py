@@ -1,14 +1,23 @@
-"""CMA-ES (Hansen), the package `cma`, restarted from the best of a space-filling sample."""
+"""CMA-ES (Hansen), the package `cma`, from several basins of a space-filling sample, until the best two runs agree."""
+
+from collections.abc import Sequence
 
 import cma
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-from .common import Found, Objective, Recorder, Report
+from .common import Found, Objective, Recorder, Report, agree
 
-_SAMPLE_SHARE = 0.35  # of the evaluations, spent on the sample that says where to start
-_RESTARTS = 4
-_STEP = 0.08  # initial standard deviation, of the unit cube
+_SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled until enough of them walk
+_ENOUGH = 60
+_APART = 0.12  # of two starts, on some axis of the unit cube: another basin
+_NEIGHBORS, _COMPARED = 8, 2000
+_CLIMBS = 5  # at once, and as many in each restart
+_STEP = 0.06  # initial standard deviation, of the unit cube
+_TRIAL = 10  # generations after which a run far behind the best is given up
+_BEHIND = 0.9  # of the best value
+_STALLED, _GAIN = 10, 2e-3  # generations in which a run has gained less than this part ends it
 
 
 def cma_es(
@@ -17,28 +26,101 @@ def cma_es(
     evaluations: int,
     seed: int,
     report: Report | None = None,
-    population: int = 14,
+    screen: Objective | None = None,
+    population: int = 12,
 ) -> Found:
-    """Maximise `objective` with about `evaluations` calls; `wraps` (dimensions,) marks full turns."""
+    """Maximise `objective` in at most about `evaluations` calls, fewer where the landscape is simple; `wraps`
+    (dimensions,) marks full turns.
+
+    screen: a cheaper objective for the space-filling sample; its best basins are then compared by `objective`.
+    """
     recorder = Recorder(objective, wraps, report)
-    sample = max(8, int(_SAMPLE_SHARE * evaluations))
-    points = qmc.LatinHypercube(len(wraps), rng=np.random.default_rng([seed, 2])).random(sample)
-    for part in np.array_split(points, max(1, sample // 50)):
-        recorder(part)
-    starts = recorder.found().finalists(_RESTARTS, apart=0.15)
-    share = (evaluations - recorder.count) // len(starts)
-    for number, start in enumerate(starts):
-        climb(recorder, start, _STEP, share, seed + number, population)
-    return recorder.found()
+    looked = Recorder(screen, wraps) if screen else recorder
+    _sample(looked, len(wraps), seed, 8 * evaluations if screen else evaluations)
+    if screen:
+        recorder(_starts(looked.found(), [], wraps, 4 * _CLIMBS))
+    tried: list[np.ndarray] = []
+    ends: list[float] = []
+    while recorder.count < evaluations and not agree(ends):
+        seen = recorder.found() if screen is None else recorder.found().joined(looked.found())
+        starts = _starts(seen, tried, wraps, _CLIMBS)
+        if not len(starts):
+            break
+        tried += list(starts)
+        ends += climb_together(recorder, starts, evaluations - recorder.count, seed + len(tried), population)
+    return recorder.found(tuple(sorted(ends, reverse=True)))
+
+
+def _sample(recorder: Recorder, dimensions: int, seed: int, evaluations: int) -> None:
+    """Sobol points, until enough of them walk, or half of `evaluations` is spent."""
+    sobol = qmc.Sobol(dimensions, rng=np.random.default_rng([seed, 2]))
+    size = min(_SAMPLE, 1 << max(3, int(np.log2(max(evaluations, 16) / 2))))
+    values = recorder(sobol.random(size))
+    while np.count_nonzero(values > 0.0) < _ENOUGH and 2 * len(values) <= min(_SAMPLE_MOST, evaluations / 2):
+        values = np.concatenate([values, recorder(sobol.random(len(values)))])
+
+
+def _starts(seen: Found, tried: Sequence[np.ndarray], wraps: np.ndarray, count: int) -> np.ndarray:
+    """The best points that no other near them beats, each the top of a basin as far as was seen, and that are in none
+    of the basins tried; then the best of the others."""
+    tops = _tops(seen, wraps)
+    first = Found(seen.points[tops], seen.values[tops]).finalists(count, _APART, wraps, avoid=tried)
+    others = seen.finalists(count - len(first), _APART, wraps, avoid=[*tried, *first]) if len(first) < count else []
+    return np.array([*first, *others])
+
+
+def _tops(seen: Found, wraps: np.ndarray) -> np.ndarray:
+    """Indices of the points that are better than their nearest `_NEIGHBORS`, among the best `_COMPARED`."""
+    order = np.argsort(-seen.values, kind="stable")[:_COMPARED]
+    order = order[seen.values[order] > 0.0]
+    if len(order) <= _NEIGHBORS:
+        return order
+    # Full turns as circles: where axes wrap, a chord does for the distance.
+    turn = 2.0 * np.pi * seen.points[order][:, wraps]
+    places = np.hstack([seen.points[order][:, ~wraps], np.cos(turn) / np.pi, np.sin(turn) / np.pi])
+    near = cKDTree(places).query(places, _NEIGHBORS + 1)[1]
+    return order[near.min(axis=1) == np.arange(len(order))]
+
+
+def climb_together(
+    objective: Objective, starts: np.ndarray, evaluations: int, seed: int, population: int = 12, step: float = _STEP
+) -> list[float]:
+    """Runs of CMA-ES from `starts` (n, dimensions), a generation of all of them in one call; the best value of each.
+    One that after a while is far behind the best is given up."""
+    runs = [_strategy(start, step, seed + k, population) for k, start in enumerate(starts)]
+    bests: list[list[float]] = [[] for _ in runs]  # of each, so far, after every generation
+    alive, spent = list(range(len(runs))), 0
+    while alive and spent < evaluations:
+        asked = [np.array(runs[k].ask()) for k in alive]
+        values = np.split(objective(np.concatenate(asked)), np.cumsum([len(a) for a in asked])[:-1])
+        for k, points, value in zip(alive, asked, values, strict=True):
+            runs[k].tell(list(points), (-value).tolist())
+            bests[k].append(max([*bests[k][-1:], float(value.max())]))
+        spent += sum(map(len, asked))
+        best = max(one[-1] for one in bests)
+        alive = [k for k in alive if not (runs[k].stop() or _is_hopeless(bests[k], best) or _has_stalled(bests[k]))]
+        ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
+        if len(ended) > 1 and agree([best, ended[-2]]):  # nothing that still runs is ahead of two that have ended
+            break
+    return [one[-1] for one in bests]
+
+
+def _is_hopeless(bests: Sequence[float], best: float) -> bool:
+    return len(bests) >= _TRIAL and bests[-1] < _BEHIND * best
+
+
+def _has_stalled(bests: Sequence[float]) -> bool:
+    return len(bests) > _STALLED and bests[-1] - bests[-1 - _STALLED] <= _GAIN * abs(bests[-1])
 
 
 def climb(
-    objective: Objective, start: np.ndarray, step: float, evaluations: int, seed: int, population: int = 14
+    objective: Objective, start: np.ndarray, step: float, evaluations: int, seed: int, population: int = 12
 ) -> None:
     """One run of CMA-ES from `start` (dimensions,); what it finds is in what `objective` recorded."""
+    climb_together(objective, np.asarray(start)[None], evaluations, seed, population, step)
+
+
+def _strategy(start: np.ndarray, step: float, seed: int, population: int) -> cma.CMAEvolutionStrategy:
     # The recorder folds points into the cube, so the search itself needs no bounds; seed 0 means "by the clock" to cma.
-    options = {"seed": seed + 1, "popsize": population, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-4}
-    strategy = cma.CMAEvolutionStrategy(np.asarray(start), step, options)
-    while not strategy.stop():
-        points = np.array(strategy.ask())
-        strategy.tell(list(points), (-objective(points)).tolist())
+    options = {"seed": seed + 1, "popsize": population, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
+    return cma.CMAEvolutionStrategy(np.asarray(start), step, options)

@@ -1,6 +1,6 @@
 """What every optimiser takes and gives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,24 @@ Objective = Callable[[np.ndarray], np.ndarray]
 # (evaluations so far, best value so far) -> None
 Report = Callable[[int, float], None]
 
+AGREE = 0.01  # relative, of what the best two of independent runs end at
+
 
 @dataclass(frozen=True)
 class Found:
-    """Everything that was evaluated: `points` (n, dimensions), folded into the cube, and `values` (n,)."""
+    """Everything that was evaluated: `points` (n, dimensions), folded into the cube, and `values` (n,).
+
+    ends: what independent runs ended at, the best first, of a method that has several.
+    """
 
     points: np.ndarray
     values: np.ndarray
+    ends: tuple[float, ...] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the best two of the independent runs have come to the same value; true of a method that has none."""
+        return len(self.ends) == 0 or agree(self.ends)
 
     @property
     def best_point(self) -> np.ndarray:
@@ -31,18 +42,43 @@ class Found:
     def joined(self, *others: "Found") -> "Found":
         """Both, of one objective."""
         parts = (self, *others)
-        return Found(np.concatenate([part.points for part in parts]), np.concatenate([part.values for part in parts]))
+        points, values = (np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "values"))
+        return Found(points, values, self.ends)
 
-    def finalists(self, count: int, apart: float = 0.01) -> np.ndarray:
-        """(m, dimensions) of the best points, m <= count, no two closer than `apart` on every axis."""
+    def finalists(
+        self,
+        count: int,
+        apart: float = 0.01,
+        wraps: np.ndarray | None = None,
+        avoid: Sequence[np.ndarray] = (),
+    ) -> np.ndarray:
+        """(m, dimensions) of the best points, m <= count, no two closer than `apart` on every axis, nor so close to one
+        of `avoid`; wraps: axes that are full turns."""
+        turns = np.zeros(self.points.shape[1], dtype=bool) if wraps is None else wraps
+        free = np.ones(len(self.points), dtype=bool)
+        for point in avoid:
+            free &= _distances(self.points, point, turns) >= apart
         chosen: list[np.ndarray] = []
         for index in np.argsort(-self.values, kind="stable"):
-            point = self.points[index]
-            if all(np.abs(point - other).max() >= apart for other in chosen):
-                chosen.append(point)
+            if not free[index]:
+                continue
+            chosen.append(self.points[index])
             if len(chosen) == count:
                 break
-        return np.array(chosen)
+            free &= _distances(self.points, chosen[-1], turns) >= apart
+        return np.array(chosen).reshape(-1, self.points.shape[1])
+
+
+def _distances(points: np.ndarray, point: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """The greatest difference on any axis, the shorter way round on full turns."""
+    difference = np.abs(points - point)
+    return np.where(turns, np.minimum(difference, 1.0 - difference), difference).max(axis=1)
+
+
+def agree(ends: Sequence[float]) -> bool:
+    """Whether the best two of independent runs have come to the same value."""
+    first, second = [*sorted(ends, reverse=True), 0.0, 0.0][:2]
+    return first > 0.0 and second >= (1.0 - AGREE) * first
 
 
 class Recorder:
@@ -66,6 +102,6 @@ class Recorder:
             self._report(self.count, self.best)
         return values
 
-    def found(self) -> Found:
-        """All of it."""
-        return Found(np.concatenate(self._points), np.concatenate(self._values))
+    def found(self, ends: tuple[float, ...] = ()) -> Found:
+        """All of it; `ends` of independent runs."""
+        return Found(np.concatenate(self._points), np.concatenate(self._values), ends)
