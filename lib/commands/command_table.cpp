@@ -6,60 +6,60 @@ namespace bifa {
 
 const char kCommandTexts[] BIFA_FLASH =
     "help [NAME]\0"
-    "li\207 ev\205y\216\213g\217\214expla\213 \235e\0"  // list everything, or explain one
+    "li\206 ev\205y\235\213g,\217r expla\213\217ne\0"  // list everything, or explain one
     "version\0"
-    "v\205\260\235s\217ca\232e\200la\207 \207\242t\0"  // versions, cause of the last start
+    "v\205si\256s\225ca\246\201\232\203\201la\206 \206\251t\0"  // versions, cause of the last start
     "status\0"
-    "\207\221e\217\244\217\210\217v\234ves\217l\213k\0"  // state, fault, pressures, valves, link
+    "\206\221e,\215\252\225\210\225v\227ves\225l\213k\0"  // state, fault, pressures, valves, link
     "show [NAME]\0"
-    "v\234ues\217r\241es\237*\236\205\201\256w\205-up loads\212\225\216\205\0"  // values, ranges; * where power-up loads another
+    "v\227ues\225\244s; *\236\205\201pow\205-up loads\212\223\235\205\0"  // values, ranges; * where power-up loads another
     "set NAME VALUE\0"
-    "ch\241\201\240\215\205,\212lso\236\252\201runn\213g\0"  // change a parameter, also while running
+    "c\231ng\201\237\214\205,\212lso\236\222\201runn\213g\0"  // change a parameter, also while running
     "run\0"
-    "w\234k\0"  // walk
+    "w\227k\0"  // walk
     "stop\0"
-    "\207op,\212\253 v\230\212\224ch\250b\205s\0"  // stop, and vent all chambers
+    "\206\257,\212\255 v\230\212l\254c\231mb\205s\0"  // stop, and vent all chambers
     "hold CHAMBER positive|vacuum|off\0"
-    "\213fl\221e\217ev\247u\221\201\214v\230 body\217\222 \214ta\252\0"  // inflate, evacuate or vent body, head or tail
+    "\213fl\221e\225evacu\221\201\233 v\230 \253\225\207\233\250a\222\0"  // inflate, evacuate or vent body, head or tail
     "clear\0"
-    "\257\223as\201\240\207op \214\244\0"  // release a stop or fault
+    "\260\242as\201\237\206\257\217r\215\252\0"  // release a stop or fault
     "stream on|off\0"
-    "te\223m\243ry: \235\201l\213\201(>)\212 s\250p\223\0"  // telemetry: one line (>) a sample
+    "\224:\217n\201l\213\201(>)\212 samp\242\0"  // telemetry: one line (>) a sample
     "plot on|off\0"
-    "te\223m\243ry\227\214\216\201S\205i\234 Plott\205\0"  // telemetry for the Serial Plotter
+    "\224\215\233\203\201S\205i\227 Plott\205\0"  // telemetry for the Serial Plotter
     "save [NAME]\0"
-    "keep \216\201\215\205s\237wi\216ou\246NAME\227\214\256w\205-up\0"  // keep the parameters; without NAME for power-up
+    "keep\203\201\214\205s; wi\235out NAME\215\233\247ow\205-up\0"  // keep the parameters; without NAME for power-up
     "load PRESET\0"
-    "\232\201\240\202\0"  // use a preset
+    "\246\201\237\202\0"  // use a preset
     "presets\0"
-    "li\207 \216\201\202s\0"  // list the presets
+    "li\206\203\201\202s\0"  // list the presets
     "forget PRESET\0"
-    "de\223t\201\240\202\227r\245\233\0"  // delete a preset from EEPROM
+    "de\242t\201\237\202\215r\243\234\0"  // delete a preset from EEPROM
     "defaults confirm\0"
-    "\205as\201a\224\202s\212\253 s\243t\213gs\0"  // erase all presets and settings
+    "\205as\201\227\254\202s\212\255 \245t\213gs\0"  // erase all presets and settings
     "zero confirm|factory\0"
-    "tak\201\216\201\210\212\226z\205o\237\214u\253\254\216\221\0"  // take the pressures as zero; or undo that
+    "tak\201\235\201\210\212\226z\205o;\217r u\255o\203\221\0"  // take the pressures as zero; or undo that
     "echo on|off\0"
-    "\257pe\221\236\221 you\204\201(b\242\201t\205m\213\234)\0";  // repeat what you type (bare terminal)
+    "\260pe\221\236\221 you\204\201(b\251\201t\205m\213\227)\0";  // repeat what you type (bare terminal)
 const char kResultTexts[] BIFA_FLASH =
     "ok\0"
-    "\225\211comma\253;\204\201help\0"  // no such command; type help
-    "wr\235g\212rgum\230s\0"  // wrong arguments
-    "\225\211\215\205;\204\201show\0"  // no such parameter; type show
-    "ou\246of r\241e\0"  // out of range
-    "\207opp\251:\204\201c\223\242\227ir\207\0"  // stopped: type clear first
-    "\225\246\213 \216i\226\207\221e;\204\201\207\221\232\0"  // not in this state; type status
-    "\225\211\202;\204\201\202s\0"  // no such preset; type presets
-    "\240n\250\201i\2261 t\25412 of\212-z 0-9 _ -\217\225t\227\247t\255y\0"  // a name is 1 to 12 of a-z 0-9 _ -, not factory
-    "\225 ro\245\223ft\0"  // no room left
-    "\216\201\233\227ai\223d\0"  // the EEPROM failed
-    "b\232y sav\213g\237try\212ga\213\0"  // busy saving; try again
-    "\225 beg\213\217\255\212 p\242\246wa\226\257f\232\251\0"  // no begin, or a part was refused
-    "\216\201s\243\212rriv\251 d\250ag\251\0"  // the set arrived damaged
-    "it\226ca\232\201i\226\207i\224\216\205e;\204\201\207\221\232\0"  // its cause is still there; type status
-    "time\226mu\207 \225\246g\254b\247kw\242ds\0"  // times must not go backwards
-    "\210 \207i\224move: \257\207 4 \226fir\207\0"  // pressures still move: rest 4 s first
-    "m\255\201\216an 0.9 p\260\227r\245z\205o\0";  // more than 0.9 psi from zero
+    "\223\211comma\255;\204\201help\0"  // no such command; type help
+    "wr\256g\212rgum\230s\0"  // wrong arguments
+    "\223\211\214\205;\204\201show\0"  // no such parameter; type show
+    "out\217f \244\0"  // out of range
+    "\206\257p\241:\204\201c\242\251\215ir\206\0"  // stopped: type clear first
+    "\223t \213\203i\226\206\221e;\204\201\206\257\215ir\206\0"  // not in this state; type stop first
+    "\223\211\202;\204\201\202s\0"  // no such preset; type presets
+    "\237nam\201i\2261\250o 12\217f\212-z 0-9 _ -\225\223t\215\240\233y\0"  // a name is 1 to 12 of a-z 0-9 _ -, not factory
+    "\223 ro\243\242ft\0"  // no room left
+    "\235\201\234\215a\222\241\0"  // the EEPROM failed
+    "b\246y sav\213g;\250ry\212ga\213\0"  // busy saving; try again
+    "\223\250rans\240i\256\217pen,\217r\212\215ield wa\226\260ject\241\0"  // no transaction open, or a field was rejected
+    "\235\201\245\212rriv\241 damag\241\0"  // the set arrived damaged
+    "it\226ca\246\201i\226\206\222l\203\205e;\204\201\206\221\246\0"  // its cause is still there; type status
+    "time\226mu\206 \223t go backw\251ds\0"  // times must not go backwards
+    "\210 \206\222\254move: \260\206 4 s\215ir\206\0"  // pressures still move: rest 4 s first
+    "m\233\201t\231n 0.9\247si\215r\243z\205o\0";  // more than 0.9 psi from zero
 const char kChamberWords[] BIFA_FLASH =
     "body\0"
     "head\0"

@@ -7,31 +7,31 @@ namespace bifa {
 const char kParameterTexts[] BIFA_FLASH =
     "period_s\0"
     "s\0"
-    "tim\201of \235\201cycl\201(1/f)\0"  // time of one cycle (1/f)
+    "tim\201\232\217n\201cycl\201(1/f)\0"  // time of one cycle (1/f)
     "psi12_deg\0"
     "deg\0"
-    "\231e\200\222\212\222\200\2202)\0"  // phase of the head ahead of the body (psi_12)
+    "p\231s\201\232\203\201\207a\207\232\203\201\2202)\0"  // phase of the head ahead of the body (psi_12)
     "psi13_deg\0"
     "deg\0"
-    "\231e\200ta\252\212\222\200\2203)\0"  // phase of the tail ahead of the body (psi_13)
+    "p\231s\201\232\203\201ta\222\212\207\232\203\201\2203)\0"  // phase of the tail ahead of the body (psi_13)
     "duty_body\0"
     "\0"
-    "\203\200cyc\223: c\235tr\247t\226(d_1)\0"  // vacuum part of the cycle: contracts (d_1)
+    "\200\253 c\256tr\240\226(d_1)\0"  // fraction of the cycle under vacuum; the body contracts (d_1)
     "duty_head\0"
     "\0"
-    "\203\200\2062)\0"  // vacuum part of the cycle: lets go (d_2)
+    "\200\207\2162)\0"  // fraction of the cycle under vacuum; the head releases (d_2)
     "duty_tail\0"
     "\0"
-    "\203\200\2063)\0"  // vacuum part of the cycle: lets go (d_3)
+    "\200ta\222 \2163)\0"  // fraction of the cycle under vacuum; the tail releases (d_3)
     "coupling_per_s\0"
     "1/s\0"
-    "osc\252l\221\255s' pu\224\213t\254\231\201(\234pha_phi)\0"  // oscillators' pull into phase (alpha_phi)
+    "osc\222l\221\233s'\247ul\254\213to\247\231s\201(\227p\231_phi)\0"  // oscillators' pull into phase (alpha_phi)
     "pressure_psi\0"
     "psi\0"
-    "s\243-\256\213t\200\256\260tiv\201supply\0"  // set-point of the positive supply
+    "\245-po\213t\217f\203\201positiv\201supply\0"  // set-point of the positive supply
     "host_timeout_s\0"
     "s\0"
-    "v\230\212ft\205\211\260\223nce\200ho\207\2370 = nev\205\0";  // vent after such silence of the host; 0 = never
+    "v\230\212ft\205\211s\222enc\201\232\203\201ho\206; 0 = nev\205\0";  // vent after such silence of the host; 0 = never
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {
     {500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1},  // period_s

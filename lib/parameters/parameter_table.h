@@ -15,9 +15,9 @@ struct ParameterSet {
   uint32_t period_us;  ///< period_s: time of one cycle (1/f)
   uint32_t psi12_mdeg;  ///< psi12_deg: phase of the head ahead of the body (psi_12)
   uint32_t psi13_mdeg;  ///< psi13_deg: phase of the tail ahead of the body (psi_13)
-  uint16_t duty_body_e4;  ///< duty_body: vacuum part of the cycle: contracts (d_1)
-  uint16_t duty_head_e4;  ///< duty_head: vacuum part of the cycle: lets go (d_2)
-  uint16_t duty_tail_e4;  ///< duty_tail: vacuum part of the cycle: lets go (d_3)
+  uint16_t duty_body_e4;  ///< duty_body: fraction of the cycle under vacuum; the body contracts (d_1)
+  uint16_t duty_head_e4;  ///< duty_head: fraction of the cycle under vacuum; the head releases (d_2)
+  uint16_t duty_tail_e4;  ///< duty_tail: fraction of the cycle under vacuum; the tail releases (d_3)
   uint16_t coupling_milli_per_s;  ///< coupling_per_s: oscillators' pull into phase (alpha_phi)
   uint16_t pressure_mpsi;  ///< pressure_psi: set-point of the positive supply
   uint16_t host_timeout_ms;  ///< host_timeout_s: vent after such silence of the host; 0 = never

@@ -25,9 +25,9 @@ def test_first_error_spoils_a_schedule_until_it_is_cleared(bench):
     add(uno, 1000, 1, 2)
     with pytest.raises(RefusedError, match="backwards"):
         add(uno, 500, 0, 0)
-    with pytest.raises(RefusedError, match="a part was refused"):
+    with pytest.raises(RefusedError, match="a field was rejected"):
         add(uno, 2000, 0, 0)
-    with pytest.raises(RefusedError, match="a part was refused"):
+    with pytest.raises(RefusedError, match="a field was rejected"):
         uno.session.call("schedule_start")
     bench.wait(1.5)
     assert not bench.valves_on
