@@ -8,9 +8,10 @@ Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or mea
 `python -m bench.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the library
 those that were never in it and, but for the foreign truth, each library effect in turn, withheld from the diagnosis.
 Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues; FILE has a line
-for each data set, with which it continues on another machine, and `--print` only prints what is in it. Prints the
-figures with 95 % Wilson intervals beside four baselines that see the same fits: the best single refit by error, BIC,
-greedy forward selection, and sparse regression on the base model's residual.
+for each data set, with which it continues on another machine, and `--print` only prints what is in it; beside it lies,
+packed, what each diagnosis tried, on which `python -m bench.replay` tries rules of decision. Prints the figures with
+95 % Wilson intervals beside four baselines that see the same fits: the best single refit by error, BIC, greedy forward
+selection, and sparse regression on the base model's residual.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from pathlib import Path
 
 from bench import blind_records, small_systems
 from bench.blind_figures import BASELINES, CLOSE, name_of, report, said_of, table
+from bench.search_record import searched
+from bench.simulations import Simulations
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
@@ -109,11 +112,15 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int)
     use_threads(threads)
     system = prepare(read_dataset(folder))
     system.effects = {name: effect for name, effect in system.effects.items() if name != without}
+    simulations = Simulations()
+    simulations.of_trials(system)
     began = time.monotonic()
     found = diagnose(system, progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
     spent = os.times()
     processor = spent.user + spent.system + spent.children_user + spent.children_system
-    record = as_record(found) | {"processor_seconds": processor, "baselines": baselines(found.search)}
+    tried = searched(found, simulations.count)
+    record = as_record(found) | {"processor_seconds": processor, "baselines": baselines(found.search), "search": tried}
+    record |= {name: tried[name] for name in ("version", "simulations")}
     verdict.write_text(json.dumps(record), encoding="utf-8")
 
 
@@ -185,6 +192,7 @@ def main() -> None:
                 if options.records:
                     known[blind_records.place(record)] = record
                     blind_records.write(options.records, known.values())
+                    blind_records.write_losses(options.records, record)
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(
                     f"{record['kind']:8}{record['seed']}  {name_of(record['truth'])} ({sizes}) -> {said_of(record)}"

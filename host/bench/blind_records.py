@@ -27,6 +27,7 @@ def write(path: Path, records: Iterable[dict]) -> None:
 def brief(record: dict) -> dict:
     """What a report needs of a record."""
     kept = ("kind", "seed", "truth", "sizes", "values", "base_values", "verdict", "processor_seconds", "baselines")
+    kept += tuple(name for name in ("version", "simulations") if name in record)  # of trials since they are counted
     estimated = record["base_parameters"]
     known = {
         name: {"interval_90": estimated[name]["interval_90"]} for name in record["base_values"] if name in estimated
@@ -35,6 +36,15 @@ def brief(record: dict) -> dict:
     error = {of: {e: record["error"][of][e] for e in _ERRORS} for of in ("before", "after", "noise_floor")}
     rest = {"effects": effects, "base_parameters": known, "error": error}
     return {k: record[k] for k in kept} | rest | {"remainder": {"matters": record["remainder"]["matters"]}}
+
+
+def write_losses(path: Path, record: dict) -> None:
+    """Add what was tried of one data set to what lies beside `path`; records read from a file have none."""
+    if "search" not in record:
+        return
+    known = lines.read(losses_beside(path), place)
+    known[place(record)] = {name: record[name] for name in ("kind", "seed", "truth")} | record["search"]
+    lines.write(losses_beside(path), known.values())
 
 
 def losses_beside(path: Path) -> Path:

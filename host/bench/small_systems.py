@@ -61,6 +61,9 @@ def run(todo: list[tuple[str, int]], path: Path, with_peers: bool) -> list[dict]
     began = time.monotonic()
     for count, (truth, seed) in enumerate(todo, 1):
         if (truth, seed) in known:
+            if with_peers and "peers" not in known[truth, seed]:
+                known[truth, seed]["peers"] = asked(*drawn(truth, seed))
+                lines.write(path, known.values())
             continue
         try:
             record, tried = one(truth, seed, with_peers)
@@ -115,7 +118,9 @@ def main(given: list[str] | None = None) -> int:
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"sets, {count} by default")
     parser.add_argument("--first-seed", type=int, default=7000, metavar="SEED")
     parser.add_argument("--records", type=Path, default=Path("../out/small.jsonl"), metavar="FILE")
-    parser.add_argument("--without-peers", action="store_true", help="the engine alone")
+    parser.add_argument(
+        "--without-peers", action="store_true", help="the engine alone; without it, they are asked later"
+    )
     parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
     parser.add_argument("--show", nargs=2, metavar=("TRUTH", "SEED"), help="one set, its seal opened")
     parser.add_argument("--against", type=Path, metavar="FILE", help="sets of which another file says otherwise")
