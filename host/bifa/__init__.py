@@ -6,7 +6,7 @@ verdict = robot.diagnose(dataset)
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bifa.version import __version__
 
@@ -21,6 +21,16 @@ _WHERE = {  # imported when first asked for: a command waits only for what it us
     "BifaError": ("bifa.errors", "BifaError"),
 }
 __all__ = ["__version__", *_WHERE]
+
+if TYPE_CHECKING:  # the same, for those who read types
+    from bifa.errors import BifaError as BifaError
+    from bifa.notebook import Robot as Robot
+    from bifa.notebook import connect as connect
+    from bifa.notebook import load_dataset as load_dataset
+    from bifa.robot.gait import BASELINE as BASELINE
+    from bifa.robot.gait import Gait as Gait
+    from bifa.robot.gait import load_gait as load_gait
+    from bifa.robot.gait import save_gait as save_gait
 
 
 def __getattr__(name: str) -> Any:

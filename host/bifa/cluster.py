@@ -11,6 +11,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from bifa.errors import BifaError
 
@@ -36,15 +37,15 @@ class Tls:
     cert: Path | None = None
     key: Path | None = None
 
-    def security(self):
+    def security(self) -> Any:
         """As distributed wants it; None leaves it to its configuration. Raises ClusterError."""
         files = {"--dask-ca": self.ca, "--dask-cert": self.cert, "--dask-key": self.key}
-        given = [name for name, file in files.items() if file is not None]
+        given = {name: file for name, file in files.items() if file is not None}
         if not given:
             return None
         if missing := [name for name in files if name not in given]:
             raise ClusterError(f"TLS needs {', '.join(files)} together: {', '.join(missing)} is missing")
-        for name, file in files.items():
+        for name, file in given.items():
             if not file.is_file():
                 raise ClusterError(f"{name} {file}: no such file")
         from distributed.security import Security

@@ -57,10 +57,10 @@ def check_targets(
 
 def _refuse_same(files: tuple[Path | None, ...], folders: tuple[Path | None, ...]) -> None:
     taken: set[Path] = set()
-    for path in (path.resolve() for path in files if path is not None):
-        if path in taken:
-            raise TargetError(f"{path} is used for two outputs; choose different paths")
-        taken.add(path)
+    for file in (path.resolve() for path in files if path is not None):
+        if file in taken:
+            raise TargetError(f"{file} is used for two outputs; choose different paths")
+        taken.add(file)
     for path in folders:
         if path is not None and path.resolve() in taken:
             raise TargetError(f"{path} is named for a file and for a folder; give each a name of its own")

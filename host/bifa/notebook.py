@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.robot import BASELINE, Gait, Model, load_model, nominal, read_gait_file, save_model
+
+if TYPE_CHECKING:  # imported when first used: a notebook waits only for what it uses
+    from bifa.gait import Optimum
+    from bifa.link import Uno
+    from lacuna import Verdict
 
 
 def load_dataset(folder: str | Path) -> Dataset:
@@ -32,10 +37,10 @@ class Robot:
         """A walk from rest, sampled at 100 Hz, as a trial of a data set would have it."""
         from bifa.simulate import walk
 
-        gait = _gait(gait)
-        walked = walk(self.model, gait, cycles)
+        chosen = _gait(gait)
+        walked = walk(self.model, chosen, cycles)
         columns = {name: np.asarray(column) for name, column in walked.columns.items()}
-        return Trial(f"{self.model.name}_simulated.csv", "locomotion", columns, gait=gait.as_dict())
+        return Trial(f"{self.model.name}_simulated.csv", "locomotion", columns, gait=chosen.as_dict())
 
     def speed_mm_s(self, gait: Gait | str | Path = BASELINE, cycles: int = 10) -> float:
         """Of the last cycle."""
@@ -43,7 +48,7 @@ class Robot:
 
         return float(speeds(self.model, gait_rows([_gait(gait)]), cycles, 1e-6).speed_mm_s[0])
 
-    def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None):
+    def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None) -> Verdict:
         """What this robot's model lacks, by a data set: a `lacuna.Verdict`. `matters`: RMS error by column up to which
         a prediction is good enough. Minutes of processor for a whole campaign."""
         import lacuna
@@ -54,13 +59,13 @@ class Robot:
         system.accuracies = accuracies([f"{name}={value}" for name, value in (matters or {}).items()])
         return lacuna.diagnose(system, seed=seed)
 
-    def completed(self, verdict) -> Robot:
+    def completed(self, verdict: Verdict) -> Robot:
         """The robot with what a verdict found: fitted values, effects, learnt curves."""
         from bifa.identify.completed import completed_model
 
         return Robot(completed_model(verdict.diagnosis.final))
 
-    def optimise(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None):
+    def optimise(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None) -> Optimum:
         """The fastest gait on this robot, or (robust) on nine in ten like it: a `bifa.gait.Optimum`, with `gait`."""
         from bifa.gait import Settings, optimise, simulations
 
@@ -74,7 +79,7 @@ class Robot:
 
 
 @contextmanager
-def connect(port: str | None = None) -> Iterator[Any]:
+def connect(port: str | None = None) -> Iterator[Uno]:
     """The Uno at `port` (a serial port, `virtual`, or found by itself), connected: a `bifa.link.Uno`. Valves are off
     at the end."""
     from bifa.link import Uno

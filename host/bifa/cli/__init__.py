@@ -7,7 +7,7 @@ import importlib
 import io
 import pkgutil
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import typer.core
@@ -20,7 +20,7 @@ from bifa.printable import printable
 class _Commands(typer.core.TyperGroup):
     """Ctrl-C ends each command with a line that says what was kept."""
 
-    def invoke(self, ctx):
+    def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:

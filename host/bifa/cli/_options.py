@@ -3,7 +3,7 @@
 import pkgutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Literal
+from typing import Any, Literal
 
 import typer
 
@@ -53,12 +53,12 @@ def stages(incomplete: str = "") -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def port_option(text: str = "Serial port, `virtual`, or the name of a rig; detected if left out."):
+def port_option(text: str = "Serial port, `virtual`, or the name of a rig; detected if left out.") -> Any:
     """The option --port."""
     return typer.Option(help=text, metavar="PORT", autocompletion=ports)
 
 
-def file_option(text: str):
+def file_option(text: str) -> Any:
     """An option that names a file to read, which has to be there."""
     return typer.Option(help=text, exists=True, dir_okay=False)
 

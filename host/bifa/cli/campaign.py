@@ -2,12 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option, stoppable
 from bifa.computer import EXAMPLE_PORT
+
+if TYPE_CHECKING:
+    from bifa.campaign.bench import Bench
+    from bifa.measure.by_hand import ByHand
+    from bifa.measure.desk import Desk
+    from bifa.screen import Console
+
 
 EPILOG = f"""Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
 bifa campaign --rerun diagnose   |
@@ -120,7 +127,7 @@ def _check(out: Path, port: str) -> None:
     check_port(port)
 
 
-def _attended(console, bench, watch: Path | None, bench_file: Path | None):
+def _attended(console: "Console", bench: "Bench", watch: Path | None, bench_file: Path | None) -> "Bench":
     """The bench with somebody at its desk, and what is known of it."""
     from dataclasses import replace
 
@@ -131,7 +138,7 @@ def _attended(console, bench, watch: Path | None, bench_file: Path | None):
     return replace(bench, known=known, hands=hands)
 
 
-def at_desk(console, watch: Path | None, bench_file: Path | None = None):
+def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = None) -> "tuple[Desk, ByHand]":
     """The desk on this terminal, and who works the instruments there (`bifa.measure.by_hand`)."""
     from bifa.errors import BifaError
     from bifa.measure.bench_file import read_exports

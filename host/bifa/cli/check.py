@@ -2,11 +2,19 @@
 
 import re
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa.cli._options import DATASET, PICTURES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bifa.data import Dataset
+    from bifa.data.check import Finding
+    from bifa.screen import Console
+
 
 _MOST_ALIKE = 3  # warnings that say the same of other files, but for their numbers
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
@@ -56,17 +64,17 @@ def register(app: typer.Typer) -> None:
             raise typer.Exit(1)
 
 
-def warn_of_units(console, dataset) -> None:
+def warn_of_units(console: "Console", dataset: "Dataset") -> None:
     """What a fit would stumble over, or make a diagnosis of."""
     from bifa.mistakes import find_mistakes
 
     _print_findings(console, [finding for finding in find_mistakes(dataset) if finding.kind == "unit"])
 
 
-def _print_findings(console, findings) -> None:
+def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
     from rich.text import Text
 
-    alike: dict[tuple[Any, ...], list[Any]] = {}
+    alike: dict[tuple[object, ...], list[Finding]] = {}
     for finding in findings:
         apart = finding if finding.file is None or finding.line is not None else None
         key = (finding.kind, finding.column, _NUMBER.sub("", finding.text), apart)
@@ -76,11 +84,11 @@ def _print_findings(console, findings) -> None:
         for finding in shown:
             console.print(Text.assemble(("warning", "yellow"), f" [{finding.kind}] {finding}"), highlight=False)
         if named:
-            files = ", ".join(finding.file for finding in named)
+            files = ", ".join(finding.file or "" for finding in named)
             console.print(Text(f"  likewise in {len(named)} more: {files}"), highlight=False)
 
 
-def _print_contents(console, dataset) -> None:
+def _print_contents(console: "Console", dataset: "Dataset") -> None:
     from bifa.report.page import Table
     from bifa.report.terminal import print_lines, print_table
     from bifa.report.words import parameter_words, quantity

@@ -1,12 +1,17 @@
 """`bifa console`: the Uno's text console with history, completion and a status line."""
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa.cli._options import PORT
 from bifa.computer import EXAMPLE_PORT
+
+if TYPE_CHECKING:
+    from bifa.link import Uno
+    from bifa.rig import Rig
+
 
 EPILOG = f"""Examples:  bifa console   |   bifa console --port virtual   |
 echo show | bifa console --port {EXAMPLE_PORT}"""
@@ -51,7 +56,7 @@ def console(
             typer.echo("the Uno confirms that all valves are off")
 
 
-def _pipe(uno, rig) -> bool:
+def _pipe(uno: "Uno", rig: "Rig") -> bool:
     from bifa.link.terminal import type_line
 
     good = True

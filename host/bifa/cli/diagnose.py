@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bifa import cluster
 from bifa.cli._options import DATASET, WATCH, file_option, port_option
 from bifa.cli.check import warn_of_units
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
+
+    from rich.progress import Progress
+
+    from bifa.data import Dataset
+    from bifa.rig import Rig
+    from bifa.robot import Model
+    from bifa.screen import Console
+    from lacuna.diagnosis.diagnose import Diagnosis
 
 
 def register(app: typer.Typer) -> None:
@@ -77,14 +90,24 @@ def diagnose(
     _report(console, measured, found, json, out, report)
 
 
-def _found(console, measured, robot, good_enough, seed: int, resolved: Path | None, port, watch, workers):
+def _found(
+    console: Console,
+    measured: Dataset,
+    robot: Model | None,
+    good_enough: dict[str, float],
+    seed: int,
+    resolved: Path | None,
+    port: str | None,
+    watch: Path | None,
+    workers: AbstractContextManager[tuple[Executor | None, int]],
+) -> Diagnosis:
     """The diagnosis of a data set; `resolved`: with experiments that separate, recorded into this folder."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from bifa.campaign.resolve import resolve
     from bifa.identify.start import prepare
     from bifa.report.words import spoken
-    from lacuna.diagnosis.diagnose import Diagnosis, diagnose
+    from lacuna.diagnosis.diagnose import diagnose
 
     with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("fitting stiffness curves")
@@ -92,7 +115,7 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
         def said(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
 
-        def diagnosed(trials) -> Diagnosis:
+        def diagnosed(trials: Dataset) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
             return diagnose(system, seed=seed, progress=said, executor=executor)
@@ -105,7 +128,14 @@ def _found(console, measured, robot, good_enough, seed: int, resolved: Path | No
     return found
 
 
-def _report(console, measured, found, json: Path | None, model: Path | None, page: Path | None) -> None:
+def _report(
+    console: Console,
+    measured: Dataset,
+    found: Diagnosis,
+    json: Path | None,
+    model: Path | None,
+    page: Path | None,
+) -> None:
     """Print the diagnosis, and write what was asked for."""
     from datetime import date
     from json import dumps
@@ -130,7 +160,7 @@ def _report(console, measured, found, json: Path | None, model: Path | None, pag
         console.print(f"report: {page}", highlight=False)
 
 
-def _curves(found, labels):
+def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
     """Held-out trials as measured, and as the base model and the completed one predict them."""
     from bifa.report.compared_curves import compared_curves
     from bifa.report.evidence import BASE, COMPLETED
@@ -142,7 +172,9 @@ def _curves(found, labels):
     return compared_curves(trials, predictions, labels)
 
 
-def _rigs(measured, port: str | None, console, watch: Path | None, progress):
+def _rigs(
+    measured: Dataset, port: str | None, console: Console, watch: Path | None, progress: Progress
+) -> Callable[[int], AbstractContextManager[Rig]]:
     """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance; where a person
     works the instruments, no bar redraws itself over the questions."""
     from contextlib import contextmanager
@@ -157,7 +189,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
     desk = cache(lambda: at_desk(console, watch, Path("bench.toml"))[1])  # one for all: each reads the terminal on
 
     @contextmanager
-    def opened(number: int):
+    def opened(number: int) -> Iterator[Rig]:
         with open_rig(port, **options, **({"seed": 1000 + number} if port == "virtual" else {})) as rig:
             if rig.instruments is not None:
                 yield rig
@@ -170,7 +202,7 @@ def _rigs(measured, port: str | None, console, watch: Path | None, progress):
     return opened
 
 
-def print_diagnosis(console, record: dict[str, Any], labels) -> None:
+def print_diagnosis(console: Console, record: dict[str, Any], labels: dict[str, str]) -> None:
     """The record of a diagnosis in the words of its page; `labels`: what trials are called, by file."""
     from bifa.report.diagnosis import further, lacking, noise_table, verdict_sentence
     from bifa.report.terminal import print_lines, print_sections, print_table

@@ -3,12 +3,21 @@
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, file_option, stoppable
 from bifa.computer import EXAMPLE_PORT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bifa.measure.plan import PlannedTrial
+    from bifa.measure.session import Event
+    from bifa.robot import Gait
+    from bifa.screen import Console
+
 
 EPILOG = f"""Examples:  bifa experiment all --port virtual --out out/bench   |
 bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
@@ -87,6 +96,7 @@ def experiment(
     from bifa.measure import plan
     from bifa.measure.known import parse_known
     from bifa.ranges import RANGES
+    from bifa.robot import BASELINE
     from bifa.screen import Console
 
     console = Console()
@@ -99,7 +109,7 @@ def experiment(
         raise typer.BadParameter(f"--rate is a finite number of mm/s, not {rate:g}")
     if inclination and name not in (Experiment.LOCOMOTION, Experiment.ALL):
         raise typer.BadParameter(f"--inclination is of walks; leave it out, or run locomotion instead of {name.value}")
-    gaits = [_load(path) for path in gait] if gait else [plan.BASELINE, plan.BRISK, plan.AMBLE]
+    gaits = [_load(path) for path in gait] if gait else [BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
         actuators=(actuator.value,) if actuator else plan.ACTUATORS,
@@ -133,7 +143,7 @@ def _kept(out: Path) -> str:
     return f"{len(list(partial.glob('*.csv')))} finished trials are kept in {partial}"
 
 
-def _load(path: Path):
+def _load(path: Path) -> "Gait":
     from bifa.robot.gait import read_gait_file
 
     file = read_gait_file(path)
@@ -142,7 +152,17 @@ def _load(path: Path):
     return file.gait
 
 
-def _run(console, port, options, out, trials, name, known, watch, bench) -> None:
+def _run(
+    console: "Console",
+    port: str | None,
+    options: dict[str, Any],
+    out: Path,
+    trials: "Sequence[PlannedTrial]",
+    name: str,
+    known: dict[str, float],
+    watch: Path | None,
+    bench: Path,
+) -> None:
     from contextlib import nullcontext
 
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -158,7 +178,7 @@ def _run(console, port, options, out, trials, name, known, watch, bench) -> None
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    errors = []
+    errors: list[float] = []
     with open_rig(port, **options) as rig:
         by_hand = rig.instruments is None
         if by_hand:
@@ -166,7 +186,7 @@ def _run(console, port, options, out, trials, name, known, watch, bench) -> None
         bars = Progress(*columns, console=console)
         task = bars.add_task(name, total=len(trials))
 
-        def show(event) -> None:
+        def show(event: "Event") -> None:
             bars.update(task, description=event.planned.title, completed=event.number - 1 + event.share)
             if event.clock_error_s is not None:
                 errors.append(event.clock_error_s)
@@ -191,7 +211,7 @@ def _run(console, port, options, out, trials, name, known, watch, bench) -> None
     console.print(f"Next: bifa check {out}, then bifa fit {out} --out model.toml")
 
 
-def _only(trials):
+def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
     """The one condition that was named: what a record is of cannot be guessed."""
     first = [trial for trial in trials if trial.repeat == 1]
     if len(first) > 1:
@@ -202,7 +222,16 @@ def _only(trials):
     return first[0]
 
 
-def _import(console, instrument, telemetry, planned, out, known, add, bench) -> None:
+def _import(
+    console: "Console",
+    instrument: Path,
+    telemetry: Path | None,
+    planned: "PlannedTrial",
+    out: Path,
+    known: dict[str, float],
+    add: bool,
+    bench: Path,
+) -> None:
     from bifa.data.export import ROLES
     from bifa.measure.bench_file import read_exports
     from bifa.measure.instrument_csv import import_trial

@@ -1,11 +1,15 @@
 """`bifa gaits`: the library of gaits, and the command that makes it."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa.cli._options import file_option, gait_names, stoppable
+
+if TYPE_CHECKING:
+    from bifa.screen import Console
+
 
 EPILOG = """Examples:  bifa gaits   |   bifa gaits --make   |   bifa gaits --make --model mine.toml --out my-gaits"""
 
@@ -66,7 +70,7 @@ def gaits(
     console.print(f"files: {library.FOLDER / 'NAME.toml'}", highlight=False, soft_wrap=True)
 
 
-def _make(console, model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:
+def _make(console: "Console", model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:
     from dataclasses import replace
 
     from bifa.cli.optimize import search_progress

@@ -1,11 +1,20 @@
 """`bifa monitor`: pressures, valves and phases, live."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa.cli._options import PORT, file_option
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bifa.link import Uno
+    from bifa.rig import Rig
+    from bifa.robot import Model
+    from bifa.screen import Console
+
 
 _WEB_PORT = 8765
 
@@ -70,7 +79,14 @@ def monitor(
             typer.echo("valves off")
 
 
-def _fly(rig, console, port: int, model, seconds: float | None, begin) -> None:
+def _fly(
+    rig: "Rig",
+    console: "Console",
+    port: int,
+    model: "Model",
+    seconds: float | None,
+    begin: "Callable[[Uno], None]",
+) -> None:
     """Serve the page and fly until Ctrl-C or for `seconds`."""
     from bifa.link import Uno
     from bifa.live.web.pilot import Pilot

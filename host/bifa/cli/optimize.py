@@ -3,13 +3,23 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bifa import cluster
 from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
 from bifa.files import named
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from bifa.gait import Settings
+    from bifa.gait.pool import Simulations
+    from bifa.gait.search import Optimum
+    from bifa.robot import Model
+    from bifa.screen import Console
+
 
 EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
 bifa optimize --out fast.toml --nominal --method de   |
@@ -88,7 +98,7 @@ def _beside(out: Path) -> Path:
     return out.with_name(f"{folder.name}-pictures") if taken else folder
 
 
-def _best(console, robot, pool, settings):
+def _best(console: "Console", robot: "Model", pool: "Simulations", settings: "list[Settings]") -> "Optimum":
     """The best optimum of one search after another, each with its line."""
     from bifa.gait import optimise
 
@@ -102,7 +112,7 @@ def _best(console, robot, pool, settings):
     return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
 
 
-def _explain(console, robot, pool, best, folder: Path) -> None:
+def _explain(console: "Console", robot: "Model", pool: "Simulations", best: "Optimum", folder: Path) -> None:
     """Draw the pictures into `folder` and print why the gait is faster."""
     from bifa.files import written_into
 
@@ -115,14 +125,14 @@ def _explain(console, robot, pool, best, folder: Path) -> None:
 
 
 @contextmanager
-def search_progress(console) -> Iterator[Callable[..., Any]]:
+def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
     """Gives a function: title -> what `optimise` reports progress to."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[best]}"))
     with Progress(*columns, console=console, transient=True) as progress:
 
-        def begin(title: str):
+        def begin(title: str) -> Callable[[str, float, float], None]:
             task = progress.add_task(title, total=1.0, best="")
 
             def report(stage: str, share: float, best: float) -> None:
@@ -133,14 +143,14 @@ def search_progress(console) -> Iterator[Callable[..., Any]]:
         yield begin
 
 
-def _line(optimum) -> str:
+def _line(optimum: "Optimum") -> str:
     return (
         f"seed {optimum.settings.seed}: {optimum.nominal_mm_s:.2f} mm/s on the model, 10th percentile "
         f"{optimum.quantile_mm_s:.2f} mm/s; {optimum.evaluations} gaits, {optimum.simulations} simulations"
     )
 
 
-def _summary(optimum):
+def _summary(optimum: "Optimum") -> "Table":
     import numpy as np
     from rich.table import Table
 
@@ -159,7 +169,7 @@ def _summary(optimum):
     return table
 
 
-def _pictures(robot, pool, optimum, folder: Path) -> list[str]:
+def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: Path) -> list[str]:
     from bifa.gait import Settings, library, optimise
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution

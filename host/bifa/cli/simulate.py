@@ -1,11 +1,22 @@
 """`bifa simulate`: walk a model with a gait; or the paper's figures beside the model's."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bifa.cli._options import PICTURES, Obstacle, file_option
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+
+    from bifa.robot import Gait, Model
+    from bifa.screen import Console
+    from bifa.simulate import Progress, SimulatedTrial, Supports
+    from bifa.simulate.terrain import Obstacle as Obstacle_
+
 
 _CYCLES, _BUCKLING_N = 10, 27.0
 
@@ -78,18 +89,27 @@ def simulate(
         console.print(f"picture: {pictures / 'walk.png'}", highlight=False)
 
 
-def _walks_otherwise(cycles, inclination, payload, obstacle, buckling, pictures, out) -> bool:
-    asked = (cycles, inclination, payload, obstacle, buckling, pictures, out)
+def _walks_otherwise(*asked: object) -> bool:
     return asked != (_CYCLES, 0.0, 0.0, None, _BUCKLING_N, None, None)
 
 
-def _walk(console, model, gait, cycles, inclination, obstacle, buckling):
+def _walk(
+    console: "Console",
+    model: "Model",
+    gait: "Gait",
+    cycles: int,
+    inclination: float,
+    obstacle: Obstacle | None,
+    buckling: float,
+) -> "tuple[SimulatedTrial, float]":
     """Simulate and print the walk; its record, and the speed of the last cycle in mm/s."""
     with console.status("simulating"):
         from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
 
         ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
-        place = {"inclination_deg": inclination} | ({"terrain": terrain(ahead, supports)} if ahead else {})
+        place: dict[str, Any] = {"inclination_deg": inclination} | (
+            {"terrain": terrain(ahead, supports)} if ahead else {}
+        )
         record = walk(model, gait, cycles, **place)
         progress = speeds(model, gait_rows([gait]), cycles, 1e-6, **place)
     _print_walk(console, model, gait, progress)
@@ -98,7 +118,7 @@ def _walk(console, model, gait, cycles, inclination, obstacle, buckling):
     return record, float(progress.speed_mm_s[0])
 
 
-def _print_walk(console, model, gait, progress) -> None:
+def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Progress") -> None:
     from rich.table import Table
 
     table = Table(title=f"{model.name}, period {gait.period_s:g} s", title_justify="left")
@@ -115,7 +135,14 @@ def _print_walk(console, model, gait, progress) -> None:
         )
 
 
-def _print_passing(console, model, gait, ahead, supports, inclination: float) -> None:
+def _print_passing(
+    console: "Console",
+    model: "Model",
+    gait: "Gait",
+    ahead: "Sequence[Obstacle_]",
+    supports: "Supports",
+    inclination: float,
+) -> None:
     from bifa.simulate.passing import LONGEST_S, passing
 
     outcome = passing(model, gait, ahead, supports, inclination)
@@ -129,7 +156,7 @@ def _print_passing(console, model, gait, ahead, supports, inclination: float) ->
         )
 
 
-def _print_paper(console, model, gait) -> None:
+def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None") -> None:
     """Both shipped models, or the one given, with its fastest gait."""
     from rich.table import Table
 
@@ -151,7 +178,7 @@ def _print_paper(console, model, gait) -> None:
         _print_obstacles(console, chosen, fast)
 
 
-def _print_obstacles(console, model, fast) -> None:
+def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
     """The paper's section VI.B: who gets through, and which stroke is too short for it."""
     from rich.table import Table
 
@@ -171,7 +198,7 @@ def _print_obstacles(console, model, fast) -> None:
     console.print(table)
 
 
-def _write_csv(path: Path, columns) -> None:
+def _write_csv(path: Path, columns: "Mapping[str, np.ndarray]") -> None:
     import numpy as np
 
     from bifa.files import written

@@ -204,7 +204,7 @@ def _missing_experiments(dataset: Dataset) -> Iterator[Finding]:
             yield Finding("missing experiment", f"no trial of {experiment}")
     for actuator in ("large", "small"):
         statics = dataset.of("static_loading", actuator)
-        if statics and not any(abs(trial.pressure_psi) < 0.5 for trial in statics):
+        if statics and not any(abs(trial.commanded_psi) < 0.5 for trial in statics):
             text = f"no static loading of the {actuator} actuator at 0 psi: its stiffness curve K depends on the area"
             yield Finding("missing experiment", text)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import tables
+from .errors import DatasetError
 from .layout import EXPERIMENTS, SETTINGS
 
 
@@ -35,6 +36,32 @@ class Trial:
     def time_s(self) -> np.ndarray:
         """Sample times, strictly increasing, shape (samples,)."""
         return self.columns["time_s"]
+
+    @property
+    def commanded_psi(self) -> float:
+        """`pressure_psi`, of an experiment at one; DatasetError where there is none."""
+        return float(self._given("pressure_psi"))
+
+    @property
+    def commanded_mm_s(self) -> float:
+        """`rate_mm_s`, of a static loading or an anchor pull; DatasetError where there is none."""
+        return float(self._given("rate_mm_s"))
+
+    @property
+    def tested(self) -> str:
+        """`actuator`, of a static loading or a step response; DatasetError where there is none."""
+        return str(self._given("actuator"))
+
+    @property
+    def walked(self) -> dict[str, float]:
+        """`gait`, of a walk; DatasetError where there is none."""
+        return dict(self._given("gait"))
+
+    def _given(self, name: str) -> Any:
+        value = getattr(self, name)
+        if value is None:
+            raise DatasetError(f"{self.experiment} without {name}", file=self.file)
+        return value
 
     @property
     def rate_hz(self) -> float:
@@ -73,11 +100,11 @@ class Trial:
             parts.append(f"pipe at {self.extra['inclination_deg']:g} degrees")
         return ", ".join(parts)
 
-    def to_pandas(self):
+    def to_pandas(self) -> Any:
         """The columns as a DataFrame over time; the condition and the repeat in its `attrs`."""
         return tables.to_pandas(self)
 
-    def plot(self, axes=None):
+    def plot(self, axes: Any = None) -> Any:
         """Draw every column over time, one quantity below the other; returns the figure."""
         return tables.plot(self, axes)
 
@@ -94,6 +121,13 @@ class Dataset:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     exports: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def folder(self) -> Path:
+        """`path`, of a data set on disk; DatasetError where it is in memory only."""
+        if self.path is None:
+            raise DatasetError(f"{self.name!r} is in memory only: write it first")
+        return self.path
+
     def of(self, experiment: str, actuator: str | None = None) -> tuple[Trial, ...]:
         """The trials of one experiment, of one actuator where given."""
         return tuple(
@@ -104,7 +138,7 @@ class Dataset:
         """The highest number of a repeat of a condition; 0 where there is none."""
         return max((trial.repeat for trial in self.trials if trial.condition == condition), default=0)
 
-    def to_pandas(self):
+    def to_pandas(self) -> Any:
         """All trials below one another, by file and time."""
         return tables.stacked(self.trials)
 

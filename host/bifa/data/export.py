@@ -140,7 +140,10 @@ def _column(sheet: Sheet, export: Export, name: str) -> np.ndarray:
 
 def _scale(export: Export, name: str) -> float:
     unit = export.units.get(name)
-    size = 1.0 / export.rate_hz if unit == FRAME else _sizes(name).get(unit, 1.0)
+    if unit == FRAME and export.rate_hz is not None:
+        size = 1.0 / export.rate_hz
+    else:
+        size = _sizes(name).get(unit, 1.0) if unit else 1.0
     return size * export.factor.get(name, 1.0) * export.sign.get(name, 1)
 
 
@@ -219,7 +222,7 @@ def _export(fields: Fields, name: str, given: dict[str, Any]) -> Export:
     except ValueError as error:
         raise fields.error("zone", str(error)) from None
     tables = {key: given[key] for key in ("columns", "units", "factor", "sign", "where")}
-    rest = {key: given.get(key) for key in ("date_format", "zone")}
+    rest: dict[str, Any] = {key: given.get(key) for key in ("date_format", "zone")}
     return Export(name, form, **tables, **rest, rate_hz=rate_hz, sync=sync, threshold=float(threshold))
 
 
@@ -234,8 +237,9 @@ def _form(fields: Fields, given: Mapping[str, Any]) -> Form:
         whole = key in ("skip_rows", "header_rows", "units_rows")
         if isinstance(value, bool) or not isinstance(value, int if whole else str):
             raise fields.error(key, f"must be {'a whole number' if whole else 'a string'}")
-        if whole and not (key == "header_rows") <= value < 10_000:
-            raise fields.error(key, f"{value} is outside {int(key == 'header_rows')} to 9999")
+        least = int(key == "header_rows")
+        if isinstance(value, int) and not least <= value < 10_000:
+            raise fields.error(key, f"{value} is outside {least} to 9999")
         how[key] = value
     how["separator"] = SEPARATORS.get(how.get("separator", ","), how.get("separator", ","))
     if how["separator"] not in SEPARATORS.values():

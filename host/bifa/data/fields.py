@@ -25,10 +25,12 @@ class Source:
 
         Where the key itself has no line of its own, that of the innermost table around it.
         """
+        section: tuple[str, ...] = ()
         if trial is None:
-            first, end, section = 1, len(self._lines) + 1, ()
+            first, end = 1, len(self._lines) + 1
         elif self._trials:
-            first, end, section = *self._trials[trial - 1], ("trial",)
+            first, end = self._trials[trial - 1]
+            section = ("trial",)
         else:
             return None
         wanted = (*section, *path)

@@ -45,13 +45,13 @@ def displacement_lag(trial: Trial) -> Lag | None:
     time_s, (length_mm, pressure_psi) = trial.time_s, _body(trial)
     motion = CubicSpline(time_s, length_mm)
     found = [_of_snap(time_s[k], motion, pressure_psi[k]) for k in _snaps(time_s, motion(time_s, 1))]
-    found = np.array([pair for pair in found if pair is not None])
-    if not len(found):
+    pairs = np.array([pair for pair in found if pair is not None])
+    if not len(pairs):
         return None
-    late_s, sd_s = found.T
+    late_s, sd_s = pairs.T
     middle_s = float(np.median(late_s))
     scatter_s = 1.4826 * float(np.median(np.abs(late_s - middle_s)))
-    return Lag(middle_s, max(scatter_s, float(np.median(sd_s))) / np.sqrt(len(found)), len(found))
+    return Lag(middle_s, max(scatter_s, float(np.median(sd_s))) / np.sqrt(len(pairs)), len(pairs))
 
 
 def misfit(lag: Lag, others: Sequence[Lag] = ()) -> str | None:

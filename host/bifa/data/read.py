@@ -3,6 +3,7 @@
 import itertools
 import os
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from types import MappingProxyType
 from typing import Any
@@ -193,11 +194,19 @@ def _gait(fields: Fields) -> dict[str, float]:
 
 
 def _inside(
-    folder: Path, head: dict[str, Any], source: Source, number: int, exports: dict[str, Export] = MappingProxyType({})
+    folder: Path,
+    head: dict[str, Any],
+    source: Source,
+    number: int,
+    exports: Mapping[str, Export] = MappingProxyType({}),
 ) -> Path:
     """The path of a trial's file, certain to be a regular file within the folder."""
     file = head["file"]
-    place = {"file": TABLE_FILE, "line": source.line(number, ("file",)), "column": f"trial {number}, file"}
+    place: dict[str, Any] = {
+        "file": TABLE_FILE,
+        "line": source.line(number, ("file",)),
+        "column": f"trial {number}, file",
+    }
     if PurePosixPath(file).is_absolute() or PureWindowsPath(file).anchor or ".." in Path(file).parts:
         raise DatasetError(f"{file!r} is outside the data set; name a file within the folder", **place)
     if not file.endswith(".csv") and ROLES[head["experiment"]] not in exports:

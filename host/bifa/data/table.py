@@ -22,14 +22,14 @@ def read_table(path: Path, file: str, layout: Layout) -> dict[str, np.ndarray]:
     `file` is the name used in errors. Raises DatasetError naming file, line and column for anything that is
     not exactly the format: nothing is skipped, filled or converted.
     """
-    values = _read_fast(path, file, layout)
-    if values is None:
+    read = _read_fast(path, file, layout)
+    if read is None:
         lines = _decode(path, file).split("\n")
         if lines[-1] == "":
             lines.pop()  # the file ends with a newline
         names = _header(lines, file, layout)
-        values = names, _parse_slowly(lines, names, file)
-    names, values = values
+        read = names, _parse_slowly(lines, names, file)
+    names, values = read
     columns = {name: np.ascontiguousarray(values[:, index]) for index, name in enumerate(names)}
     check_values(columns, file)
     return columns

@@ -131,14 +131,14 @@ def add_trial(dataset: Dataset, trial: Trial) -> Dataset:
             f"{dataset.path} declares how instruments write its files ([instrument]), and trials are added in the data "
             "set's own form: add to a copy of it, write_dataset(folder, read_dataset(...))"
         )
-    grown = replace(dataset, trials=(*dataset.trials, trial))
-    probe = dataset.path / f"{_PROBE}{secrets.token_hex(4)}"
+    folder, grown = dataset.folder, replace(dataset, trials=(*dataset.trials, trial))
+    probe = folder / f"{_PROBE}{secrets.token_hex(4)}"
     write_dataset(probe, replace(dataset, path=None, trials=(trial,)))
     try:
-        target = dataset.path / trial.file
+        target = folder / trial.file
         target.parent.mkdir(parents=True, exist_ok=True)
         os.replace(probe / trial.file, target)
-        _write_toml(dataset.path, grown)
+        _write_toml(folder, grown)
     finally:
         shutil.rmtree(probe, ignore_errors=True)
     return grown

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from bifa.identify.robust import labelled, with_uncertainty
 from bifa.pipe_robot.sites import learnt_curves
+from bifa.pipe_robot.system import RobotSystem
 from bifa.robot import Model
 from bifa.simulate import plant
 from lacuna.estimation.clustered import clustered_covariance
@@ -19,7 +21,7 @@ def completed_model(fit: Fit, date: str = "") -> Model:
     """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of those
     values that the data determine. `date`: of the fit, for its provenance."""
     structure = fit.structure
-    system = structure.system
+    system = cast(RobotSystem, structure.system)
     model = system.model_at(fit.theta, structure.effects)
     model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
     known = uncertainty(fit)

@@ -39,7 +39,7 @@ def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | N
     Raises UndeterminedError without a trial at 0 psi.
     """
     trials = dataset.of("static_loading", actuator)
-    unloaded = [trial for trial in trials if abs(trial.pressure_psi) < UNPRESSURISED_PSI]
+    unloaded = [trial for trial in trials if abs(trial.commanded_psi) < UNPRESSURISED_PSI]
     if not unloaded:
         raise UndeterminedError(
             f"the stiffness curve of the {actuator} actuator cannot be determined: there is no static_loading of it at "
@@ -65,18 +65,18 @@ def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
     areas, weights = [], []
     for trial in trials:
         x, force, _ = _branches(trial)
-        areas.append(np.mean(stiffness.force(x) - force) / trial.pressure_psi)
-        weights.append(trial.pressure_psi**2)
+        areas.append(np.mean(stiffness.force(x) - force) / trial.commanded_psi)
+        weights.append(trial.commanded_psi**2)
     # What is not known of K's mean shifts every trial alike, so the scatter between them does not show it.
     x = np.linspace(*stiffness.covered_m, 50)
-    mean_pressure = np.average([trial.pressure_psi for trial in trials], weights=weights)
+    mean_pressure = np.average([trial.commanded_psi for trial in trials], weights=weights)
     common_sd = stiffness.mean_force_sd(x) / abs(mean_pressure)
     return weighted_mean(np.array(areas), np.array(weights), common_sd)
 
 
 def _residual_rms(stiffness: StiffnessFit, area: float, trial: Trial) -> float:
     x, force, _ = _branches(trial)
-    return float(np.sqrt(np.mean((force - stiffness.force(x) + area * trial.pressure_psi) ** 2)))
+    return float(np.sqrt(np.mean((force - stiffness.force(x) + area * trial.commanded_psi) ** 2)))
 
 
 def _half_width(x: np.ndarray, force: np.ndarray, loading: np.ndarray, stiffness: StiffnessFit) -> float:

@@ -4,7 +4,7 @@ A diagnosis would look for their cause in the robot. Each check has its own file
 healthy data stay, strong effects included. Nothing here changes what is fitted.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from bifa.data import Dataset, Trial
 from bifa.data.check import Finding
@@ -37,8 +37,12 @@ def find_mistakes(dataset: Dataset) -> list[Finding]:
     """What was mistaken in a data set, as it seems: what is known beforehand, single trials, odd repeats."""
     walks = dataset.of("locomotion")
     found = [finding for trial in dataset.trials for finding in mistakes_in(trial, walks)]
-    found += check_strokes(dataset, {finding.file for finding in found if finding.kind == "unit"})
-    files = {finding.file for finding in found}
+    found += check_strokes(dataset, _files(finding for finding in found if finding.kind == "unit"))
+    files = _files(found)
     odd = list(check_repeats(dataset, files))
-    copies = check_copies(dataset, {file for finding in odd for file in (finding.file, *finding.files)})
+    copies = check_copies(dataset, _files(odd) | {file for finding in odd for file in finding.files})
     return [*check_known(dataset.known), *found, *copies, *odd]
+
+
+def _files(findings: Iterable[Finding]) -> set[str]:
+    return {finding.file for finding in findings if finding.file is not None}

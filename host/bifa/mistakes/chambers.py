@@ -69,7 +69,7 @@ def turned(trial: Trial, shares: np.ndarray) -> Iterator[Finding]:
     if chambers:
         names = [f"pressure_{chamber}_psi" for chamber in chambers]
         falls = [
-            -swing(trial.columns[f"command_{chamber}"], trial.columns[name], trial.time_s)
+            -(swing(trial.columns[f"command_{chamber}"], trial.columns[name], trial.time_s) or 0.0)
             for chamber, name in zip(chambers, names, strict=True)
         ]
         listed = ", ".join(f"{psi:.2f}" for psi in falls)
@@ -82,4 +82,4 @@ def _percent(row: np.ndarray, chamber: str) -> str:
 
 
 def _fits(trial: Trial, commands: dict[str, np.ndarray]) -> bool:
-    return not contradicted(trial.gait, seen_gait(trial, commands))
+    return not contradicted(trial.walked, seen_gait(trial, commands))

@@ -1,6 +1,7 @@
 """Does a walk's gait say what its recorded commands did? Both are written down, and either may be of another walk."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ _PERIOD_SHARE = 0.02
 _CYCLE_SHARE = 0.05  # of duties and phases
 _SETTLED = 5.0  # time constants of the coupling, after which phases are what the gait says
 
+Turns = TypeVar("Turns", float, np.ndarray)
+
 _PHASES = {"head": "psi12_deg", "tail": "psi13_deg"}
 _DUTIES = {chamber: f"duty_{chamber}" for chamber in CHAMBERS}
 
@@ -22,10 +25,10 @@ def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
     """A gait that the commands contradict; `walks`, others of the day, may have the gait that they fit."""
     commands = {f"command_{c}": trial.columns[f"command_{c}"] for c in CHAMBERS}
     seen = seen_gait(trial, commands)
-    wrong = contradicted(trial.gait, seen)
+    wrong = contradicted(trial.walked, seen)
     if wrong:
         values = ", ".join(f"{name} = {_written(name, seen[name])}" for name in wrong)
-        given = ", ".join(f"{trial.gait[name]:g}" for name in wrong)
+        given = ", ".join(f"{trial.walked[name]:g}" for name in wrong)
         text = f"the recorded commands have {values}, the gait in dataset.toml {given}"
         yield Finding("gait", f"{text}: {_why(trial, seen, wrong, walks)}", trial.file)
 
@@ -45,7 +48,7 @@ def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, flo
     seen: dict[str, float | None] = {"period_s": period_s}
     for chamber, name in _DUTIES.items():
         seen[name] = _agreed(_vacuum_s(falls[chamber], rises[chamber]) / period_s, _CYCLE_SHARE)
-    begin_s = time_s[0] + _settled_s(trial.gait)
+    begin_s = time_s[0] + _settled_s(trial.walked)
     for chamber, name in _PHASES.items():
         ahead = _ahead(falls[chamber][falls[chamber] > begin_s], falls["body"], period_s)
         turns = _agreed(ahead, _CYCLE_SHARE)
@@ -67,13 +70,13 @@ def _same(name: str, given: float, seen: float) -> bool:
 
 
 def _why(trial: Trial, seen: Mapping[str, float], wrong: Sequence[str], walks: Sequence[Trial]) -> str:
-    given = trial.gait
+    given = trial.walked
     if all(name in _PHASES.values() and _same(name, 360.0 - given[name], seen[name]) for name in wrong):
         return "a phase is how far head and tail are ahead of the body, not behind it; correct dataset.toml"
     if all(name in _DUTIES.values() and _same(name, 1.0 - given[name], seen[name]) for name in wrong):
         return "a duty is the part of the cycle at vacuum, not under pressure; correct dataset.toml"
     for other in walks:
-        if other.gait != given and not contradicted(other.gait, seen):
+        if other.walked != given and not contradicted(other.walked, seen):
             return f"that is the gait of {other.file}; does dataset.toml name the right file?"
     return "another gait was walked than dataset.toml says; correct it there, or walk again"
 
@@ -113,6 +116,6 @@ def _agreed(values: np.ndarray, tolerance: float) -> float | None:
     return middle if np.sum(np.abs(values - middle) <= tolerance) >= 2 else None
 
 
-def _wrapped(turns):
+def _wrapped(turns: Turns) -> Turns:
     """Turns in -0.5 to 0.5."""
     return (turns + 0.5) % 1.0 - 0.5

@@ -28,7 +28,7 @@ def check_step_response(trial: Trial) -> Iterator[Finding]:
         )
         yield Finding("sign", text, trial.file, column="command")
     elif falls:
-        psi = -swing(command, trial.columns["pressure_psi"], time_s)
+        psi = -(swing(command, trial.columns["pressure_psi"], time_s) or 0.0)
         text = f"falls by {psi:.2f} psi while the command is positive, {PORTS}"
         yield Finding("sign", text, trial.file, column="pressure_psi")
     elif shrinks:

@@ -63,15 +63,15 @@ def check_strokes(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[F
         if found:
             strokes[actuator] = float(np.median(found))
     for trial in dataset.trials:
-        actuator, seen_mm, column = _seen(trial)
-        if actuator not in strokes or trial.file in besides:
+        shown, seen_mm, column = _seen(trial)
+        if shown is None or shown not in strokes or trial.file in besides:
             continue
         moved_mm = float(np.ptp(seen_mm))
-        share = moved_mm / strokes[actuator]
+        share = moved_mm / strokes[shown]
         if share > _LARGER or (share < _SMALLER and _snaps(trial.time_s, seen_mm)):
             text = (
-                f"moves by {moved_mm:.3g} mm, and in the testing machine by {strokes[actuator]:.3g} mm"
-                f"{_or_else(moved_mm, 1.2 * strokes[actuator], _MM)}"
+                f"moves by {moved_mm:.3g} mm, and in the testing machine by {strokes[shown]:.3g} mm"
+                f"{_or_else(moved_mm, 1.2 * strokes[shown], _MM)}"
             )
             yield Finding("unit", text, trial.file, column=column)
 
@@ -104,10 +104,10 @@ def _speed(trial: Trial) -> Iterator[Finding]:
     speed_mm_s = _speed_mm_s(trial)
     low, high = _KINDS[trial.actuator].stroke_mm if trial.actuator else (0.0, np.inf)
     moved_mm = _stroke_mm(trial)
-    if speed_mm_s is not None and not _SPEED[0] < speed_mm_s / trial.rate_mm_s < _SPEED[1]:
+    if speed_mm_s is not None and not _SPEED[0] < speed_mm_s / trial.commanded_mm_s < _SPEED[1]:
         text = (
             f"moves at {speed_mm_s:.3g} mm/s where rate_mm_s = {trial.rate_mm_s:g}"
-            f"{_or_else(speed_mm_s, trial.rate_mm_s, _MM, 0.1)}"
+            f"{_or_else(speed_mm_s, trial.commanded_mm_s, _MM, 0.1)}"
         )
         yield Finding("unit", text, trial.file, column="displacement_mm")
     elif moved_mm > high or 0.0 < moved_mm < 0.3 * low:  # a part of the stroke may have been all that was wanted
@@ -141,7 +141,7 @@ def _forces(trial: Trial, force_N: np.ndarray) -> Iterator[tuple[float, tuple[fl
         if pressed >= _HELD_PSI:
             yield abs(float(np.median(force_N))), _PULL_N, "N that the anchor holds:"
         return
-    kind = _KINDS[trial.actuator]
+    kind = _KINDS[trial.tested]
     whole = _stroke_mm(trial) >= kind.stroke_mm[0]
     if whole:
         yield float(np.ptp(force_N)), kind.force_N, "N from the least to the most:"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -23,24 +23,26 @@ from bifa.pipe_robot.switches import (
 )
 from bifa.pipe_robot.unmeasured import LOAD_CELL
 from bifa.simulate import Plant, Timeline
+from bifa.simulate.records import SimulatedTrial
 from lacuna.system import Theta
 
 STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
 _MM = 1e3
+Given = TypeVar("Given", bound="Inputs", covariant=True)
 
 
 @dataclass(frozen=True)
-class Case:
+class Case(Generic[Given]):
     """One robot in a trial. `inputs`: what reached it (learnt curves may change the trial's own); `zeros_m`: K's
     contracted zero of body and small actuator; `nuisances` may hold what varies from run to run."""
 
-    inputs: Inputs
+    inputs: Given
     plant: Plant
     zeros_m: tuple[float, float]
     nuisances: Theta
 
     @property
-    def commands(self) -> Timeline:
+    def commands(self: Case[StepInputs] | Case[WalkInputs]) -> Timeline:
         """When the valves switched."""
         return shifted(self.inputs.commands, self.nuisances.get("switch_late_s", 0.0))
 
@@ -55,13 +57,20 @@ class Inputs(Protocol):
     `positive_psi`: the supply, where the trial sets one of its own for the walk. `bench`: trials with an equal one are
     simulated side by side."""
 
-    channels: tuple[str, ...]
-    actuator: str | None
-    positive_psi: float | None
-    bench: Hashable
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+
+    @property
+    def actuator(self) -> str | None: ...
+
+    @property
+    def positive_psi(self) -> float | None: ...
+
+    @property
+    def bench(self) -> Hashable: ...
 
     @staticmethod
-    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    def simulate(cases: Sequence[Case[Any]], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
         """The channels of each case on one bench, each of shape (n,). `together`: see `bifa.simulate.walks`."""
         ...
 
@@ -104,8 +113,10 @@ class StaticInputs:
         return {name: column[self._is_sample] for name, column in columns.items()}
 
     @staticmethod
-    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
-        first: StaticInputs = cases[0].inputs
+    def simulate(
+        cases: Sequence[Case[StaticInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
+        first = cases[0].inputs
         records = simulate.static_loadings(
             [case.plant for case in cases],
             first.actuator,
@@ -131,7 +142,9 @@ class StepInputs:
         return STEP, self.actuator
 
     @staticmethod
-    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    def simulate(
+        cases: Sequence[Case[StepInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
         records = simulate.step_responses(
             [case.plant for case in cases],
             cases[0].inputs.actuator,
@@ -171,8 +184,10 @@ class PullInputs:
         return ANCHOR, self.rate_mm_s, self.load_cell_N_m, self.extended_psi
 
     @staticmethod
-    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
-        first: PullInputs = cases[0].inputs
+    def simulate(
+        cases: Sequence[Case[PullInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
+        first = cases[0].inputs
         records = simulate.anchor_pulls(
             [case.plant for case in cases],
             [case.inputs.pulled_s for case in cases],
@@ -188,7 +203,7 @@ class PullInputs:
             for record, case in zip(records, cases, strict=True)
         ]
 
-    def _force(self, record: simulate.SimulatedTrial, nuisances: Theta) -> np.ndarray:
+    def _force(self, record: SimulatedTrial, nuisances: Theta) -> np.ndarray:
         """The resistance, passing from the wound-up load cell to sliding over one sample instead of at once.
 
         A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change
@@ -224,7 +239,9 @@ class WalkInputs:
         return WALK
 
     @staticmethod
-    def simulate(cases: Sequence[Case], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    def simulate(
+        cases: Sequence[Case[WalkInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
         records = simulate.walks(
             [case.plant for case in cases],
             [case.commands for case in cases],
@@ -242,9 +259,10 @@ def inputs_of(trial: Trial) -> Inputs:
     return _MAKERS[trial.experiment](trial)
 
 
-def _pressure_psi(trial: Trial) -> float | None:
+def _pressure_psi(trial: Trial) -> float:
     """What the regulator was asked for, where the recorder noted it: its converter has steps of 0.03 psi."""
-    return trial.extra.get("set_point_psi", trial.pressure_psi)
+    noted = trial.extra.get("set_point_psi")
+    return trial.commanded_psi if noted is None else noted
 
 
 def _time_s(trial: Trial) -> np.ndarray:
@@ -254,7 +272,7 @@ def _time_s(trial: Trial) -> np.ndarray:
 def _static(trial: Trial) -> StaticInputs:
     motion = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
     return StaticInputs(
-        trial.actuator,
+        trial.tested,
         _time_s(trial),
         motion.displacement_m,
         motion.direction,
@@ -266,11 +284,11 @@ def _static(trial: Trial) -> StaticInputs:
 
 def _step(trial: Trial) -> StepInputs:
     commands = valves_of(step_timeline(trial), trial)
-    return StepInputs(trial.actuator, _time_s(trial), commands, _pressure_psi(trial), switch_sd_s(trial))
+    return StepInputs(trial.tested, _time_s(trial), commands, _pressure_psi(trial), switch_sd_s(trial))
 
 
 def _pull(trial: Trial) -> PullInputs:
-    rate = abs(trial.rate_mm_s)
+    rate = abs(trial.commanded_mm_s)
     backward = trial.extra.get("direction") == "backward"
     pulled_mm = np.abs(trial.columns["displacement_mm"])
     return PullInputs(
@@ -295,10 +313,10 @@ def _walk(trial: Trial) -> WalkInputs:
         time_s=_time_s(trial),
         commands=valves_of(walk_timeline(trial), trial),
         inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
-        positive_psi=_pressure_psi(trial),
+        positive_psi=trial.extra.get("set_point_psi", trial.pressure_psi),
         channels=(*displacements, *pressures),
         switch_sd_s=switch_sd_s(trial),
     )
 
 
-_MAKERS = {STATIC: _static, STEP: _step, ANCHOR: _pull, WALK: _walk}
+_MAKERS: dict[str, Callable[[Trial], Inputs]] = {STATIC: _static, STEP: _step, ANCHOR: _pull, WALK: _walk}

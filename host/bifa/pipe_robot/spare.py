@@ -10,10 +10,10 @@ from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
 
 # By experiment: what is varied, and of how many settings at least one may be spared.
 _VARIED: dict[str, tuple[Callable[[Trial], float], int]] = {
-    STATIC: (lambda trial: trial.pressure_psi, 3),
-    STEP: (lambda trial: trial.pressure_psi, 2),
-    ANCHOR: (lambda trial: trial.pressure_psi, 3),
-    WALK: (lambda trial: trial.gait["period_s"], 3),
+    STATIC: (lambda trial: trial.commanded_psi, 3),
+    STEP: (lambda trial: trial.commanded_psi, 2),
+    ANCHOR: (lambda trial: trial.commanded_psi, 3),
+    WALK: (lambda trial: trial.walked["period_s"], 3),
 }
 
 

@@ -13,11 +13,11 @@ The fit is a Gaussian posterior, so it carries the uncertainty of every point of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import ArrayLike
 from scipy.optimize import LinearConstraint, minimize
 
 from bifa.pipe_robot.errors import UndeterminedError
@@ -78,7 +78,7 @@ class StiffnessFit:
         i = falling[0]
         return float(x[i] + (x[i + 1] - x[i]) * force[i] / (force[i] - force[i + 1]))
 
-    def with_equilibria(self, x: Sequence[float], force_N: Sequence[float], sd_N: Sequence[float]) -> StiffnessFit:
+    def with_equilibria(self, x: ArrayLike, force_N: ArrayLike, sd_N: ArrayLike) -> StiffnessFit:
         """The posterior after seeing that the actuator rests at x [m] under a pressure force [N] known to sd [N]."""
         rows = self._rows(np.asarray(x)) / np.asarray(sd_N)[:, None]
         information = self.information + rows.T @ rows
@@ -97,11 +97,11 @@ class StiffnessFit:
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         told, turned = np.linalg.eigh(root.T @ self.static @ root)
-        shapes = []
+        ways = []
         for subspace in (turned[:, told < _TOLD], turned[:, told >= _TOLD]):
             _, sizes, directions = np.linalg.svd((root @ subspace).T, full_matrices=False)
-            shapes.append(sizes[:, None] * directions)
-        shapes = np.concatenate(shapes)
+            ways.append(sizes[:, None] * directions)
+        shapes = np.concatenate(ways)
         # A sign for each, so that the coordinates do not depend on the linear algebra library.
         signs = np.sign(shapes[np.arange(len(shapes)), np.argmax(np.abs(shapes), axis=1)])
         return shapes * signs[:, None], np.arange(len(shapes)) >= np.sum(told < _TOLD)

@@ -127,7 +127,7 @@ class RobotSystem(System):
     forks = True  # compiled code without threads or state of its own
 
     @property
-    def at_once(self) -> int:
+    def at_once(self) -> int:  # type: ignore[override]  # not before it is asked for: it may compile
         return lanes.width()
 
     def predict_trials(
@@ -145,7 +145,7 @@ class RobotSystem(System):
         cases = [self._case(theta, learnt, effects, trial) for theta, learnt, trial in each]
         benches: dict[Hashable, list[int]] = {}
         for k, (case, trial) in enumerate(zip(cases, trials, strict=True)):
-            if case:
+            if case is not None:
                 benches.setdefault(trial.payload.bench, []).append(k)
         found: dict[int, Channels] = {}
         for members in benches.values():
@@ -153,13 +153,16 @@ class RobotSystem(System):
             shared = alike and self.at_once > 1
             tolerances_m = _EXACT_M if not coarse else _ALIKE_M if shared else _COARSE_M
             tolerance_m = tolerances_m[first.experiment]
-            simulated = _simulated(first.payload, [cases[k] for k in members], tolerance_m, alike)
-            for k, channels in zip(members, simulated, strict=True):
+            there = [case for case in (cases[k] for k in members) if case is not None]
+            simulated = _simulated(first.payload, there, tolerance_m, alike)
+            for k, case, channels in zip(members, there, simulated, strict=True):
                 if channels:
-                    found[k] = _seen(channels, each[k][1], cases[k], trials[k])
+                    found[k] = _seen(channels, each[k][1], case, trials[k])
         return [found[k] if k in found else _nothing(trial) for k, trial in enumerate(trials)]
 
-    def _case(self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record) -> Case | None:
+    def _case(
+        self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
+    ) -> Case[Inputs] | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
         place = self._place_in_session(trial)
         try:
@@ -318,7 +321,9 @@ def _bench_unknowns(dataset: Dataset) -> list[str]:
     return [name for name, where in _FELT.items() if where in experiments]
 
 
-def _simulated(bench: Inputs, cases: Sequence[Case], tolerance_m: float, alike: bool) -> list[Mapping[str, np.ndarray]]:
+def _simulated(
+    bench: Inputs, cases: Sequence[Case[Inputs]], tolerance_m: float, alike: bool
+) -> list[Mapping[str, np.ndarray]]:
     """The channels of each case; none of one that is out of range."""
     try:
         return bench.simulate(cases, tolerance_m, alike)
@@ -332,7 +337,9 @@ def _nothing(trial: Record) -> Channels:
     return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
 
 
-def _seen(channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case, trial: Record) -> Channels:
+def _seen(
+    channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case[Inputs], trial: Record
+) -> Channels:
     """What the instruments show of a simulation."""
     channels = sites.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
     return {name: channels[name] for name in trial.channels}
@@ -381,4 +388,5 @@ def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | No
 def _with_curves(model: Model, curves: Mapping[str, StiffnessCurve]) -> Model:
     from dataclasses import replace
 
-    return replace(model, **{f"{prefix}_stiffness": curve for prefix, curve in curves.items()})
+    changes: dict[str, Any] = {f"{prefix}_stiffness": curve for prefix, curve in curves.items()}
+    return replace(model, **changes)

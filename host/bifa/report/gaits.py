@@ -3,17 +3,22 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bifa.gait.explain import CYCLES, Anatomy, reasons
 from bifa.gait.search import Optimum
 from bifa.gait.sensitivity import Front, Scan
-from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, figure_style
+from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, Palette, figure_style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 
 _SHOWN_CYCLES = 3  # of the slower gait
 _SETTLED = CYCLES - 2  # cycles of a record, from rest
-_BESIDE = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+_BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
 
 
 def draw_changes(before: Anatomy, after: Anatomy, path: Path, titles: tuple[str, str]) -> None:
@@ -41,7 +46,7 @@ def draw_changes(before: Anatomy, after: Anatomy, path: Path, titles: tuple[str,
         plt.close(figure)
 
 
-def _draw_gait(axes, anatomy: Anatomy, horizon_s: float, palette) -> None:
+def _draw_gait(axes: np.ndarray, anatomy: Anatomy, horizon_s: float, palette: Palette) -> None:
     outputs, pressures, displacement = axes
     record, gait = anatomy.record, anatomy.gait
     start = (CYCLES - min(_SETTLED, math.ceil(horizon_s / gait.period_s))) * gait.period_s
@@ -62,7 +67,7 @@ def _draw_gait(axes, anatomy: Anatomy, horizon_s: float, palette) -> None:
     displacement.set_xlabel("time [s]")
 
 
-def _mark_contraction(axis, contracting: np.ndarray, time: np.ndarray, palette) -> None:
+def _mark_contraction(axis: "Axes", contracting: np.ndarray, time: np.ndarray, palette: Palette) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], contracting.astype(int), [0]))))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         axis.axvspan(time[first], time[min(last, len(time) - 1)], color=palette.quiet, alpha=0.12, linewidth=0)
@@ -113,7 +118,7 @@ def draw_distribution(optimum: Optimum, others: dict[str, np.ndarray], path: Pat
 
         figure, axis = plt.subplots(figsize=(6.8, 4.4), layout="constrained")
         top = max(optimum.speeds_mm_s.max(), *(speeds.max() for speeds in others.values()), 1.0)
-        bins = np.linspace(0, 1.05 * top, 60)
+        bins = np.linspace(0, 1.05 * top, 60).tolist()
         for shade, (name, speeds) in zip((palette.quiet, palette.before), others.items(), strict=False):
             axis.hist(
                 speeds, bins, color=shade, alpha=0.7, label=f"{name}: 10th percentile {np.quantile(speeds, 0.1):.1f}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,12 @@ from bifa.identify.identification import Identification
 from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.style import CHAMBER_COLOURS, Palette, figure_style
 from lacuna.system import Channels, Record
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Pairs = Sequence[tuple[Record, Channels]]  # a trial, and what the model says
 
 
 def draw(found: Identification, folder: Path) -> list[Path]:
@@ -37,13 +43,15 @@ def draw(found: Identification, folder: Path) -> list[Path]:
 class _Pair:
     """A quantity as measured and as modelled, and below it the difference, which at this scale is all that shows."""
 
-    def __init__(self, above, below, unit: str, palette: Palette):
+    def __init__(self, above: Axes, below: Axes, unit: str, palette: Palette) -> None:
         self.above, self.below = above, below
         above.tick_params(labelbottom=False)
         below.axhline(0.0, color=palette.quiet, lw=0.6)
         below.set(ylabel=f"measured\n- model [{unit}]")
 
-    def add(self, x: np.ndarray, measured: np.ndarray, modelled: np.ndarray, colour, label: str | None = None) -> None:
+    def add(
+        self, x: np.ndarray, measured: np.ndarray, modelled: np.ndarray, colour: Any, label: str | None = None
+    ) -> None:
         self.above.plot(x, measured, color=colour, alpha=0.35, lw=2.4)
         self.above.plot(x, modelled, color=colour, lw=1.0, label=label)
         self.below.plot(x, measured - modelled, color=colour, alpha=0.6, lw=0.5)
@@ -59,7 +67,7 @@ class _Pair:
         self.above.legend(unique.values(), unique.keys(), loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def _axes(heights: Sequence[float], columns: int, width: float = 5.2):
+def _axes(heights: Sequence[float], columns: int, width: float = 5.2) -> tuple[Figure, np.ndarray]:
     import matplotlib.pyplot as plt
 
     return plt.subplots(
@@ -73,7 +81,7 @@ def _axes(heights: Sequence[float], columns: int, width: float = 5.2):
     )
 
 
-def _save(figure, path: Path) -> None:
+def _save(figure: Figure, path: Path) -> None:
     import matplotlib.pyplot as plt
 
     figure.align_ylabels()
@@ -81,14 +89,14 @@ def _save(figure, path: Path) -> None:
     plt.close(figure)
 
 
-def _by_actuator(pairs) -> dict[str, list[tuple[Record, Channels]]]:
+def _by_actuator(pairs: Pairs) -> dict[str, list[tuple[Record, Channels]]]:
     groups: dict[str, list[tuple[Record, Channels]]] = {}
     for trial, prediction in pairs:
         groups.setdefault(trial.payload.actuator, []).append((trial, prediction))
     return dict(sorted(groups.items()))
 
 
-def _pressures(pairs) -> dict[float, tuple[Any, ...]]:
+def _pressures(pairs: Pairs) -> dict[float, tuple[Any, ...]]:
     """A colour for each commanded pressure."""
     import matplotlib
 
@@ -97,7 +105,7 @@ def _pressures(pairs) -> dict[float, tuple[Any, ...]]:
     return dict(zip(places, map(tuple, colours), strict=True))
 
 
-def _stiffness(pairs, palette: Palette, path: Path) -> None:
+def _stiffness(pairs: Pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes((3.4, 1.3), len(groups))
     for (above, below), (actuator, mine) in zip(axes.T, groups.items(), strict=True):
@@ -112,7 +120,7 @@ def _stiffness(pairs, palette: Palette, path: Path) -> None:
     _save(figure, path)
 
 
-def _steps(pairs, palette: Palette, path: Path) -> None:
+def _steps(pairs: Pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes((3.0, 1.3, 3.0, 1.3), len(groups))
     for column, (actuator, mine) in zip(axes.T, groups.items(), strict=True):
@@ -132,7 +140,7 @@ def _steps(pairs, palette: Palette, path: Path) -> None:
     _save(figure, path)
 
 
-def _anchor(pairs, palette: Palette, path: Path) -> None:
+def _anchor(pairs: Pairs, palette: Palette, path: Path) -> None:
     figure, ((above,), (below,)) = _axes((3.6, 1.3), 1, 7.2)
     force, colours = _Pair(above, below, "N", palette), _pressures(pairs)
     for trial, prediction in pairs:
@@ -144,7 +152,7 @@ def _anchor(pairs, palette: Palette, path: Path) -> None:
     _save(figure, path)
 
 
-def _walks(pairs, palette: Palette, path: Path) -> None:
+def _walks(pairs: Pairs, palette: Palette, path: Path) -> None:
     """The first repeat of each gait: those that follow would lie on it."""
     first: dict[object, tuple[Record, Channels]] = {}
     for trial, prediction in pairs:

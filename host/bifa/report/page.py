@@ -43,7 +43,7 @@ class Motion:
 
 def render(page: Page) -> str:
     """The page, whose sections are this module's, as one HTML document; all text is escaped."""
-    charts = [chart for section in page.sections for chart in section.charts]
+    charts = [chart for section in page.sections if isinstance(section, Section) for chart in section.charts]
     plots = [as_plot(column, chart.height) for chart in charts for column in chart.columns]
     return (
         environment()
@@ -81,6 +81,6 @@ def template_file(name: str) -> Markup:
     return Markup(files("bifa.report").joinpath("templates", name).read_text(encoding="utf-8"))
 
 
-def _embedded(value) -> Markup:
+def _embedded(value: object) -> Markup:
     """As JSON that cannot end the element it stands in."""
     return Markup(json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from bifa.report.chart import Axis, Chart, Key, Panel, Series
 from bifa.report.style import Palette, figure_style
 
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+
 _PER_INCH = 75.0  # of a chart's pixels
-_DASHES = {"dashed": "--", "dotted": ":"}
+_DASHES: dict[str, Literal["--", ":"]] = {"dashed": "--", "dotted": ":"}
 
 
 def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9.6) -> None:
@@ -52,20 +58,20 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
         plt.close(figure)
 
 
-def _draw(axis, panel: Panel, palette: Palette) -> None:
+def _draw(axis: Axes, panel: Panel, palette: Palette) -> None:
     colours = palette.colours()
     for series in panel.series:
         _draw_series(axis, series, colours[series.colour])
     for along, place, label in panel.rules:
         (axis.axvline if along == "x" else axis.axhline)(place, color=palette.ink, linestyle=":", linewidth=1.0)
         where = {"x": (place, 0.97, axis.get_xaxis_transform()), "y": (0.5, place, axis.get_yaxis_transform())}[along]
-        side = {"ha": "left", "va": "top"} if along == "x" else {"ha": "center", "va": "bottom"}
+        side: dict[str, Any] = {"ha": "left", "va": "top"} if along == "x" else {"ha": "center", "va": "bottom"}
         axis.text(*where[:2], label, transform=where[2], fontsize=8, **side)
-    for name, one in (("x", panel.x), ("y", panel.y)):
-        _scale(axis, name, one)
+    _scale(axis, "x", panel.x)
+    _scale(axis, "y", panel.y)
 
 
-def _draw_series(axis, series: Series, colour: str) -> None:
+def _draw_series(axis: Axes, series: Series, colour: str) -> None:
     x, y = series.x, series.y
     if series.style == "dots":
         axis.plot(x, y, "o", color=colour, markersize=7)
@@ -77,7 +83,7 @@ def _draw_series(axis, series: Series, colour: str) -> None:
         axis.plot(x, y, _DASHES.get(series.style, "-"), color=colour)
 
 
-def _scale(axis, name: str, one: Axis) -> None:
+def _scale(axis: Axes, name: Literal["x", "y"], one: Axis) -> None:
     if one.log:
         axis.set(**{f"{name}scale": "log"})
         getattr(axis, f"{name}axis").set_major_formatter("{x:g}")
@@ -93,12 +99,14 @@ def _scale(axis, name: str, one: Axis) -> None:
     axis.set(**{f"{name}label": one.label})
 
 
-def _handle(key: Key, palette: Palette):
+def _handle(key: Key, palette: Palette) -> Artist:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     colour = palette.colours()[key.colour]
     if key.style == "area":
         return Patch(color=colour, label=key.label)
-    form = {"linestyle": "", "marker": "o"} if key.style == "dots" else {"linestyle": _DASHES.get(key.style, "-")}
+    form: dict[str, Any] = (
+        {"linestyle": "", "marker": "o"} if key.style == "dots" else {"linestyle": _DASHES.get(key.style, "-")}
+    )
     return Line2D([], [], color=colour, label=key.label, **form)

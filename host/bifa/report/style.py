@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from lacuna.report.page import COLOURS
 from lacuna.report.style import LOOK
@@ -32,7 +33,7 @@ class Palette:
 LIGHT = Palette(**COLOURS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
 DARK = Palette(**COLOURS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
 
-_RC = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
+_RC: dict[Any, Any] = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
 
 
 @contextmanager

@@ -30,7 +30,7 @@ def _open_once(port: str) -> None:
             errno.EACCES: PORT_REFUSED.format(port=port),
             errno.EBUSY: PORT_BUSY.format(port=port),
             errno.EAGAIN: PORT_BUSY.format(port=port),
-        }.get(getattr(error, "errno", None))
+        }.get(getattr(error, "errno", None) or 0)
         raise ToolchainError(reason or f"{port} does not open: {error}; {PORT_QUESTIONS}") from error
 
 

@@ -36,7 +36,7 @@ def run(
         errors="replace",
     ) as process:
         try:
-            for line in process.stdout:
+            for line in process.stdout or ():
                 last.append(line.rstrip())
                 on_line(line.rstrip())
         except KeyboardInterrupt:

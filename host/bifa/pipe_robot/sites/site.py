@@ -53,7 +53,12 @@ class Site:
 
     def declared(self, ends_m: tuple[float, float] | None) -> CorrectionSite:
         """As the engine knows it; `ends_m`: of the spring's range, where the curve goes over that."""
-        over = Range("displacement (m)", *ends_m) if isinstance(self.over, str) else self.over
+        if isinstance(self.over, Range):
+            over = self.over
+        elif ends_m is not None:
+            over = Range("displacement (m)", *ends_m)
+        else:
+            raise ValueError(f"{self.name} goes over the range of a spring, which is missing")
         return CorrectionSite(
             self.name,
             self.term,
