@@ -10,10 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 Search = dict[str, Any]
 Rule = Callable[[Search], Sequence[str]]
-_ONE_SIDED = 1.645  # standard errors: 95 %
+_CONFIDENCE = 0.95  # one-sided
 
 
 def least_cost(search: Search) -> Sequence[str]:
@@ -49,18 +50,24 @@ def chosen(search: Search) -> Sequence[str]:
 
 
 def within_confidence(search: Search) -> Sequence[str]:
-    """The smallest explanation that the best one does not beat beyond doubt on trials that it was not fitted to: their
-    losses' differences by condition, and the standard error of these (cross-validation with confidence, Lei, 2020)."""
+    """The smallest explanation that the best one does not beat beyond doubt on trials that it was not fitted to: the
+    differences of their losses by condition, and the standard error of these (cross-validation with confidence, Lei,
+    2020). A difference counts as a share of both losses, or the condition with the largest signal would be the doubt.
+    """
     losses = {k: _by_condition(search, one) for k, one in enumerate(search["tried"])}
     best = min(losses, key=lambda k: losses[k].sum())
-    inside = [search["tried"][k] for k in losses if _not_beaten(losses[k] - losses[best])]
+    inside = [
+        search["tried"][k] for k in losses if _not_beaten((losses[k] - losses[best]) / (losses[k] + losses[best]))
+    ]
     return min(inside, key=lambda one: (len(one["effects"]), one["cost"]))["effects"]
 
 
 def _not_beaten(difference: np.ndarray) -> bool:
     n = len(difference)
-    doubt = np.std(difference, ddof=1) / math.sqrt(n) if n > 1 else 0.0
-    return bool(np.mean(difference) <= _ONE_SIDED * doubt)
+    if n < 2:
+        return bool(np.mean(difference) <= 0.0)
+    doubt = float(np.std(difference, ddof=1)) / math.sqrt(n)
+    return bool(np.mean(difference) <= student.ppf(_CONFIDENCE, n - 1) * doubt)
 
 
 def _by_condition(search: Search, one: dict[str, Any]) -> np.ndarray:
