@@ -75,6 +75,7 @@ class ByHand:
             except BifaError as error:
                 uno.halt()
                 self._review(rig, uno, turn, f"Not usable: {error}.", "Enter tries again", keep=False)
+                uno.clear()  # it may have been stopped; the next thing asked is whether valves may switch
                 continue
             if self._accepted(rig, uno, turn, trial, writer):
                 self._instruments.keep(writer.partial / RAW)

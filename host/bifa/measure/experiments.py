@@ -15,6 +15,7 @@ from bifa.measure.alignment import AlignmentError, camera_rate, resampled
 from bifa.measure.locomotion import noted, record_walk
 from bifa.measure.plan import PULL_MM, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, idle, instruments_of, mount
+from bifa.measure.undisturbed import refuse_disturbed
 
 CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
@@ -73,6 +74,7 @@ def _static(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         rig.instruments.move()
         tape.wait_while(lambda: rig.instruments.moving, 2 * 54.0 / planned.rate_mm_s)
         tape.wait(LEAD_S)
+    _refuse_unheld(tape, chamber, planned.pressure_psi)
     moved = _moving_span(tape)
     return _machine_columns(tape, chamber, moved), noted(tape.clock), tape.lost_samples
 
@@ -90,6 +92,7 @@ def _pull(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         rig.instruments.move()
         tape.wait_while(lambda: rig.instruments.moving, PULL_MM / planned.rate_mm_s)
         tape.wait(LEAD_S)
+    _refuse_unheld(tape, "head", planned.pressure_psi)
     moved = _moving_span(tape)
     known = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}
     return _machine_columns(tape, "head", moved), noted(tape.clock) | known, tape.lost_samples
@@ -106,6 +109,7 @@ def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
         tape.wait(LEAD_S)
         uno.schedule([(STEP_UP_S, chamber, "positive"), (STEP_DOWN_S, chamber, "vacuum")])
         tape.wait(STEP_END_S + LEAD_S)
+    refuse_disturbed(tape.samples, "holding")
     i = CHAMBERS.index(chamber)
     command = tape.commands[:, i]
     up_s, error_s = _scheduled_start(tape.uno_s, command)
@@ -168,6 +172,13 @@ def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, flo
     low = max(uno_s[changes[0] - 1], uno_s[changes[1] - 1] - apart_s)
     high = min(uno_s[changes[0]], uno_s[changes[1]] - apart_s)
     return float(0.5 * (low + high)), float(0.5 * (high - low))
+
+
+def _refuse_unheld(tape: Recording, chamber: str, pressure_psi: float) -> None:
+    """DisturbedError unless `chamber` alone was held at its pressure all the time, as `_pressurise` had it."""
+    state = "holding" if pressure_psi else "idle"
+    held = "positive" if pressure_psi > 0.0 else "vacuum" if pressure_psi < 0.0 else "off"
+    refuse_disturbed(tape.samples, state, {chamber: held})
 
 
 def _moving_span(tape: Recording) -> slice:

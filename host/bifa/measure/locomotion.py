@@ -10,6 +10,7 @@ from bifa.link import Uno
 from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, camera_rate, resampled
 from bifa.measure.recording import LEAD_S, Recording, mount
+from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
 
@@ -72,15 +73,19 @@ def record_walk(
 def _columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:
     """The Uno's samples while it ran, at the pressures' times since the valves first switched: the displacement then,
     the commands as they were at the strobe just before."""
+    begun = next((i for i, sample in enumerate(tape.samples) if sample.state == "running"), len(tape.samples))
     # A sample taken in the very tick that starts the run has no command yet.
     running = [sample for sample in tape.samples if sample.state == "running" and not np.isnan(sample.command).any()]
     if not running:
         raise BifaError("the Uno sent no sample while it ran: check the link's counters with `bifa monitor`")
+    refuse_disturbed(tape.samples[begun:], "running")
     uno_s = np.array([sample.time_us for sample in running]) * 1e-6
     # The body's phase grows evenly from 0 on. At a strobe it is still what the tick before has switched the valves by:
     # when it seems to have been 0, the valves switched for the first time.
     begun_s = uno_s[0] - running[0].phase_rad[0] / (2 * np.pi) * period_s
     keep = uno_s - begun_s <= cycles * period_s + SAMPLE_S
+    if uno_s[-1] - begun_s < cycles * period_s - SAMPLE_S:
+        raise DisturbedError(f"the robot walked {uno_s[-1] - begun_s:.2f} s instead of {cycles * period_s:g}: repeat")
     time_s = (uno_s - begun_s)[keep] + PRESSURES_AFTER_S
     columns = {"time_s": time_s}
     for i, chamber in enumerate(CHAMBERS):

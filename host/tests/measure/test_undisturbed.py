@@ -1,0 +1,90 @@
+"""A trial within which the robot was stopped, or tripped, is refused; on the real firmware and bench."""
+
+import math
+
+import pytest
+
+from bifa.link import RefusedError, Uno
+from bifa.link.uno import Sample
+from bifa.measure.experiments import record_trial
+from bifa.measure.plan import BRISK, PlannedTrial
+from bifa.measure.session import run_session
+from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
+from bifa.rig import open_rig
+
+STEP = PlannedTrial("step_response", "small", 8.5)
+TRIALS = (
+    PlannedTrial("static_loading", "small", 4.0, 20.0),
+    PlannedTrial("static_loading", "small", 0.0, 20.0),
+    PlannedTrial("anchor_pull", None, 8.5, 40.0),
+    STEP,
+    PlannedTrial("locomotion", gait=BRISK, cycles=2),
+)
+
+
+def recorded(disturb, planned, at):
+    """Record a trial; `disturb(rig, uno)` is called once a share `at` of it is done."""
+    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock, 1) as uno:
+        uno.connect()
+        due = [disturb]
+
+        def on_progress(share):
+            if share > at and due:
+                due.pop()(rig, uno)
+
+        return record_trial(rig, uno, planned, on_progress, attempts=1)
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize("planned", TRIALS, ids=lambda planned: planned.title)
+@pytest.mark.parametrize("at", [0.3, 0.85])
+def test_a_trial_within_which_somebody_stopped_the_robot_is_refused(planned, at):
+    at *= 0.55 if planned.experiment == "static_loading" else 1.0  # the share that its cross-head's motion ends at
+    with pytest.raises((DisturbedError, RefusedError), match="stopped"):
+        recorded(lambda rig, uno: uno.send_stop(), planned, at)
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize("planned", TRIALS[2:], ids=lambda planned: planned.title)
+def test_a_trial_within_which_a_fault_tripped_is_refused(planned):
+    with pytest.raises(DisturbedError, match="fault"):
+        recorded(lambda rig, uno: rig.break_sensor("head", 5.0), planned, 0.8)
+
+
+@pytest.mark.uno
+def test_a_walk_that_was_ended_and_vented_is_refused():
+    with pytest.raises(DisturbedError, match="idle"):
+        recorded(lambda rig, uno: uno.session.transport.write(b"stop\n"), TRIALS[-1], 0.85)
+
+
+@pytest.mark.uno
+def test_the_last_trial_of_a_session_counts_as_any(tmp_path):
+    with open_rig("virtual", profile="ideal", seed=3) as rig:
+
+        def stop_in_the_second(event):
+            if event.number == 2 and event.share > 0.85:
+                rig.transport.write(b"!")
+
+        plan = (STEP, TRIALS[-1])
+        with pytest.raises(DisturbedError):
+            run_session(rig, tmp_path / "day", plan, name="a day", known={}, provenance={}, on_event=stop_in_the_second)
+    assert not (tmp_path / "day").exists()
+    assert len(list((tmp_path / "day.partial").glob("*.csv"))) == 1
+
+
+def sample(number, state="running", command=(1.0, 0.0, 1.0), valves=0b011001) -> Sample:
+    return Sample(number, 10_000 * number, state, (0.0, 0.0, 0.0), command, (0.0, 0.0, 0.0), valves)
+
+
+def test_valves_that_are_not_as_commanded_are_seen_and_the_dead_time_is_none():
+    steady = [sample(i) for i in range(3)]
+    switched = sample(3, command=(0.0, 0.0, 1.0), valves=0b011000)
+    refuse_disturbed([*steady, switched, sample(4, command=(0.0, 0.0, 1.0), valves=0b011010)], "running")
+    for wrong in (
+        sample(3, valves=0b011000),
+        sample(3, valves=0b011010),
+        sample(3, valves=0b011011),
+        sample(3, command=(math.nan, 0.0, 1.0)),
+    ):
+        with pytest.raises(DisturbedError, match="body"):
+            refuse_disturbed([*steady, wrong], "running")
