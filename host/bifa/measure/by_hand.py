@@ -18,7 +18,7 @@ from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, Uno
 from bifa.measure.desk import Desk
 from bifa.measure.experiments import record_trial
-from bifa.measure.own_instruments import STOP, OwnInstruments, Turn
+from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import idle
 from bifa.measure.sketch import sketch
@@ -94,8 +94,9 @@ class ByHand:
         self._desk.ask(
             "review", f"{seen} {choice}, q discards it and stops.", turn.told() | {"findings": list(findings)}
         )
-        while (answer := self._desk.answer()) is None:
-            idle(rig, uno, _LOOK_S)
-        if answer.lower() in STOP:
-            raise KeyboardInterrupt
-        return keep and answer.lower() not in _REPEAT
+        while True:
+            while (answer := self._desk.answer()) is None:
+                idle(rig, uno, _LOOK_S)
+            if not answer or answer.lower() in _REPEAT:
+                return keep and not answer
+            self._desk.again(answer, choice)

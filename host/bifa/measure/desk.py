@@ -1,7 +1,8 @@
 """The desk at the bench: questions to the person there, and to scripts that watch a folder.
 
 Answers are lines typed at the terminal. With a watched folder, what is asked stands in `next.toml` there as well, and a
-file `answer` (its text is the line; an empty file is Enter) answers it: bifa takes the file away.
+file `answer` (its text is the line; an empty file is Enter) answers it: bifa takes the file away. What was answered
+before a question was asked starts nothing; a stop counts whenever it came.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from bifa.files import write_text
 
 ASKS, ANSWER = "next.toml", "answer"
 _LONGEST = 4096  # of an answer in a file
+STOP = ("q", "quit", "stop", "!")  # in answer to any question, and to none
 _END = None
 
 
@@ -36,24 +38,47 @@ class Desk:
         self.say = say
         self._watch = watch
         self._lines: queue.Queue[str | None] | None = None
+        self._is_asking = False
+        self._is_stopped = False
 
     def ask(self, step: str, text: str, about: Mapping[str, Any] | None = None) -> None:
-        """Show `text` and expect an answer to it; an answer to an earlier question does not count.
+        """Show `text` and expect an answer to it; an answer to an earlier question does not count, but for a stop.
 
         `about`: what else a script needs to know, plain values.
         """
         self._listen()
         self._forget()
+        self._is_asking = True
         if self._watch is not None:
-            (self._watch / ANSWER).unlink(missing_ok=True)
             write_text(self._watch / ASKS, tomli_w.dumps({"step": step, "asks": text, **(about or {})}))
         self.say(text)
 
     def answer(self) -> str | None:
         """The line that answers what was asked last, without its ends' blanks; None: not yet. Does not wait.
 
-        Raises NobodyError where the terminal's input has ended and no folder is watched.
+        Raises KeyboardInterrupt where it is to stop, NobodyError where the terminal's input has ended and no folder is
+        watched.
         """
+        text = self._taken()
+        if self._is_stopped or (text is not None and _is_stop(text)):
+            raise KeyboardInterrupt
+        self._is_asking = self._is_asking and text is None
+        return text
+
+    def again(self, answer: str, choice: str) -> None:
+        """`answer` is none to what was asked last, which is still asked: `choice` says what would be."""
+        self._is_asking = True
+        self.say(f"{answer!r} is no answer here: {choice}, q stops.")
+
+    def attend(self) -> None:
+        """While nothing is asked: raises KeyboardInterrupt if somebody has asked to stop."""
+        if self._is_asking or self._lines is None:
+            return
+        self._forget()
+        if self._is_stopped:
+            raise KeyboardInterrupt
+
+    def _taken(self) -> str | None:
         if self._watch is not None and (text := self._from_file()) is not None:
             return text
         try:
@@ -85,17 +110,23 @@ class Desk:
 
     def _forget(self) -> None:
         """What was typed ahead must not start anything; lines from a pipe were meant for what is to come."""
-        if not sys.stdin.isatty():
-            return
+        early = [self._from_file()] if self._watch is not None else []
         with contextlib.suppress(queue.Empty):
-            while self._lines.get_nowait() is not _END:
-                pass
-            self._lines.put(_END)
+            while sys.stdin.isatty():
+                if (line := self._lines.get_nowait()) is _END:
+                    self._lines.put(_END)
+                    break
+                early.append(line)
+        self._is_stopped = self._is_stopped or any(_is_stop(line) for line in early if line)
 
     def _listen(self) -> None:
         if self._lines is None:
             self._lines = queue.Queue()
             threading.Thread(target=_read_lines, args=(self._lines,), daemon=True).start()
+
+
+def _is_stop(line: str) -> bool:
+    return line.strip().lower() in STOP
 
 
 def _read_lines(lines: queue.Queue[str | None]) -> None:

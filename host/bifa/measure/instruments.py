@@ -40,6 +40,9 @@ class AskedInstruments(Instruments, Protocol):
     def ready(self) -> bool:
         """Whether what was asked last (mount, start, save) has been done."""
 
+    def attend(self) -> None:
+        """Called while nothing is asked of them: KeyboardInterrupt where somebody has asked to stop. Optional."""
+
     def save(self) -> None:
         """Ask for the record of the recording that has just ended; `stop` gives it once `ready`."""
 
@@ -61,3 +64,9 @@ def until_ready(instruments: Instruments, wait: Callable[[], None]) -> None:
     """Call `wait` until what was asked of the instruments has been done; not at all where they do it at once."""
     while are_asked(instruments) and not instruments.ready:
         wait()
+
+
+def attend(instruments: Instruments | None) -> None:
+    """Let instruments that somebody works hear that person out."""
+    if hasattr(instruments, "attend"):
+        instruments.attend()

@@ -27,7 +27,6 @@ from bifa.measure.plan import PULL_MM, PlannedTrial
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
 SETTLED_S = 0.5  # a file whose size and time stay for so long has been written to its end
-STOP = ("q", "quit", "stop")
 
 _STAND = {
     "static_loading": "the {actuator} actuator in the testing machine, contracted",
@@ -118,7 +117,7 @@ class OwnInstruments:
 
     @property
     def ready(self) -> bool:
-        """See AskedInstruments. Raises KeyboardInterrupt where the answer is to stop."""
+        """See AskedInstruments. Raises KeyboardInterrupt where the answer is to stop; no other word starts anything."""
         if self._step in ("move", "save") and self._watch is not None and self._take_new():
             self._step = "saved"
         if self._step in ("", "saved"):
@@ -126,12 +125,17 @@ class OwnInstruments:
         answer = self._desk.answer()
         if answer is None:
             return False
-        if answer.lower() in STOP:
-            raise KeyboardInterrupt
         if self._step == "save":
             return self._take_named(answer)
+        if answer:
+            self._desk.again(answer, "press Enter once it is done")
+            return False
         self._step = ""
         return True
+
+    def attend(self) -> None:
+        """See AskedInstruments."""
+        self._desk.attend()
 
     def save(self) -> None:
         """See AskedInstruments."""

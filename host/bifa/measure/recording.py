@@ -11,7 +11,7 @@ from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, align
-from bifa.measure.instruments import are_asked, until_ready
+from bifa.measure.instruments import are_asked, attend, until_ready
 
 LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
 _PIECE_S = 0.25
@@ -40,6 +40,7 @@ def idle(rig, uno: Uno, duration_s: float) -> None:
     while (left_s := until_s - rig.clock.now()) > 0:
         rig.clock.sleep(min(left_s, _PIECE_S))
         uno.keep_alive()
+        attend(rig.instruments)
 
 
 class Recording:
@@ -81,6 +82,7 @@ class Recording:
         begun_s = self._rig.clock.now()
         while (left_s := begun_s + duration_s - self._rig.clock.now()) > 0:
             self.samples += self._uno.samples(min(left_s, _PIECE_S))
+            attend(self._instruments)
             if report:
                 self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
 

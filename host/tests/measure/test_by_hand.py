@@ -164,3 +164,35 @@ def test_it_stops_between_trials_with_valves_off_and_goes_on_another_day(bench, 
     before = len(here.lab.asked)
     assert [t.file for t in here.run(tmp_path / "day", plan).trials] == [PULL.file, STATIC.file]
     assert {asked["file"] for asked in here.lab.asked[before:]} == {STATIC.file}
+
+
+def test_a_word_that_is_no_answer_neither_keeps_nor_discards(bench, tmp_path):
+    here = bench()
+    words = ["no", "keep?", ""]
+    here.lab.review = lambda asked: words.pop(0)
+    ask = here.rig.recorder._desk.again
+
+    def again(answer, choice):
+        ask(answer, choice)
+        (here.watch / "answer").write_text(words.pop(0))
+
+    here.rig.recorder._desk.again = again
+    assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
+    assert words == []
+    assert "'no' is no answer here: Enter keeps it, r repeats it, q stops." in here.said
+
+
+def test_a_trial_that_was_stopped_is_not_kept_and_is_tried_again_once_somebody_says_so(bench, tmp_path):
+    here = bench()
+    move, moved = here.lab._move, []
+
+    def stop_once(asked):
+        if not moved:
+            here.rig.uno.send(b"!")
+        moved.append(1)
+        return move(asked)
+
+    here.lab._move = stop_once
+    assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
+    assert "Not usable: " in "\n".join(here.said)
+    assert "the robot was stopped instead of holding" in "\n".join(here.said)

@@ -16,6 +16,17 @@ PULL = PlannedTrial("anchor_pull", None, 8.5, 40.0)
 
 
 @pytest.fixture
+def terminal(monkeypatch):
+    """Writes what somebody types at a terminal."""
+    master, slave = os.openpty()
+    stdin = os.fdopen(slave)
+    monkeypatch.setattr(sys, "stdin", stdin)
+    yield lambda data: (os.write(master, data), time.sleep(0.2))
+    os.close(master)
+    stdin.close()
+
+
+@pytest.fixture
 def typed(monkeypatch):
     """Writes what somebody types, as into a pipe; b"" ends it."""
     out, into = os.pipe()
@@ -55,8 +66,8 @@ def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp
     time.sleep(0.1)
     assert watching.answer() is None
     assert tomllib.loads((tmp_path / "next.toml").read_text()) == {"step": "mount", "asks": "Mount it.", "trial": 3}
-    (tmp_path / "answer").write_text("q\n")
-    assert watching.answer() == "q"
+    (tmp_path / "answer").write_text("r\n")
+    assert watching.answer() == "r"
     assert not (tmp_path / "answer").exists()
 
 
@@ -99,3 +110,62 @@ def test_stopping_is_an_answer_to_every_question(typed):
     typed(b"q\n")
     with pytest.raises(KeyboardInterrupt):
         waited(lambda: SimpleNamespace() if instruments.ready else None)
+
+
+@pytest.mark.parametrize("word", ["q", "Quit", "stop", "!"])
+def test_a_stop_that_was_typed_while_the_next_question_was_prepared_stops(terminal, word):
+    desk = Desk(lambda text: None)
+    desk.ask("mount", "Mount it.")
+    terminal(f"\n{word}\nr\n".encode())
+    assert waited(desk.answer) == ""
+    desk.ask("start", "Start it.")
+    with pytest.raises(KeyboardInterrupt):
+        desk.answer()
+
+
+def test_what_else_was_typed_ahead_starts_nothing(terminal):
+    desk = Desk(lambda text: None)
+    desk.ask("mount", "Mount it.")
+    terminal(b"\n\nr\n")
+    assert waited(desk.answer) == ""
+    desk.ask("start", "Start it.")
+    assert desk.answer() is None
+
+
+def test_a_stop_while_nothing_is_asked_counts_at_once(terminal, tmp_path):
+    desk = Desk(lambda text: None, tmp_path)
+    desk.attend()
+    desk.ask("mount", "Mount it.")
+    terminal(b"\n")
+    assert waited(desk.answer) == ""
+    desk.attend()
+    terminal(b"q\n")
+    with pytest.raises(KeyboardInterrupt):
+        desk.attend()
+    watching = Desk(lambda text: None, tmp_path)
+    (tmp_path / "answer").write_text("stop\n")
+    watching.ask("start", "Start it.")
+    with pytest.raises(KeyboardInterrupt):
+        watching.answer()
+
+
+def test_attending_does_not_take_the_answer_to_what_is_asked(terminal):
+    desk = Desk(lambda text: None)
+    desk.ask("mount", "Mount it.")
+    terminal(b"\n")
+    desk.attend()
+    assert desk.answer() == ""
+
+
+@pytest.mark.parametrize("word", ["clear", "no", "wait", "n", "yes"])
+def test_a_word_that_is_no_answer_starts_nothing_and_is_asked_again(typed, word):
+    said = []
+    instruments = OwnInstruments(Desk(said.append))
+    instruments.begin(Turn(PULL, 1, 1))
+    instruments.mount("anchor_pull", rate_mm_s=40.0)
+    typed(f"{word}\n".encode())
+    assert waited(lambda: instruments.ready or (len(said) > 1 or None))
+    assert not instruments.ready
+    assert f"{word!r} is no answer here: press Enter once it is done, q stops." in said[-1]
+    typed(b"\n")
+    assert waited(lambda: instruments.ready or None)
