@@ -18,6 +18,7 @@ from typing import Any
 import bifa
 from bifa.errors import BifaError
 from bifa.files import is_stray, write_text
+from bifa.lock import locked
 from bifa.toml import parse_toml
 
 PROVENANCE = "provenance.json"
@@ -104,7 +105,7 @@ def run_stages(
     A stage runs where it is named in `rerun`, or its artefacts, inputs, settings or bifa's version are not
     those on record. on_end(stage, ran) says whether it ran. Raises StageError, before any stage runs where
     something that a stage would replace is not on record; an error inside a stage leaves the artefacts of earlier
-    runs as they were.
+    runs as they were. Raises LockedError where another program runs stages in `folder`.
     """
     unknown = set(rerun) - {stage.name for stage in stages}
     if unknown:
@@ -112,6 +113,17 @@ def run_stages(
             f"no stage is called {', '.join(sorted(unknown))}; there are {', '.join(s.name for s in stages)}"
         )
     check_folder(folder)
+    with locked(folder):
+        _bring_up_to_date(folder, stages, set(rerun), on_start, on_end)
+
+
+def _bring_up_to_date(
+    folder: Path,
+    stages: Sequence[Stage],
+    rerun: set[str],
+    on_start: Callable[[Stage], None],
+    on_end: Callable[[Stage, bool], None],
+) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     records = _read_records(folder)
     names = {stage.name for stage in stages}

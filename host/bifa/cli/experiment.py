@@ -200,7 +200,7 @@ def _run(
                 trials,
                 name=f"{name} on the bench",
                 known=known_of(rig, known),
-                provenance=provenance(port, options),
+                provenance=provenance("bifa experiment", port, options | _length_of_walks(trials)),
                 on_event=show,
             )
     console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them just recorded.")
@@ -209,6 +209,12 @@ def _run(
             f"Instruments and Uno synchronised to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
         )
     console.print(f"Next: bifa check {out}, then bifa fit {out} --out model.toml")
+
+
+def _length_of_walks(trials: "Sequence[PlannedTrial]") -> dict[str, int]:
+    """No part of a walk's condition: a session that is resumed has to be asked for the same."""
+    cycles = [trial.cycles for trial in trials if trial.cycles]
+    return {"cycles": cycles[0]} if cycles else {}
 
 
 def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":

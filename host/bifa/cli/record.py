@@ -29,7 +29,8 @@ def record(
     """Record walks. On a rig with motion capture: a data set for `bifa check` and `bifa diagnose`.
 
     On a bare Uno: a folder with telemetry (pressures, commands, phases, the Uno's and the computer's time), written as
-    it arrives. If the port vanishes, the data recorded so far are kept, and recording resumes when the port is back.
+    it arrives. If the port vanishes, the data recorded so far are kept, and recording resumes when the same Uno is
+    back; before it walks again, you are asked.
     An interrupted command is resumed by running it again.
     """
     from bifa.files import check_targets
@@ -55,4 +56,4 @@ def record(
                 record_walks(rig, out, gait, cycles, repeats, console)
     if not has_instruments:
         console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking", highlight=False)
-        record_telemetry(lambda: open_rig(port), out, gait, seconds, console)
+        record_telemetry(open_rig, port, out, gait, seconds, console)

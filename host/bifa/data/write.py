@@ -55,7 +55,7 @@ class DatasetWriter:
     """A data set that grows trial by trial in `<folder>.partial`, and takes its name when it is finished.
 
     After each `add` the partial folder is a complete data set on disk. A session that was interrupted goes
-    on with `resume=True`: `trials` then holds what was recorded before. Not for two writers at once.
+    on with `resume=True`: `trials` then holds what was recorded before. Not for two writers at once (bifa.lock).
     """
 
     def __init__(
@@ -94,6 +94,11 @@ class DatasetWriter:
     def trials(self) -> tuple[Trial, ...]:
         """The trials that are safely on disk."""
         return self._dataset.trials
+
+    @property
+    def provenance(self) -> Mapping[str, Any]:
+        """Of the session that began it."""
+        return self._dataset.provenance
 
     def has(self, trial: Trial) -> bool:
         """Whether this repeat of this condition is already recorded (the columns are not compared)."""

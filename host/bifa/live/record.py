@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,14 +14,17 @@ from typing import Any, TextIO
 from rich.progress import Progress
 
 from bifa.errors import BifaError
-from bifa.link import NoAnswerError, PortGoneError, RestartedError, Sample, StillMovingError, Uno
+from bifa.link import NoAnswerError, PortGoneError, RefusedError, RestartedError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS
 from bifa.link.uno import MARK_PAUSE
-from bifa.rig import RigError
+from bifa.lock import locked
+from bifa.measure.desk import Desk
+from bifa.rig import RigError, port_of, serial_number_at
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console
 
 RETRY_S = 1.0
+RESTARTS = 3  # of a board that kept its power, while its port was away: each counts its boot number on by one
 # RigError: no Uno is plugged in
 GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
 HEADER = [
@@ -41,14 +45,20 @@ class RecordError(BifaError):
 
 def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
     """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
+    with locked(out):
+        _record_walks(rig, out, gait_file, cycles, repeats, console)
+
+
+def _record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
     from bifa.data import DatasetWriter, Trial
     from bifa.data.lag import misfit_of_last
     from bifa.measure.experiments import record_columns
     from bifa.measure.plan import PlannedTrial
+    from bifa.measure.session import provenance
 
     steps = read_gait_file(gait_file) if gait_file else GaitFile(BASELINE)
     gait = steps.gait
-    writer = DatasetWriter(out, f"walks, {time.strftime('%Y-%m-%d')}", resume=True)
+    writer = DatasetWriter(out, "walks", provenance=provenance("bifa record"), resume=True)
     _check_same(writer, _settings(steps), round(cycles * gait.period_s, 2))
     with Progress(console=console) as progress, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
@@ -93,7 +103,7 @@ def _settings(steps: GaitFile) -> dict[str, object]:
 
 
 def record_telemetry(
-    open_rig: Callable[..., Any], out: Path, gait_file: Path | None, duration_s: float | None, console: Console
+    open_rig: Callable[..., Any], port: str | None, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
 ) -> None:
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
@@ -101,53 +111,107 @@ def record_telemetry(
         raise RecordError(f"{out} holds something else; name a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
-    waiting = f"when the Uno is back, it {'walks and records' if parameters else 'records'} on (Ctrl-C ends)"
+    recorder = _Recorder(open_rig, port, parameters, end_s, console)
+    waiting = "when that Uno is back, recording goes on" + (
+        ", and you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
+    )
     is_told = False
     try:
-        while time.monotonic() < end_s:
-            path = _next_file(out)
-            try:
-                _record_until_gone(open_rig, path, parameters, end_s, console)
-            except GONE as error:
-                if isinstance(error.__cause__, KeyboardInterrupt):
-                    raise
-                if path.exists() or not is_told:
-                    console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
-                    is_told = True
-                time.sleep(RETRY_S)
+        with locked(out):
+            while time.monotonic() < end_s:
+                path = _next_file(out)
+                try:
+                    recorder.record_until_gone(path)
+                except GONE as error:
+                    if isinstance(error.__cause__, KeyboardInterrupt):
+                        raise
+                    if path.exists() or not is_told:
+                        console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
+                        is_told = True
+                    time.sleep(RETRY_S)
     except KeyboardInterrupt:
         console.print("ended")
     console.print(f"{out} holds the telemetry; a data set needs the displacement from your own instrument beside it")
 
 
-def _record_until_gone(
-    open_rig: Callable[..., Any], path: Path, parameters: dict[str, float], end_s: float, console: Console
-) -> None:
-    uno = None
-    try:
-        with open_rig() as rig, console.status("waiting for the Uno") as status:
-            uno = Uno(rig.transport, rig.clock)
-            with uno:
-                uno.connect()
-                if parameters:
-                    uno.upload(parameters)
-                uno.stream(True)
-                marked = uno.mark_strobe()
-                with _telemetry_file(path) as file:
-                    writer = csv.writer(file)
-                    writer.writerow(HEADER)
-                    if parameters:
-                        uno.run()
-                    try:
-                        while time.monotonic() < end_s:
-                            writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
-                            file.flush()
-                            status.update(f"recording  {uno.counters.text()}")
-                    finally:
-                        writer.writerows(_row(uno, sample, marked) for sample in uno.taken_samples())
-    finally:
-        if path.exists():
-            console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
+class _Recorder:
+    """Records from one board and no other, which walks by itself only the first time."""
+
+    def __init__(
+        self, open_rig: Callable[..., Any], port: str | None, parameters: dict[str, float], end_s: float, console: Console
+    ) -> None:
+        self._open_rig, self._port, self._parameters, self._end_s = open_rig, port, parameters, end_s
+        self._console = console
+        self._serial_number: str | None = None
+        self._nonce: int | None = None  # of the start that was seen last; None before the first
+        self._desk = Desk(lambda text: console.print(text, markup=False, highlight=False))
+
+    def _open(self):
+        if self._nonce is None:
+            self._serial_number = serial_number_at(self._port)
+            return self._open_rig(self._port)
+        return self._open_rig(port_of(self._serial_number) if self._serial_number else self._port)
+
+    def record_until_gone(self, path: Path) -> None:
+        """Into the new file `path`; raises one of GONE when the Uno is."""
+        uno = None
+        try:
+            with self._open() as rig, self._console.status("waiting for the Uno") as status:
+                uno = Uno(rig.transport, rig.clock)
+                with uno:
+                    is_back, known = self._nonce is not None, self._greet(uno)
+                    if self._parameters:
+                        uno.upload(self._parameters)
+                    uno.stream(True)
+                    marked = uno.mark_strobe()
+                    with _telemetry_file(path) as file:
+                        writer = csv.writer(file)
+                        writer.writerow(HEADER)
+                        if self._parameters:
+                            self._ask(known) if is_back else uno.run()
+                        self._record(uno, writer, file, status, marked)
+        finally:
+            if path.exists():
+                self._console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
+
+    def _greet(self, uno: Uno) -> str:
+        """Connect; in words, whether this is known to be the board that was recorded before."""
+        nonce = uno.connect().boot_nonce
+        followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= RESTARTS
+        self._nonce = nonce
+        if self._serial_number or followed:
+            return "The Uno is back, and has started anew"
+        return "An Uno is there, and nothing says that it is the same one"
+
+    def _ask(self, known: str) -> None:
+        if sys.stdin is not None and sys.stdin.isatty():
+            self._desk.ask("walk", f"{known}. Recording goes on. Press Enter to walk again; q ends.")
+            return
+        self._console.print(
+            f"{known}: recording without walking, as nobody can be asked; to walk, start the command anew"
+        )
+
+    def _record(self, uno: Uno, writer, file: TextIO, status, marked: int) -> None:
+        try:
+            while time.monotonic() < self._end_s:
+                writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
+                file.flush()
+                status.update(f"recording  {uno.counters.text()}")
+                self._walk_if_told(uno)
+        finally:
+            writer.writerows(_row(uno, sample, marked) for sample in uno.taken_samples())
+
+    def _walk_if_told(self, uno: Uno) -> None:
+        if not self._desk.is_asking or (answer := self._desk.answer()) is None:
+            return
+        if answer:
+            self._desk.again(answer, "press Enter to walk")
+            return
+        try:
+            uno.clear()  # where opening the port restarts nothing, it is still stopped
+            uno.run()
+        except RefusedError as error:
+            self._console.print(f"{error}", markup=False)
 
 
 def _next_file(out: Path) -> Path:

@@ -32,13 +32,14 @@ class NobodyError(BifaError):
 
 
 class Desk:
-    """`say(text)` shows a line to the person; `watch` is the folder for scripts, if there is one."""
+    """`say(text)` shows a line to the person; `watch` is the folder for scripts, if there is one. `is_asking`: a
+    question has not been answered yet."""
 
     def __init__(self, say: Callable[[str], None], watch: Path | None = None) -> None:
         self.say = say
         self._watch = watch
         self._lines: queue.Queue[str | None] | None = None
-        self._is_asking = False
+        self.is_asking = False
         self._is_stopped = False
 
     def ask(self, step: str, text: str, about: Mapping[str, Any] | None = None) -> None:
@@ -48,7 +49,7 @@ class Desk:
         """
         self._listen()
         self._forget()
-        self._is_asking = True
+        self.is_asking = True
         if self._watch is not None:
             write_text(self._watch / ASKS, tomli_w.dumps({"step": step, "asks": text, **(about or {})}))
         self.say(text)
@@ -62,17 +63,17 @@ class Desk:
         text = self._taken()
         if self._is_stopped or (text is not None and _is_stop(text)):
             raise KeyboardInterrupt
-        self._is_asking = self._is_asking and text is None
+        self.is_asking = self.is_asking and text is None
         return text
 
     def again(self, answer: str, choice: str) -> None:
         """`answer` is none to what was asked last, which is still asked: `choice` says what would be."""
-        self._is_asking = True
+        self.is_asking = True
         self.say(f"{answer!r} is no answer here: {choice}, q stops.")
 
     def attend(self) -> None:
         """While nothing is asked: raises KeyboardInterrupt if somebody has asked to stop."""
-        if self._is_asking or self._lines is None:
+        if self.is_asking or self._lines is None:
             return
         self._forget()
         if self._is_stopped:

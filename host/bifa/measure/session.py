@@ -10,12 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import bifa
-from bifa.data import Dataset, DatasetWriter, Trial
+from bifa.data import Dataset, DatasetError, DatasetWriter, Trial
 from bifa.data.lag import misfit_of_last
 from bifa.link import Uno
+from bifa.lock import locked
 from bifa.measure.experiments import record_trial
 from bifa.measure.plan import PlannedTrial
 
@@ -72,9 +74,39 @@ def run_session(
 ) -> Dataset:
     """Record `trials` on `rig` into `folder`; those that an interrupted session already has are skipped.
 
-    Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session.
+    Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session or with other
+    `options` in its provenance; LockedError where somebody else is recording into it.
     """
-    writer = DatasetWriter(folder, name, known, provenance, resume=True)
+    with locked(folder):
+        writer = DatasetWriter(folder, name, known, provenance, resume=True)
+        refuse_other_settings(writer, provenance)
+        return _recorded(rig, writer, trials, on_event)
+
+
+def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) -> None:
+    """DatasetError where the trials that an interrupted session has left were made with other options: two conditions
+    in one data set, of which its provenance would name the first."""
+    if not writer.trials:
+        return
+    old, new = (_settings(of) for of in (writer.provenance, provenance))
+    differing = [
+        f"{name} = {old.get(name, 'none')}, not {new.get(name, 'none')}"
+        for name in sorted(old.keys() | new.keys())
+        if old.get(name) != new.get(name)
+    ]
+    if differing:
+        raise DatasetError(
+            f"{writer.partial} holds {len(writer.trials)} trials that were made with {', '.join(differing)}: go on "
+            "with the same options, name another folder, or move it away"
+        )
+
+
+def _settings(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What decides a session's data. Which port a robot is at does not; whether it is a virtual one does."""
+    return {"virtual": provenance.get("port") == "virtual"} | dict(provenance.get("options", {}))
+
+
+def _recorded(rig, writer: DatasetWriter, trials: Sequence[PlannedTrial], on_event: Callable[[Event], None]) -> Dataset:
     record = recorder_of(rig)
     with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         uno.connect()
@@ -99,10 +131,12 @@ def run_session(
     return writer.finish()
 
 
-def provenance(port: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
+def provenance(
+    command: str, port: str | None = None, options: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
     """Who made a data set, with what: for the reader of the file."""
     return {
-        "recorded_by": f"bifa experiment {bifa.__version__}",
+        "recorded_by": f"{command} {bifa.__version__}",
         "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
         "port": port or "found by USB identity",
         "options": {key: value for key, value in options.items() if value is not None},

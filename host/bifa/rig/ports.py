@@ -23,12 +23,18 @@ class SerialPort:
     device: str
     description: str
     board: str | None
+    serial_number: str | None = None  # of its USB chip; many copies have none
 
 
 def serial_ports() -> list[SerialPort]:
     """Every USB serial port, Unos first, originals before copies."""
     ports = [
-        SerialPort(port.device, port.description or "unknown device", UNO_IDENTITIES.get((port.vid, port.pid)))
+        SerialPort(
+            port.device,
+            port.description or "unknown device",
+            UNO_IDENTITIES.get((port.vid, port.pid)),
+            port.serial_number or None,
+        )
         for port in list_ports.comports()
         if port.vid is not None
     ]

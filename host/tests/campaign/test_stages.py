@@ -9,6 +9,7 @@ import pytest
 
 from bifa.campaign import stages
 from bifa.campaign.stages import PROVENANCE, Stage, StageError, digest, run_stages
+from bifa.lock import LockedError, locked
 
 
 def copier(name, needs, makes, log, text="x", settings=None):
@@ -318,3 +319,13 @@ def test_what_an_earlier_version_recorded_of_a_data_set_still_holds(tmp_path):
     for name in ("dataset.toml", "one.csv", "raw/one.csv"):
         total.update(f"{name}\0{hashlib.sha256((tmp_path / 'data' / name).read_bytes()).hexdigest()}\n".encode())
     assert digest(tmp_path / "data") == total.hexdigest()
+
+
+def test_two_campaigns_do_not_write_into_one_folder(tmp_path):
+    log = []
+    stages = [copier("a", [], "a.txt", log)]
+    with locked(tmp_path / "out"), pytest.raises(LockedError, match="is being written by"):
+        run_stages(tmp_path / "out", stages)
+    assert log == []
+    run_stages(tmp_path / "out", stages)
+    assert log == ["a"]

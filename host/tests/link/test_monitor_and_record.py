@@ -5,18 +5,20 @@ import csv
 import io
 import math
 import signal
+import sys
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
-from bifa.link import Sample, Uno
+from bifa.link import PortGoneError, Sample, Uno
 from bifa.link.uno import MARK_PAUSE
 from bifa.live.monitor import Monitor, watch
 from bifa.live.record import record_telemetry
-from bifa.rig import RigError, SerialRig
+from bifa.rig import RigError, SerialRig, port_of, serial_number_at
 from harness.board import Board
 from harness.pty_uno import PtyUno
 from harness.terminal import Terminal
@@ -92,7 +94,7 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
     files = [tmp_path / f"out/telemetry_{n}.csv" for n in (1, 2)]
     opened = []
 
-    def open_rig() -> SerialRig:
+    def open_rig(port) -> SerialRig:
         if opened and refusals:
             raise refusals.pop()
         opened.append(unos[len(opened)])
@@ -106,17 +108,120 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
             act()
 
     threading.Thread(target=person, daemon=True).start()
-    record_telemetry(open_rig, tmp_path / "out", None, 120.0, Console(file=told, width=200))
+    record_telemetry(open_rig, "the port", tmp_path / "out", None, 120.0, Console(file=told, width=200))
     text = told.getvalue()
     assert f"{unos[0].device} is gone; plug the Uno in again" in text
-    assert f"what was recorded is in {tmp_path / 'out'}; when the Uno is back, it records on" in text
-    assert text.count("when the Uno is back") == 1
+    assert f"what was recorded is in {tmp_path / 'out'}; when that Uno is back, recording goes on" in text
+    assert text.count("when that Uno is back") == 1
     for path in files:
         recorded = rows(path)
         assert len(recorded) >= 50
         assert f"{path}: samples {len(recorded)}  lost {lost(recorded)}  bad frames" in text
     assert unos[1].board.state == "stopped"
     unos[1].unplug()
+
+
+def test_a_restart_never_walks_and_a_person_is_asked(uno, gait, tmp_path):
+    out = tmp_path / "out"
+    with Terminal(tmp_path, "record", "--out", str(out), "--port", uno.device, "--gait", gait) as terminal:
+        terminal.until(lambda: uno.board.state == "running" and uno.board.valves != 0)
+        uno.board.reset()
+        terminal.sees("Press Enter to walk")
+        terminal.presses("clear\n")
+        terminal.sees("'clear' is no answer here")
+        driven_s = uno.driven_s
+        uno.wait(3.0)
+        assert (uno.board.valves, uno.driven_s) == (0, driven_s), "it waits for the person"
+        assert len(rows(out / "telemetry_2.csv")) > 50, "and is recorded meanwhile"
+        terminal.presses("\n")
+        terminal.until(lambda: uno.board.state == "running")
+        terminal.presses("\x03")
+        terminal.exit_status()
+    assert uno.board.valves == 0
+
+
+def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", None)
+    unos, told, opened = [PtyUno(), PtyUno()], io.StringIO(), []
+
+    def open_rig(port) -> SerialRig:
+        opened.append(unos[len(opened)])
+        return SerialRig(opened[-1].device)
+
+    def person() -> None:
+        for number, act in ((1, unos[0].unplug), (2, _thread.interrupt_main)):
+            path = tmp_path / f"out/telemetry_{number}.csv"
+            while not path.exists() or len(rows(path)) < 100:
+                time.sleep(0.1)
+            act()
+
+    threading.Thread(target=person, daemon=True).start()
+    record_telemetry(open_rig, None, tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
+    assert unos[0].driven_s > 0
+    assert unos[1].driven_s == 0, "another board, or the same one anew: it does not walk by itself"
+    assert "recording without walking, as nobody can be asked" in told.getvalue()
+    unos[1].unplug()
+
+
+def test_another_uno_is_not_taken_for_the_one_that_was_recorded(monkeypatch):
+    """By the serial number of its USB chip, wherever it is plugged in; the other one is not even opened."""
+    plugged = [usb("/dev/ttyACM0", "A1")]
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: plugged)
+    assert serial_number_at(None) == serial_number_at("/dev/ttyACM0") == "A1"
+    plugged[:] = [usb("/dev/ttyACM0", "B2")]
+    with pytest.raises(RigError, match=r"A1 is not plugged in .*ttyACM0"):
+        port_of("A1")
+    plugged.append(usb("/dev/ttyACM1", "A1"))
+    assert port_of("A1") == "/dev/ttyACM1"
+    plugged[:] = [usb("/dev/ttyACM0", None)]
+    assert serial_number_at(None) is None
+
+
+def test_a_recorder_opens_only_the_board_that_it_began_with(tmp_path, monkeypatch):
+    plugged, opened = [usb("/dev/ttyACM0", "A1")], []
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: plugged)
+
+    board = Board()
+    monkeypatch.setattr("bifa.live.record.RETRY_S", 0.01)
+
+    class Rig:
+        transport, clock = Away(board), board
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+    def open_once(port):
+        opened.append(port)
+        plugged[:] = [usb("/dev/ttyACM0", "B2")]
+        return Rig()
+
+    record_telemetry(open_once, None, tmp_path / "out", None, 3.0, Console(file=io.StringIO()))
+    assert opened == [None]
+
+
+class Away:
+    """A board whose port is gone after a while."""
+
+    def __init__(self, board: Board) -> None:
+        self._board, self._reads = board, 0
+
+    def read(self, timeout_s: float) -> bytes:
+        self._reads += 1
+        if self._reads > 200:
+            raise PortGoneError("gone")
+        return self._board.read(timeout_s)
+
+    def write(self, data: bytes) -> None:
+        if self._reads > 200:
+            raise PortGoneError("gone")
+        self._board.write(data)
+
+
+def usb(device: str, serial_number: str | None) -> SimpleNamespace:
+    return SimpleNamespace(device=device, description="Uno", vid=0x2341, pid=0x0043, serial_number=serial_number)
 
 
 def test_a_killed_recording_keeps_its_rows_and_stops_the_robot(uno, gait, tmp_path):

@@ -9,10 +9,11 @@ from bifa.data import Dataset, DatasetError, read_dataset
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import PRESSURES_AFTER_S
+from bifa.lock import LockedError, locked
 from bifa.measure.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
 from bifa.measure.plan import BRISK, EXPERIMENTS, PlannedTrial, session
 from bifa.measure.recording import Recording
-from bifa.measure.session import run_session
+from bifa.measure.session import provenance, run_session
 from bifa.pipe_robot.spare import spare
 from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.rig import open_rig
@@ -221,3 +222,41 @@ def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_sa
         ):
             record_trial(rig, uno, PLAN[2])
         assert len(tries) == 3
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize("change", [{"seed": 4}, {"profile": "worn"}, {"cycles": 2}, {}])
+def test_a_session_is_resumed_with_the_same_settings_only(tmp_path, change):
+    options = {"seed": 3, "profile": "ideal", "cycles": 1}
+
+    def begin(rig, options, on_event=lambda event: None):
+        made = provenance("bifa experiment", "virtual", options)
+        plan = PLAN[1:3]
+        return run_session(rig, tmp_path / "day", plan, name="a day", known={}, provenance=made, on_event=on_event)
+
+    def interrupt(event):
+        if event.number == 2:
+            raise KeyboardInterrupt
+
+    with open_rig("virtual", profile="ideal", seed=3) as rig:
+        with pytest.raises(KeyboardInterrupt):
+            begin(rig, options, interrupt)
+        if not change:
+            assert len(begin(rig, options).trials) == 2
+            return
+        [(name, value)] = change.items()
+        with pytest.raises(DatasetError, match=f"1 trials that were made with {name} = {options[name]}, not {value}"):
+            begin(rig, options | change)
+        made = provenance("bifa experiment", "/dev/ttyACM0", options)
+        with pytest.raises(DatasetError, match="virtual = True, not False"):
+            run_session(rig, tmp_path / "day", PLAN[1:3], name="a day", known={}, provenance=made)
+
+
+@pytest.mark.uno
+def test_two_sessions_do_not_record_into_one_data_set(tmp_path):
+    """The second is told who the first is, before anything moves."""
+    with open_rig("virtual", profile="ideal", seed=3) as rig, locked(tmp_path / "day"):
+        with pytest.raises(LockedError, match="is being written by"):
+            run(rig, tmp_path / "day")
+        assert rig.uno.time_s < 0.1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,103 @@
+"""One program at a time in a folder: who writes there holds a lock beside it, which says who that is.
+
+The operating system lets go of a lock when the program that holds it ends, however it ends; so what a killed one has
+left behind is stale by itself, and taken over.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import IO
+
+from bifa.errors import BifaError
+
+_FARTHEST = 1 << 30  # where Windows locks a byte: what is locked cannot be read
+
+
+class LockedError(BifaError):
+    """Another program writes there; the text says which."""
+
+
+@contextmanager
+def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
+    """Nobody else is `locked` on `folder` while the block runs; the folder need not exist yet. Raises LockedError."""
+    folder = Path(folder).resolve()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    path = folder.with_name(f".{folder.name}.lock")
+    file = _taken(path, folder)
+    try:
+        file.truncate(0)
+        file.write(json.dumps(_who(), indent=1) + "\n")
+        file.flush()
+        yield
+    finally:
+        with suppress(OSError):  # Windows removes no file that is open; it is stale then
+            path.unlink()
+        file.close()
+
+
+def _taken(path: Path, folder: Path) -> IO[str]:
+    """The lock's file, open and held."""
+    while True:
+        try:
+            file = path.open("a+", encoding="utf-8")
+        except OSError as error:
+            raise LockedError(f"{path} cannot be written ({error.strerror or error}); choose another folder") from None
+        if not _hold(file):
+            file.seek(0)
+            text = file.read()
+            file.close()
+            raise LockedError(f"{folder} is being written by {_words(text)}: wait for it, or name another folder")
+        with suppress(OSError):
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        file.close()  # whoever held it has just removed it: there is another now, or none
+
+
+def _who() -> dict[str, object]:
+    return {
+        "pid": os.getpid(),
+        "command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "host": socket.gethostname(),
+        "since": datetime.now().isoformat(sep=" ", timespec="seconds"),
+    }
+
+
+def _words(text: str) -> str:
+    try:
+        who = json.loads(text)
+        return f"`{who['command']}` (process {who['pid']} on {who['host']}, since {who['since']})"
+    except (ValueError, KeyError, TypeError):
+        return "another program"  # which has not come to say who it is
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _hold(file: IO[str]) -> bool:
+        """Whether `file` is now held by this program."""
+        file.seek(_FARTHEST)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+
+else:
+    import fcntl
+
+    def _hold(file: IO[str]) -> bool:
+        """Whether `file` is now held by this program."""
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return True

@@ -1,0 +1,33 @@
+"""`bifa record` on a rig with motion capture: resumed on another day, and by one program at a time."""
+
+import pytest
+
+from bifa.data import read_dataset
+from bifa.live.record import record_walks
+from bifa.lock import LockedError, locked
+from bifa.rig import open_rig
+from bifa.screen import Console
+
+pytestmark = pytest.mark.uno
+
+
+def test_a_recording_is_resumed_on_another_day(tmp_path, monkeypatch):
+    out = tmp_path / "walks"
+    with open_rig("virtual", profile="ideal", seed=3) as rig:
+        monkeypatch.setattr("time.strftime", lambda *form: "2026-11-25")
+        record_walks(rig, out, None, 1, 1, Console(quiet=True))
+        out.rename(out.with_name("walks.partial"))  # as where the second of two walks was interrupted
+        monkeypatch.setattr("time.strftime", lambda *form: "2026-11-26")
+        record_walks(rig, out, None, 1, 2, Console(quiet=True))
+    dataset = read_dataset(out)
+    assert [trial.file for trial in dataset.trials] == ["walk_1.csv", "walk_2.csv"]
+    assert dataset.provenance["recorded_at"].startswith("20")
+
+
+def test_two_recordings_do_not_go_into_one_data_set(tmp_path):
+    with (
+        open_rig("virtual", profile="ideal", seed=3) as rig,
+        locked(tmp_path / "walks"),
+        pytest.raises(LockedError, match="is being written by"),
+    ):
+        record_walks(rig, tmp_path / "walks", None, 1, 1, Console(quiet=True))
