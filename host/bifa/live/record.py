@@ -103,7 +103,12 @@ def _settings(steps: GaitFile) -> dict[str, object]:
 
 
 def record_telemetry(
-    open_rig: Callable[..., Any], port: str | None, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
+    open_rig: Callable[..., Any],
+    port: str | None,
+    out: Path,
+    gait_file: Path | None,
+    duration_s: float | None,
+    console: Console,
 ) -> None:
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
@@ -138,7 +143,12 @@ class _Recorder:
     """Records from one board and no other, which walks by itself only the first time."""
 
     def __init__(
-        self, open_rig: Callable[..., Any], port: str | None, parameters: dict[str, float], end_s: float, console: Console
+        self,
+        open_rig: Callable[..., Any],
+        port: str | None,
+        parameters: dict[str, float],
+        end_s: float,
+        console: Console,
     ) -> None:
         self._open_rig, self._port, self._parameters, self._end_s = open_rig, port, parameters, end_s
         self._console = console
