@@ -1,10 +1,16 @@
 """What is typed or saved at the bench and is not this trial's record: said, and asked for again."""
 
+import re
+import time
+
+import numpy as np
 import pytest
 
+from bifa.measure.bench_file import read_exports
 from bifa.measure.desk import Desk
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
+from harness.exports import EXPORTS
 
 
 @pytest.fixture
@@ -33,3 +39,110 @@ def test_an_earlier_trials_record_is_refused(instruments, said, tmp_path):
         path.with_suffix(".sync.csv").write_text("sync_time_s\n1\n2\n")
     assert not instruments._take_named(str(tmp_path / "again.csv"))
     assert "an earlier trial, anchor_first.csv" in said[-1]
+
+
+# -- the watched folder ---------------------------------------------------------------------------------------
+
+RECORD = {"time_s": np.arange(0.0, 1.0, 0.02), "displacement_mm": np.arange(50.0), "force_N": np.sin(np.arange(50.0))}
+SYNC = "sync_time_s\n" + "".join(f"{0.01 * k:.2f}\n" for k in range(100))
+
+
+@pytest.fixture
+def watching(said, tmp_path):
+    """Instruments that wait for the record of a pull, and how they are declared."""
+
+    def begin(declaration=""):
+        folder = tmp_path / "records"
+        folder.mkdir()
+        (tmp_path / "bench.toml").write_text(declaration)
+        own = OwnInstruments(Desk(said.append), folder, read_exports(tmp_path / "bench.toml"))
+        own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 1, 1), tmp_path / "raw")
+        own._experiment = "anchor_pull"
+        own._step = "start"
+        own._known, own._told = dict(own._signatures()), dict(own._alone())
+        own._step = "save"
+        return own, folder
+
+    return begin
+
+
+def looked(own, until, seconds=2.0):
+    """Look as a session does, until something is so; False if it is not in time."""
+    ends = time.monotonic() + seconds
+    while time.monotonic() < ends:
+        own._take_new()
+        if until():
+            return True
+        time.sleep(0.1)
+    return False
+
+
+@pytest.mark.parametrize("name", ["bluehill-french", "testxpert", "walter-bai", "labview", "trapezium"])
+@pytest.mark.parametrize("place", ["", "monday/specimen 1"])
+def test_a_declared_record_is_seen_by_any_suffix_and_in_subfolders(watching, said, name, place):
+    own, folder = watching(f'[instrument.machine]\npreset = "{name}"\n')
+    (folder / place).mkdir(parents=True, exist_ok=True)
+    path = folder / place / f"pull{EXPORTS[name].suffix}"
+    path.write_bytes(EXPORTS[name].write(RECORD))
+    path.with_suffix(".sync.csv").write_text(SYNC)
+    assert looked(own, lambda: own._record is not None), said
+    np.testing.assert_allclose(own.stop()["force_N"], RECORD["force_N"], atol=2e-3)
+    own.keep(folder.parent / "raw")
+    kept = {file.name for file in (folder.parent / "raw").iterdir()}
+    assert kept == {f"anchor_8.5psi_20mm_s_1{EXPORTS[name].suffix}", "anchor_8.5psi_20mm_s_1.sync.csv"}
+
+
+def test_a_workbook_is_seen(watching, said):
+    pandas = pytest.importorskip("pandas")
+    own, folder = watching(
+        '[instrument.machine]\nformat = "xlsx"\ncolumns = { time_s = "t", displacement_mm = "x", force_N = "F" }\n'
+        'units = { time_s = "s", displacement_mm = "mm", force_N = "N" }\n'
+    )
+    table = pandas.DataFrame(dict(zip("txF", RECORD.values(), strict=True)))
+    (folder / "pull.sync.csv").write_text(SYNC)
+    table.to_excel(folder / "pull.xlsx", index=False)
+    assert looked(own, lambda: own._record is not None), said
+
+
+@pytest.mark.parametrize(
+    ("file", "says"),
+    [
+        ("pull.csv", r"pull\.csv is there; pull\.sync\.csv .* is not, yet"),
+        ("pull.sync.csv", r"pull\.sync\.csv is there; the record that it belongs to is not, yet"),
+        ("pull.xlsx", r"pull\.xlsx is there, but a record of the machine ends with \.csv.*bifa instrument"),
+        ("pull.c3d", r"pull\.c3d is there, but"),
+        ("below/pull.CSV", r"pull\.CSV is there; pull\.sync\.csv"),
+    ],
+)
+def test_what_has_come_and_cannot_be_used_is_said_within_two_seconds_and_once(watching, said, file, says):
+    own, folder = watching()
+    (folder / file).parent.mkdir(exist_ok=True)
+    (folder / file).write_text("1\n2\n")
+    assert looked(own, lambda: said), "nothing was said"
+    assert re.search(says, said[0])
+    assert not looked(own, lambda: len(said) > 1, 0.7)
+
+
+def test_a_record_whose_columns_are_not_there_is_said_within_two_seconds(watching, said):
+    own, folder = watching('[instrument.machine]\npreset = "testxpert"\n')
+    (folder / "pull.TRA").write_text("Prüfzeit;Weg;Standardkraft\ns;mm;N\n0;0;0\n1;1;1\n", encoding="cp1252")
+    (folder / "pull.sync.csv").write_text(SYNC)
+    assert looked(own, lambda: said)
+    assert "lacks the column Standardweg; it has Prüfzeit, Weg, Standardkraft" in said[0]
+
+
+@pytest.mark.parametrize("stray", [".DS_Store", "Thumbs.db", "._pull.csv", ".~lock.pull.csv#", "~$pull.xlsx"])
+def test_what_systems_leave_behind_is_no_record(watching, said, stray):
+    own, folder = watching()
+    (folder / stray).write_text("x")
+    assert not looked(own, lambda: said, 0.9)
+
+
+def test_a_record_that_has_its_own_sync_needs_no_second_file(watching, said):
+    own, folder = watching('[instrument.machine]\npreset = "arduino"\nsync = { column = "d10" }\n')
+    millis = np.arange(0, 3000)
+    high = (millis % 10 < 3) * 5
+    rows = "".join(f"{t},{t / 100:.3f},{t / 50:.3f},{v}\n" for t, v in zip(millis, high, strict=True))
+    (folder / "log.txt").write_text("millis,position_mm,force_N,d10\n" + rows)
+    assert looked(own, lambda: own._record is not None), said
+    np.testing.assert_allclose(np.diff(own.stop()["sync_time_s"]), 0.01)
