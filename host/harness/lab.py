@@ -1,6 +1,7 @@
 """A lab beside the virtual robot: somebody who does what `next.toml` asks, with a camera and a testing machine.
 
-As a program (`python -m harness.lab LINK FOLDER`) it serves the robot on a pty as well.
+As a program (`python -m harness.lab LINK FOLDER [BENCH]`) it serves the robot on a pty as well; with BENCH, a bench's
+file, its instruments write in turn as the named programs do, and it declares which in that file.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ import threading
 import time
 import tomllib
 from collections.abc import Callable
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 
+from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
 from virtual_robot.rig import VirtualRig, open_rig
 
 _MOUNTED_BY = {  # which of a trial's settings the stand is told
@@ -29,8 +32,15 @@ _LOOK_S = 0.05
 class Lab:
     """Answers each question once. `spoil(step, asked, record)` may change what is saved, to see it refused."""
 
-    def __init__(self, rig: VirtualRig, folder: Path, spoil: Callable[[dict, dict], dict] = lambda asked, r: r) -> None:
-        self._rig, self._folder, self._spoil = rig, folder, spoil
+    def __init__(
+        self,
+        rig: VirtualRig,
+        folder: Path,
+        spoil: Callable[[dict, dict], dict] = lambda asked, r: r,
+        bench: Path | None = None,
+    ) -> None:
+        self._rig, self._folder, self._spoil, self._bench = rig, folder, spoil, bench
+        self._turns = {"machine": cycle(MACHINES), "camera": cycle(CAMERAS[:6])}
         self._stand = rig.instruments
         self._done: tuple | None = None
         self.asked: list[dict] = []
@@ -79,10 +89,30 @@ class Lab:
     def _save(self, asked: dict) -> str:
         record = self._spoil(asked, self._stand.stop())
         name = Path(asked["file"]).stem
+        if self._bench is not None:
+            return self._export(asked, record, name)
         edges = {"sync_time_s": record.pop("sync_time_s")}
         for file, columns in ((f"{name}.sync.csv", edges), (f"{name}.csv", record)):
             rows = np.column_stack(list(columns.values()))
             np.savetxt(self._folder / file, rows, "%.6f", ",", header=",".join(columns), comments="")
+        return ""
+
+    def _export(self, asked: dict, record: dict, name: str) -> str:
+        """As the next of the programs writes it; its clock begins with its first sample, as that of frames does."""
+        role = "machine" if asked["experiment"] in ("static_loading", "anchor_pull") else "camera"
+        program = next(self._turns[role])
+        begin_s = record["time_s"][0]
+        edges = record.pop("sync_time_s") - begin_s
+        record = {**record, "time_s": record["time_s"] - begin_s}
+        known = self._bench.read_text() if self._bench.exists() else ""
+        declared = f'[instrument.{role}]\npreset = "{preset_of(program)}"\n'
+        if preset_of(program) == "natnet":  # by the computer's time
+            edges = edges + 1.7e9
+        self._bench.write_text(known.split("[instrument")[0] + declared)
+        (self._folder / program).mkdir(exist_ok=True)
+        path = self._folder / program / f"{name}{EXPORTS[program].suffix}"
+        np.savetxt(path.with_suffix(".sync.csv"), edges, "%.6f", header="sync_time_s", comments="")
+        path.write_bytes(EXPORTS[program].write(record))
         return ""
 
     def _review(self, asked: dict) -> str:
@@ -93,7 +123,7 @@ def main() -> None:
     """Serve until the process is ended."""
     link, folder = Path(sys.argv[1]), Path(sys.argv[2])
     with open_rig() as rig:
-        lab = Lab(rig, folder)
+        lab = Lab(rig, folder, bench=Path(sys.argv[3]) if len(sys.argv) > 3 else None)
 
         def work() -> None:
             while True:

@@ -140,6 +140,8 @@ def _attended(console: "Console", bench: "Bench", watch: Path | None, bench_file
 
 def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = None) -> "tuple[Desk, ByHand]":
     """The desk on this terminal, and who works the instruments there (`bifa.measure.by_hand`)."""
+    from functools import partial
+
     from bifa.errors import BifaError
     from bifa.measure.bench_file import read_exports
     from bifa.measure.by_hand import ByHand
@@ -149,7 +151,9 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
         raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
     plain = not console.encoding.lower().startswith("utf")
     desk = Desk(lambda text: console.print(text, markup=False, highlight=False), watch)
-    return desk, ByHand(desk, watch, plain, read_exports(bench_file) if bench_file else {})
+    exports = partial(read_exports, bench_file) if bench_file else dict
+    exports()  # what is wrong is said before anything moves
+    return desk, ByHand(desk, watch, plain, exports)
 
 
 def _kept(out: Path) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 
 from bifa.data import DatasetWriter, Trial
 from bifa.data.check import check_trial
@@ -29,16 +28,16 @@ _LOOK_S = 0.25
 
 
 class ByHand:
-    """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; `exports`: how
-    the instruments write their files, where they are declared; `before` is called before anything is asked, so that no
-    bar redraws itself over questions and answers."""
+    """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; `exports`: says
+    how the instruments write their files, where that is declared; `before` is called before anything is asked, so that
+    no bar redraws itself over questions and answers."""
 
     def __init__(
         self,
         desk: Desk,
         watch: Path | None = None,
         plain: bool = False,
-        exports: Mapping[str, Export] = MappingProxyType({}),
+        exports: Callable[[], Mapping[str, Export]] = dict,
     ) -> None:
         self._desk, self._plain = desk, plain
         self._instruments = OwnInstruments(desk, watch, exports)

@@ -10,15 +10,15 @@ from __future__ import annotations
 import contextlib
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from bifa.data.export import ROLES, Export
+from bifa.errors import BifaError
 from bifa.files import is_stray
 from bifa.measure.desk import ANSWER, ASKS, Desk
 from bifa.measure.instrument_csv import InstrumentFileError, read_instrument, sync_file
@@ -62,12 +62,16 @@ class Turn:
 
 
 class OwnInstruments:
-    """`AskedInstruments` that are worked by whoever is at `desk`; `watch` is the folder of their files, if any."""
+    """`AskedInstruments` that are worked by whoever is at `desk`; `watch` is the folder of their files, if any;
+    `exports()` says how these are written, and is asked again while a record is waited for."""
 
     def __init__(
-        self, desk: Desk, watch: Path | None = None, exports: Mapping[str, Export] = MappingProxyType({})
+        self, desk: Desk, watch: Path | None = None, exports: Callable[[], Mapping[str, Export]] = dict
     ) -> None:
         self._desk, self._watch, self._exports = desk, watch, exports
+        self._declared: Mapping[str, Export] = {}
+        self._before: dict[Path, tuple] = {}
+        self._wrong = ""
         self._told: dict[Path, tuple] = {}
         self._turn: Turn | None = None
         self._kept: Path | None = None
@@ -84,6 +88,7 @@ class OwnInstruments:
     def mount(self, experiment: str, **settings) -> None:
         """See Instruments."""
         self._experiment, self._record = experiment, None
+        self._declared = self._exports()
         stand = _STAND[experiment].format(**settings)
         slope = settings.get("inclination_deg")
         if slope:
@@ -96,6 +101,7 @@ class OwnInstruments:
     def start(self) -> None:
         """See Instruments."""
         self._known, self._told = dict(self._signatures()), dict(self._alone())
+        self._before = dict(self._known)
         machine = on_machine(self._experiment)
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
@@ -170,7 +176,7 @@ class OwnInstruments:
     @property
     def _export(self) -> Export | None:
         """How the instrument of this experiment writes its files."""
-        return self._exports.get(ROLES[self._experiment])
+        return self._declared.get(ROLES[self._experiment])
 
     @property
     def _needs_sync_file(self) -> bool:
@@ -240,6 +246,7 @@ class OwnInstruments:
 
     def _take_new(self) -> bool:
         """Take the file that has come since the start, once it is whole; what cannot be used is said, once."""
+        self._take_correction()
         self._tell_of_others()
         for path, signature in self._signatures():
             if self._known.get(path) == signature:
@@ -252,6 +259,18 @@ class OwnInstruments:
                 if self._take(path):
                     return True
         return False
+
+    def _take_correction(self) -> None:
+        """A declaration that was put right while it is waited for: what came is looked at again."""
+        try:
+            declared = self._exports()
+        except BifaError as error:
+            if str(error) != self._wrong:
+                self._wrong = str(error)
+                self._desk.say(f"{error}.")
+            return
+        if declared != self._declared:
+            self._declared, self._known = declared, dict(self._before)
 
     def _take_named(self, answer: str) -> bool:
         if not answer and self._watch is not None:

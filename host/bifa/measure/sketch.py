@@ -29,13 +29,18 @@ def sketch(trial: Trial, plain: bool = False) -> list[str]:
 
 
 def _panel(x_name: str, y_name: str, columns, plain: bool) -> list[str]:
-    x, y = (_joined(columns[name]) for name in (x_name, y_name))
+    return panel(columns[x_name], columns[y_name], _words(x_name), _words(y_name), plain)
+
+
+def panel(x: np.ndarray, y: np.ndarray, below: str, above: str, plain: bool = False) -> list[str]:
+    """Lines of a plot of `y` over `x`, each of shape (n,), with what they are called."""
+    x, y = _joined(x), _joined(y)
     rows = _rows(x, y, plain)
     labels = [f"{y.max():.1f}", *[""] * (HEIGHT - 2), f"{y.min():.1f}"]
     lines = [f"{label:>{_MARGIN}} {row}".rstrip() for label, row in zip(labels, rows, strict=True)]
     left, right = f"{x.min():.1f}", f"{x.max():.1f}"
-    below = f"{left}{_words(x_name):^{WIDTH - len(left) - len(right)}}{right}"
-    return [f"{'':{_MARGIN}} {_words(y_name)}", *lines, f"{'':{_MARGIN}} {below}"]
+    axis = f"{left}{below:^{WIDTH - len(left) - len(right)}}{right}"
+    return [f"{'':{_MARGIN}} {above}", *lines, f"{'':{_MARGIN}} {axis}"]
 
 
 def _joined(values: np.ndarray) -> np.ndarray:

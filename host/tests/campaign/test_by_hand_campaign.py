@@ -10,7 +10,9 @@ import pytest
 
 from bifa.data import read_dataset
 from bifa.measure.plan import BRISK
+from bifa.mistakes import mistakes_in
 from bifa.robot.gait import save_gait
+from harness.exports import EXPORTS
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 HOST = Path(__file__).parents[2]
@@ -71,3 +73,40 @@ def test_an_experiment_records_a_walk_with_the_camera(lab, tmp_path):
     (trial,) = read_dataset(tmp_path / "walk").trials
     assert trial.columns["displacement_head_mm"].max() > 40.0
     assert trial.extra["clock_error_s"] < 1e-3
+
+
+def is_same_record(trial, raw):
+    """The instrument's own file of the trial is kept as it came."""
+    return [path for path in raw.iterdir() if path.name.startswith(Path(trial.file).stem)]
+
+
+@pytest.mark.parametrize("lab", ["programs"], indirect=True)
+def test_an_experiment_takes_the_exports_of_testing_machines_by_preset(lab, tmp_path):
+    """Two of them: the declaration is put right while the second record waits."""
+    (tmp_path / "bench.toml").write_text("[known]\n")
+    options = ("--actuator", "small", "--pressure", "0", "--rate", "40", "--repeats", "2", "--out", "static")
+    output, _ = begin(lab, tmp_path, "experiment", *options, "static_loading").communicate(timeout=120)
+    assert output.count("Nothing looks wrong") == 2, output
+    trials = read_dataset(tmp_path / "static").trials
+    kept = [is_same_record(trial, tmp_path / "static" / "raw") for trial in trials]
+    assert [len(files) for files in kept] == [2, 2]
+    assert all(trial.columns["displacement_mm"].max() > 25.0 for trial in trials)
+    assert all(trial.extra["clock_error_s"] < 1e-3 for trial in trials)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("lab", ["programs"], indirect=True)
+def test_a_campaign_takes_the_exports_of_every_named_program_by_preset(lab, tmp_path):
+    """One after the other, fifteen conditions: eight testing machines, six cameras."""
+    (tmp_path / "bench.toml").write_text("[known]\n")
+    options = ("--quick", "--out", "run", "--bench", "bench.toml")
+    process = begin(lab, tmp_path, "campaign", *options)
+    said = wait_for(process, "Trial 16 of 30")
+    interrupt(process)
+    assert said.count("Not usable") == 0, said
+    seen = {path.parent.name for path in (tmp_path / "files").rglob("*") if path.is_file()}
+    assert set(EXPORTS) <= seen
+    trials = read_dataset(tmp_path / "run" / ".measure-unfinished" / "measured.partial").trials
+    assert len(trials) == 15
+    assert all(trial.extra["clock_error_s"] < 1e-3 for trial in trials)
+    assert [str(found) for trial in trials for found in mistakes_in(trial)] == []

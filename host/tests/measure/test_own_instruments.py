@@ -2,6 +2,7 @@
 
 import re
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -55,7 +56,8 @@ def watching(said, tmp_path):
         folder = tmp_path / "records"
         folder.mkdir()
         (tmp_path / "bench.toml").write_text(declaration)
-        own = OwnInstruments(Desk(said.append), folder, read_exports(tmp_path / "bench.toml"))
+        own = OwnInstruments(Desk(said.append), folder, partial(read_exports, tmp_path / "bench.toml"))
+        own._declared = own._exports()
         own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 1, 1), tmp_path / "raw")
         own._experiment = "anchor_pull"
         own._step = "start"
@@ -146,3 +148,14 @@ def test_a_record_that_has_its_own_sync_needs_no_second_file(watching, said):
     (folder / "log.txt").write_text("millis,position_mm,force_N,d10\n" + rows)
     assert looked(own, lambda: own._record is not None), said
     np.testing.assert_allclose(np.diff(own.stop()["sync_time_s"]), 0.01)
+
+
+def test_a_declaration_may_be_put_right_while_its_file_waits(watching, said, tmp_path):
+    own, folder = watching('[instrument.machine]\npreset = "bluehill"\n')
+    (folder / "pull.TRA").write_bytes(EXPORTS["testxpert"].write(RECORD))
+    (folder / "pull.sync.csv").write_text(SYNC)
+    assert looked(own, lambda: said)
+    (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testexpert"\n')
+    assert looked(own, lambda: "'testexpert' is unknown" in said[-1])
+    (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
+    assert looked(own, lambda: own._record is not None), said

@@ -1,0 +1,221 @@
+"""`bifa instrument`: how an instrument writes its files, proposed from one of them, asked about, and declared."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+EPILOG = """Examples:  bifa instrument export.csv   |   bifa instrument trial.TRA --role machine   |
+bifa instrument take.csv --role camera --bench monday.toml   |   bifa instrument --presets"""
+_ROLES = {"machine": "the testing machine (static loadings, pulls)", "camera": "the camera (steps, walks)"}
+_MOST_PLOTS = 8
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog=EPILOG)(instrument)
+
+
+def instrument(
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="An export of the instrument.", show_default=False, exists=True, dir_okay=False),
+    ] = None,
+    role: Annotated[str | None, typer.Option(help="machine or camera; otherwise you are asked.")] = None,
+    bench: Annotated[Path, typer.Option(help="The bench's file, which takes the declaration.")] = Path("bench.toml"),
+    presets: Annotated[bool, typer.Option("--presets", help="List the programs whose exports are known.")] = False,
+) -> None:
+    """Look at an instrument's export, and declare how it is written.
+
+    Shows the names of its columns, its first rows, its row of units and a small plot of each column, proposes which
+    column is what, and asks. The declaration is checked on the file and written into the bench's file, from where
+    `bifa campaign` and `bifa experiment` read it. Nothing is declared that you have not been asked about.
+    """
+    from bifa.data.export import presets as known
+    from bifa.screen import Console
+
+    console = Console()
+    if presets:
+        for name, preset in known().items():
+            console.print(f"{name:16} {preset['program']}", markup=False, highlight=False)
+        return
+    if file is None:
+        raise typer.BadParameter("name a file that your instrument has exported, or ask for --presets")
+    if role is not None and role not in _ROLES:
+        raise typer.BadParameter(f"--role is machine or camera, not {role}")
+
+    from bifa.measure.propose import declaration, look
+
+    seen = look(file)
+    _show(console, file, seen)
+    role = role or _choice("Whose file is it?", list(_ROLES), None)
+    _refuse_declared(bench, role)
+    table = _asked(console, seen, role)
+    _prove(console, file, role, table)
+    text = declaration(role, table)
+    console.print(f"\n{text}", markup=False, highlight=False)
+    if typer.confirm(f"Write this into {bench}?", default=False):
+        _append(bench, text)
+        console.print(f"written: {bench}", highlight=False)
+
+
+def _show(console, file: Path, seen) -> None:
+    """What was seen: how it is written, names, units, rows, plots."""
+    import numpy as np
+
+    from bifa.data.errors import DatasetError
+    from bifa.measure.sketch import panel
+    from bifa.report.page import Table
+    from bifa.report.terminal import print_table
+
+    plain = not console.encoding.lower().startswith("utf")
+    how = ", ".join(f"{key} {value!r}" for key, value in seen.how.items()) or "commas, points, names in the first line"
+    console.print(f"{file}: {how}; {len(seen.sheet)} rows from line {seen.sheet.line(0)} on", markup=False)
+    for role, name in seen.presets.items():
+        console.print(f"As a {role}'s it is read by the preset {name}.", markup=False)
+    labels, units = seen.sheet.labels(), seen.sheet.units
+    rows = [[label, unit, *row] for label, unit, row in zip(labels, units, zip(*seen.rows(), strict=True), strict=True)]
+    print_table(console, Table(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
+    for place, label in list(enumerate(labels))[:_MOST_PLOTS]:
+        try:
+            values = seen.sheet.numbers(place, label)
+        except DatasetError as error:
+            console.print(f"{label}: {error}", markup=False, highlight=False)
+            continue
+        known = np.flatnonzero(np.isfinite(values))
+        if len(known) > 1:
+            for line in panel(known.astype(float), values[known], "row", label, plain):
+                console.print(line, markup=False, highlight=False)
+
+
+def _asked(console, seen, role: str) -> dict[str, Any]:
+    """The declaration, question by question; Enter takes what is proposed in brackets."""
+    from bifa.measure.propose import parsed, wanted
+
+    preset = seen.presets.get(role)
+    if preset and not typer.confirm(f"Use the preset {preset}?", default=True):
+        preset = None
+    given = parsed(role, {"preset": preset}) if preset else None
+    columns: dict[str, str] = {}
+    units: dict[str, str] = {}
+    sign: dict[str, int] = {}
+    more: dict[str, Any] = {}
+    for name in [*wanted(role), *(["displacement_tail_mm"] if role == "camera" else [])]:
+        proposed = given.columns.get(name) if given else seen.guess(name)
+        if name != "time_s":
+            proposed = proposed if proposed is not None and _is_there(seen, proposed) else "-"
+        column = _column(console, seen, name, proposed)
+        if column == "-":
+            continue
+        columns[name] = column
+        told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
+        units[name] = _unit(name, column, told)
+        if name != "time_s" and typer.confirm(f"Turn the sign of {name}?", default=False):
+            sign[name] = -1
+        more |= _clock(units[name], given) if name == "time_s" else {}
+    table: dict[str, Any] = {"preset": preset} if preset else dict(seen.how)
+    if not given or any(given.columns.get(n) != c or given.units.get(n) != units[n] for n, c in columns.items()):
+        table |= {"columns": columns, "units": units}
+    table |= {key: value for key, value in more.items() if not given or getattr(given, key) != value}
+    return table | ({"sign": sign} if sign else {}) | _sync(seen)
+
+
+def _is_there(seen, column: str) -> bool:
+    from bifa.data.errors import DatasetError
+
+    try:
+        return seen.sheet.find(column) >= 0
+    except DatasetError:
+        return False
+
+
+def _column(console, seen, name: str, proposed: str | None) -> str:
+    from bifa.data.errors import DatasetError
+
+    while True:
+        optional = "" if name == "time_s" else " (- if it is none)"
+        column = typer.prompt(f"Which column is {name}{optional}?", default=proposed)
+        if column == "-" and optional:
+            return column
+        try:
+            for part in column.split(" + "):
+                seen.sheet.find(part)
+            return column
+        except DatasetError as error:
+            console.print(str(error), markup=False, highlight=False)
+
+
+def _unit(name: str, column: str, proposed: str | None) -> str:
+    from bifa.measure.propose import units_for
+
+    return _choice(f"In which unit is {column!r}?", units_for(name), proposed)
+
+
+def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
+    while True:
+        answer = typer.prompt(f"{question} ({', '.join(allowed)})", default=proposed)
+        if answer in allowed:
+            return answer
+        typer.echo(f"one of {', '.join(allowed)}")
+
+
+def _clock(unit: str, given) -> dict[str, Any]:
+    """What frames and dates need besides."""
+    if unit == "frame":
+        return {"rate_hz": typer.prompt("Frames a second?", default=given.rate_hz if given else None, type=float)}
+    if unit != "date":
+        return {}
+    form = typer.prompt("How is a date written (as for strptime; Enter: ISO 8601)?", default="", show_default=False)
+    zone = typer.prompt("In which zone, where it names none (as Europe/Berlin; Enter: UTC)?", default="UTC")
+    return ({"date_format": form} if form else {}) | ({"zone": zone} if zone != "UTC" else {})
+
+
+def _sync(seen) -> dict[str, Any]:
+    """Where the strobe's edges stand."""
+    answer = typer.prompt(
+        "Where is the strobe (D10)? file: edges in a file beside it; frames: every row is a frame that it triggered; "
+        "or the column in which it was sampled",
+        default="file",
+    )
+    if answer == "file":
+        return {}
+    if answer == "frames":
+        return {"sync": "frames"}
+    seen.sheet.find(answer)
+    return {"sync": {"column": answer, "threshold": typer.prompt("High above?", default=2.5, type=float)}}
+
+
+def _prove(console, file: Path, role: str, table) -> None:
+    """Read the file as it is declared, and say what comes out; DatasetError where it cannot be."""
+    import numpy as np
+
+    from bifa.data.export import read_export
+    from bifa.measure.propose import parsed, wanted
+
+    export = parsed(role, table)
+    named = table.get("columns", export.columns)
+    columns, _, rows = read_export(file, export, [n for n in wanted(role) if n in named])
+    step_s = float(np.median(np.diff(columns["time_s"]))) if len(rows) > 1 else np.nan
+    console.print(f"\nRead as declared: {len(rows)} rows, one every {1e3 * step_s:.3g} ms.", highlight=False)
+    for name, values in columns.items():
+        known = values[np.isfinite(values)]
+        gaps = len(values) - len(known)
+        told = f"{known.min():.6g} to {known.max():.6g}" if len(known) else "nothing"
+        console.print(f"  {name}: {told}{f', {gaps} empty' if gaps else ''}", highlight=False)
+
+
+def _refuse_declared(bench: Path, role: str) -> None:
+    from bifa.errors import BifaError
+    from bifa.measure.bench_file import read_exports
+
+    if role in read_exports(bench):
+        raise BifaError(
+            f"{bench} declares [instrument.{role}] already: remove that table first, or name another --bench"
+        )
+
+
+def _append(bench: Path, text: str) -> None:
+    from bifa.files import write_text
+
+    before = bench.read_text(encoding="utf-8") if bench.exists() else ""
+    write_text(bench, f"{before.rstrip()}\n\n{text}" if before.strip() else text)

@@ -1,0 +1,226 @@
+"""A look at one export: how it seems to be written, which preset reads it, and which column may be what.
+
+What is found here is proposed to a person, who decides; nothing is read by it unasked.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from bifa.data.clocks import DATE, FRAME
+from bifa.data.errors import DatasetError
+from bifa.data.export import ROLES, UNITS, Export, parse_exports, presets, unit_in
+from bifa.data.fields import Fields, Source
+from bifa.data.sheet import SEPARATORS, Form, Sheet
+from bifa.measure.instruments import CHANNELS
+from lacuna.decimals import number
+
+ROWS_SHOWN = 3
+_LOOKED_AT = 400  # lines
+_MOST_HEADS = 6
+_TAIL = "displacement_tail_mm"
+_MEANS = {  # what a column may be called, in the languages of the presets
+    "time_s": r"time|zeit|temps|millis|micros|stamp|frame|x_value|^t$",
+    "displacement": r"displ|exten|stroke|posi|weg|verl|course|cross|^x$|/ x$| x$",
+    "force": r"force|load|kraft|last|charge",
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """What was seen in a file: how it is written (the keys of a declaration that differ from the usual), its sheet, and
+    the presets that read it, by role."""
+
+    how: Mapping[str, Any]
+    sheet: Sheet
+    presets: Mapping[str, str]
+
+    def rows(self) -> list[list[str]]:
+        """The first rows, as they were written."""
+        columns = [self.sheet.cells(place)[:ROWS_SHOWN] for place in range(len(self.sheet.names))]
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def guess(self, name: str) -> str | None:
+        """The column that may be `name` of the data set."""
+        kind = "time_s" if name == "time_s" else name.split("_")[0]
+        found = [label for label in self.sheet.labels() if re.search(_MEANS[kind], label, re.IGNORECASE)]
+        return found[0] if found else None
+
+    def unit(self, name: str, column: str) -> str | None:
+        """The unit that the file itself gives for a column, if it may be that of `name`."""
+        place = self.sheet.find(column)
+        told = unit_in(self.sheet.units[place]) or unit_in(self.sheet.names[place][-1])
+        return told if told in units_for(name) else None
+
+
+def units_for(name: str) -> list[str]:
+    """The units in which a column of the data set may be declared."""
+    return [*UNITS.get(name.rsplit("_", 1)[-1], {}), *((FRAME, DATE) if name == "time_s" else ())]
+
+
+def wanted(role: str) -> list[str]:
+    """The columns that an instrument of this role records, over all its experiments."""
+    names = [name for experiment, channels in CHANNELS.items() if ROLES[experiment] == role for name in channels]
+    return ["time_s", *dict.fromkeys(names)]
+
+
+def look(path: Path) -> Look:
+    """Raises DatasetError where the file is no table at all."""
+    how = _workbook() if path.suffix.lower() == ".xlsx" else _text(path)
+    form = Form(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
+    return Look(how, Sheet(path, form), {role: name for role in ("machine", "camera") if (name := _preset(path, role))})
+
+
+def declaration(role: str, table: Mapping[str, Any]) -> str:
+    """As it stands in a bench's file."""
+    return f"[instrument.{role}]\n{tomli_w.dumps(dict(table))}" if not _nested(table) else _inline(role, table)
+
+
+def parsed(role: str, table: Mapping[str, Any]) -> Export:
+    """The declaration, checked; DatasetError."""
+    source = Source("", 0, "the declaration")
+    return parse_exports(Fields({role: dict(table)}, source, table="instrument"), source)[role]
+
+
+def _nested(table: Mapping[str, Any]) -> bool:
+    return any(isinstance(value, Mapping) for value in table.values())
+
+
+def _inline(role: str, table: Mapping[str, Any]) -> str:
+    """Tables of one line each, as people write them."""
+    lines = [f"[instrument.{role}]"]
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            pairs = [tomli_w.dumps({name: one}).strip() for name, one in value.items()]
+            lines.append(f"{key} = {{ {', '.join(pairs)} }}")
+        else:
+            lines.append(tomli_w.dumps({key: value}).strip())
+    return "\n".join(lines) + "\n"
+
+
+# -- how it is written -----------------------------------------------------------------------------------------------
+
+
+def _workbook() -> dict[str, Any]:
+    return {"format": "xlsx"}
+
+
+def _text(path: Path) -> dict[str, Any]:
+    encoding, lines = _decoded(path)
+    best: tuple[int, int, str, str] = (0, 0, "comma", ".")
+    for name, mark in SEPARATORS.items():
+        for decimal in (".", ","):
+            if decimal != mark:
+                run, first = _numbers(lines, mark, decimal)
+                best = max(best, (run, -first, name, decimal), key=lambda one: one[:2])
+    run, first, separator, decimal = best[0], -best[1], best[2], best[3]
+    if run < 2:
+        raise DatasetError(
+            "holds no rows of numbers that belong together: is it the export of a table?", file=str(path)
+        )
+    cells = [_split(line, SEPARATORS[separator]) for line in lines[:first]]
+    how: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
+    how = {key: value for key, value in how.items() if value not in ("comma", ".", "utf-8")}
+    return how | _heads(cells, len(_split(lines[first], SEPARATORS[separator])))
+
+
+def _decoded(path: Path) -> tuple[str, list[str]]:
+    try:
+        raw = path.read_bytes()[: 1 << 18]
+    except OSError as error:
+        raise DatasetError(f"cannot be read ({error.strerror})", file=str(path)) from None
+    marked = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
+    encoding = "utf-16" if marked else "utf-8" if _is_utf8(raw) else "cp1252"
+    return encoding, raw.decode(encoding, "replace").removeprefix("\ufeff").splitlines()[:_LOOKED_AT]
+
+
+def _is_utf8(raw: bytes) -> bool:
+    try:
+        raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        return error.start > len(raw) - 4  # cut within a character
+    return True
+
+
+def _split(line: str, mark: str) -> list[str]:
+    if mark == " ":
+        return line.split()
+    return next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])
+
+
+def _numbers(lines: Sequence[str], mark: str, decimal: str) -> tuple[int, int]:
+    """Length and first line of the longest run of lines with as many cells, numbers most of them."""
+    longest, first, run, width = 0, 0, 0, 0
+    for place, line in enumerate(lines):
+        cells = _split(line, mark)
+        here = len(cells) if len(cells) > 1 and _most_are_numbers(cells, decimal) else 0
+        run = run + 1 if here and here == width else int(bool(here))
+        width = here
+        if run > longest:
+            longest, first = run, place - run + 1
+    return longest, first
+
+
+def _most_are_numbers(cells: Sequence[str], decimal: str) -> bool:
+    written = [cell for cell in cells if cell.strip()]
+    found = [number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) for cell in written]
+    return len(written) > 1 and sum(value is not None for value in found) > len(written) / 2
+
+
+def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
+    """The rows of names, and of units, right above the numbers."""
+    heads: list[Sequence[str]] = []
+    for row in reversed(above):
+        if not 1 < len(row) <= width + 1 or not any(cell.strip() for cell in row) or len(heads) == _MOST_HEADS:
+            break
+        if row[0].strip() and heads and _names(heads[0]) and not _is_of_units(heads[0]):
+            break  # a line of the preamble
+        heads.insert(0, row)
+    units = int(bool(heads) and len(heads) > 1 and _is_of_units(heads[-1]))
+    names = heads[: len(heads) - units]
+    how: dict[str, Any] = {"units_rows": units} if units else {}
+    if len(names) > 1:
+        how["header_rows"] = len(names)
+    begin = len(above) - len(heads)
+    label = names[-1][0].strip() if names else ""
+    if begin and label and [row[0].strip() for row in above if row].count(label) == 1:
+        how["header"] = label
+    elif begin:
+        how["skip_rows"] = begin
+    return how
+
+
+def _names(row: Sequence[str]) -> bool:
+    """Whether a row names its first column, so that what is above it is no part of the names."""
+    return bool(row[0].strip())
+
+
+def _is_of_units(row: Sequence[str]) -> bool:
+    written = [cell for cell in row if cell.strip()]
+    return sum(unit_in(cell) is not None for cell in written) > len(written) / 2
+
+
+def _preset(path: Path, role: str) -> str | None:
+    """The first preset that finds its columns in the file."""
+    for name in presets():
+        try:
+            export = parsed(role, {"preset": name})
+            sheet = Sheet(path, export.form)
+            found = [own for own in wanted(role) if own in export.columns and sheet.find(export.columns[own]) >= 0]
+            if (
+                "time_s" in found
+                and len(found) > 1
+                and len(sheet)
+                and len(sheet.numbers(sheet.find(export.columns[found[1]]), ""))
+            ):
+                return name
+        except DatasetError:
+            continue
+    return None

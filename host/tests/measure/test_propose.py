@@ -1,0 +1,112 @@
+"""`bifa instrument`: what is seen in an export is proposed, asked about, proved on the file, and only then declared."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.data import DatasetError
+from bifa.data.export import read_export
+from bifa.measure.bench_file import read_exports
+from bifa.measure.propose import declaration, look, parsed
+from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
+
+TIME_S = np.round(np.arange(0.0, 1.0, 0.01), 6)
+MACHINE = {"time_s": TIME_S, "displacement_mm": 20.0 * np.sin(TIME_S) + 0.5, "force_N": -30.0 * np.cos(TIME_S)}
+CAMERA = {"time_s": TIME_S, "displacement_mm": 20.0 * np.sin(TIME_S) + 0.5}
+
+
+def exported(folder, name, role):
+    path = folder / f"trial{EXPORTS[name].suffix}"
+    path.write_bytes(EXPORTS[name].write(MACHINE if role == "machine" else CAMERA))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "role"), [*((name, "machine") for name in MACHINES), *((name, "camera") for name in CAMERAS)]
+)
+def test_how_an_export_is_written_is_seen_without_its_preset(tmp_path, name, role):
+    """And the preset is recognised."""
+    path = exported(tmp_path, name, role)
+    seen = look(path)
+    assert seen.presets[role] == preset_of(name)
+    assert len(seen.sheet) == len(TIME_S) * (2 if name == "natnet" else 1)
+    column = parsed(role, {"preset": preset_of(name)}).columns["displacement_mm"]
+    values = seen.sheet.numbers(seen.sheet.find(column), column)
+    by_preset, _, _ = read_export(path, parsed(role, {"preset": preset_of(name)}), ("displacement_mm",))
+    assert np.ptp(by_preset["displacement_mm"]) == pytest.approx(np.ptp(MACHINE["displacement_mm"]), rel=1e-3)
+    assert len(values) == len(seen.sheet)
+    assert seen.guess("time_s") is not None
+
+
+@pytest.mark.parametrize("name", ["bluehill", "bluehill-german", "trapezium", "walter-bai", "testxpert"])
+def test_units_and_columns_of_testing_machines_are_proposed(tmp_path, name):
+    seen = look(exported(tmp_path, name, "machine"))
+    export = parsed("machine", {"preset": name})
+    for own, column in export.columns.items():
+        assert seen.guess(own) == column
+        assert seen.unit(own, column) == export.units[own]
+
+
+def asked(path, tmp_path, *answers, role="machine"):
+    options = ["instrument", str(path), "--role", role, "--bench", str(tmp_path / "bench.toml")]
+    return CliRunner().invoke(app, options, input="\n".join(answers) + "\n")
+
+
+def test_a_file_is_declared_by_answering_questions(tmp_path):
+    path = tmp_path / "log.csv"
+    rows = "".join(
+        f"{1000 * t:.0f};{x:.3f};{f:.4f}\n".replace(".", ",") for t, x, f in zip(*MACHINE.values(), strict=True)
+    )
+    path.write_text("rig 3\nmillis;pos;cell [kN]\n" + rows)
+    said = asked(path, tmp_path, "", "ms", "pos", "cm", "y", "cell [kN]", "", "n", "file", "y")
+    assert said.exit_code == 0, said.output
+    assert "Read as declared: 100 rows, one every 10 ms." in said.output
+    export = read_exports(tmp_path / "bench.toml")["machine"]
+    found, _, _ = read_export(path, export, ("time_s", "displacement_mm", "force_N"))
+    np.testing.assert_allclose(found["time_s"], TIME_S)
+    np.testing.assert_allclose(found["displacement_mm"], -10.0 * MACHINE["displacement_mm"], atol=6e-3)
+    np.testing.assert_allclose(found["force_N"], 1000.0 * MACHINE["force_N"], atol=0.06)
+
+
+def test_a_preset_that_fits_is_offered_and_kept_short(tmp_path):
+    path = exported(tmp_path, "testxpert", "machine")
+    (tmp_path / "bench.toml").write_text("[known]\nhead_mass_kg = 0.18\n")
+    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "y")
+    assert said.exit_code == 0, said.output
+    assert "read by the preset testxpert" in said.output
+    assert "⠐" in said.output or "*" in said.output or "⣀" in said.output, "each column is plotted"
+    text = (tmp_path / "bench.toml").read_text()
+    assert text == '[known]\nhead_mass_kg = 0.18\n\n[instrument.machine]\npreset = "testxpert"\n'
+
+
+def test_nothing_is_written_unasked_and_nothing_declared_twice(tmp_path):
+    path = exported(tmp_path, "testxpert", "machine")
+    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "file", "n")
+    assert said.exit_code == 0
+    assert not (tmp_path / "bench.toml").exists()
+    (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
+    said = asked(path, tmp_path, "y")
+    assert said.exit_code != 0
+    assert "already" in str(said.exception)
+
+
+def test_what_is_no_table_is_refused(tmp_path):
+    for content in (b"", b"dear diary\n", bytes(range(256))):
+        (tmp_path / "a.csv").write_bytes(content)
+        with pytest.raises(DatasetError, match=r"a\.csv"):
+            look(tmp_path / "a.csv")
+
+
+def test_a_declaration_is_written_as_people_write_them():
+    table = {"separator": "semicolon", "columns": {"time_s": "Time (s)"}, "units": {"time_s": "s"}}
+    expected = (
+        '[instrument.machine]\nseparator = "semicolon"\ncolumns = { time_s = "Time (s)" }\nunits = { time_s = "s" }\n'
+    )
+    assert declaration("machine", table) == expected
+
+
+def test_presets_are_listed():
+    said = CliRunner().invoke(app, ["instrument", "--presets"]).output
+    assert "bluehill-german" in said
+    assert "OptiTrack Motive" in said
