@@ -1,15 +1,29 @@
-"""Reading an hour of 100 Hz walking data strictly, beside NumPy's own reader and the csv module on the same file."""
+"""Reading an hour of 100 Hz walking data, strictly, as a telemetry and as a declared export: time and memory beside
+those of NumPy's and pandas' own readers on the same file."""
 
 import csv
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+import pandas
 
 from bifa.data import EXPERIMENTS, Dataset, Trial, read_dataset, write_dataset
+from bifa.data.export import OWN_NAMES, read_export
+from bifa.measure.instrument_csv import read_columns
 
 SECONDS_ALLOWED = 2.0
+NAMES = EXPERIMENTS["locomotion"].all_columns
+IMPORTS = "import pathlib; from bifa.data import read_dataset; from bifa.measure.instrument_csv import read_columns"
+READERS = {
+    "numpy": "numpy.loadtxt(file, delimiter=',', skiprows=1)",
+    "pandas": "pandas.read_csv(file)",
+    "data set": "read_dataset(sys.argv[1])",
+    "telemetry": "read_columns(pathlib.Path(file), ('time_s',))",
+}
 GAIT = {"period_s": 5.7, "psi12_deg": 270, "psi13_deg": 90, "duty_body": 0.5, "duty_head": 0.5, "duty_tail": 0.5}
 
 
@@ -24,10 +38,20 @@ def run() -> dict[str, float]:
         file = folder / "hour.csv"
         read_s = min(_seconds(lambda: read_dataset(folder)) for _ in range(3))
         numpy_s = min(_seconds(lambda: np.loadtxt(file, delimiter=",", skiprows=1)) for _ in range(3))
+        pandas_s = min(_seconds(lambda: pandas.read_csv(file)) for _ in range(3))
         csv_s = _seconds(lambda: _with_csv_module(file))
+        columns_s = min(_seconds(lambda: read_columns(file, ("time_s",))) for _ in range(3))
+        export_s = min(_seconds(lambda: read_export(file, OWN_NAMES, NAMES)) for _ in range(3))
+        peaks = {name: _peak_mb(code, str(folder)) for name, code in READERS.items()}
         megabytes = file.stat().st_size / 1e6
     print(f"read an hour of 100 Hz data strictly ({megabytes:.0f} MB): {read_s:.2f} s (allowed {SECONDS_ALLOWED:g} s)")
     print(f"  numpy.loadtxt alone, unchecked: {numpy_s:.2f} s; Python's csv and float: {csv_s:.2f} s")
+    print(
+        f"  pandas.read_csv alone: {pandas_s:.2f} s; as telemetry {columns_s:.2f} s, "
+        f"as a declared export {export_s:.2f} s"
+    )
+    told = ", ".join(f"{name} {peak:.0f}" for name, peak in peaks.items())
+    print(f"  memory beyond what is imported, at its peak, MB: {told}")
     print(f"  write it, read it back, publish it: {write_s:.2f} s")
     return {
         "dataset_read_hour_seconds": read_s,
@@ -35,7 +59,25 @@ def run() -> dict[str, float]:
         "dataset_read_hour_seconds_numpy_loadtxt": numpy_s,
         "dataset_read_hour_seconds_csv_module": csv_s,
         "dataset_write_hour_seconds": write_s,
-    }
+        "dataset_read_hour_times_numpy_loadtxt": read_s / numpy_s,
+        "export_read_hour_seconds": export_s,
+        "export_read_hour_times_pandas": export_s / pandas_s,
+        "telemetry_read_hour_seconds": columns_s,
+    } | {f"read_hour_peak_mb_{name.replace(' ', '_')}": peak for name, peak in peaks.items()}
+
+
+def _peak_mb(code: str, folder: str) -> float:
+    """What a process of its own needs at most while it reads, beyond what it had with all imported; NaN where the
+    system does not say."""
+    if not Path("/proc/self/status").exists():
+        return float("nan")
+    program = f"import sys; import numpy, pandas; {IMPORTS}\n"
+    program += "status = lambda: dict(line.split(':') for line in open('/proc/self/status'))\n"
+    program += "most = lambda: int(status()['VmHWM'].split()[0]) / 1024\n"
+    program += f"file = sys.argv[1] + '/hour.csv'\nbefore = most()\n{code}\nprint(most() - before)"
+    return float(
+        subprocess.run([sys.executable, "-c", program, folder], capture_output=True, text=True, check=True).stdout
+    )
 
 
 def _hour(samples: int) -> Dataset:

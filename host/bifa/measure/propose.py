@@ -25,7 +25,7 @@ from lacuna.decimals import number
 ROWS_SHOWN = 3
 _LOOKED_AT = 400  # lines
 _MOST_HEADS = 6
-_TAIL = "displacement_tail_mm"
+_MAY_HAVE = ("time_s", "displacement_mm", "displacement_head_mm", "force_N")
 _MEANS = {  # what a column may be called, in the languages of the presets
     "time_s": r"time|zeit|temps|millis|micros|stamp|frame|x_value|^t$",
     "displacement": r"displ|exten|stroke|posi|weg|verl|course|cross|^x$|/ x$| x$",
@@ -213,14 +213,16 @@ def _preset(path: Path, role: str) -> str | None:
         try:
             export = parsed(role, {"preset": name})
             sheet = Sheet(path, export.form)
-            found = [own for own in wanted(role) if own in export.columns and sheet.find(export.columns[own]) >= 0]
-            if (
-                "time_s" in found
-                and len(found) > 1
-                and len(sheet)
-                and len(sheet.numbers(sheet.find(export.columns[found[1]]), ""))
-            ):
+            found = {own for own in _MAY_HAVE if own in export.columns and _is_found(sheet, export.columns[own])}
+            if "time_s" in found and len(found) > 1 and len(sheet) and ("force_N" in found) == (role == "machine"):
                 return name
         except DatasetError:
             continue
     return None
+
+
+def _is_found(sheet: Sheet, column: str) -> bool:
+    try:
+        return sheet.find(column) >= 0
+    except DatasetError:
+        return False
