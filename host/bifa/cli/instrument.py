@@ -1,9 +1,14 @@
 """`bifa instrument`: how an instrument writes its files, proposed from one of them, asked about, and declared."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from bifa.data.export import Export
+    from bifa.measure.propose import Look
+    from bifa.screen import Console
 
 EPILOG = """Examples:  bifa instrument export.csv   |   bifa instrument trial.TRA --role machine   |
 bifa instrument take.csv --role camera --bench monday.toml   |   bifa instrument --presets"""
@@ -59,7 +64,7 @@ def instrument(
         console.print(f"written: {bench}", highlight=False)
 
 
-def _show(console, file: Path, seen) -> None:
+def _show(console: "Console", file: Path, seen: "Look") -> None:
     """What was seen: how it is written, names, units, rows, plots."""
     import numpy as np
 
@@ -88,7 +93,7 @@ def _show(console, file: Path, seen) -> None:
                 console.print(line, markup=False, highlight=False)
 
 
-def _asked(console, seen, role: str) -> dict[str, Any]:
+def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
     """The declaration, question by question; Enter takes what is proposed in brackets."""
     from bifa.measure.propose import parsed, wanted
 
@@ -120,7 +125,7 @@ def _asked(console, seen, role: str) -> dict[str, Any]:
     return table | ({"sign": sign} if sign else {}) | _sync(seen)
 
 
-def _is_there(seen, column: str) -> bool:
+def _is_there(seen: "Look", column: str) -> bool:
     from bifa.data.errors import DatasetError
 
     try:
@@ -129,7 +134,7 @@ def _is_there(seen, column: str) -> bool:
         return False
 
 
-def _column(console, seen, name: str, proposed: str | None) -> str:
+def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -> str:
     from bifa.data.errors import DatasetError
 
     while True:
@@ -159,7 +164,7 @@ def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
         typer.echo(f"one of {', '.join(allowed)}")
 
 
-def _clock(unit: str, given) -> dict[str, Any]:
+def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
     """What frames and dates need besides."""
     if unit == "frame":
         return {"rate_hz": typer.prompt("Frames a second?", default=given.rate_hz if given else None, type=float)}
@@ -170,7 +175,7 @@ def _clock(unit: str, given) -> dict[str, Any]:
     return ({"date_format": form} if form else {}) | ({"zone": zone} if zone != "UTC" else {})
 
 
-def _sync(seen) -> dict[str, Any]:
+def _sync(seen: "Look") -> dict[str, Any]:
     """Where the strobe's edges stand."""
     answer = typer.prompt(
         "Where is the strobe (D10)? file: edges in a file beside it; frames: every row is a frame that it triggered; "
@@ -185,7 +190,7 @@ def _sync(seen) -> dict[str, Any]:
     return {"sync": {"column": answer, "threshold": typer.prompt("High above?", default=2.5, type=float)}}
 
 
-def _prove(console, file: Path, role: str, table) -> None:
+def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:
     """Read the file as it is declared, and say what comes out; DatasetError where it cannot be."""
     import numpy as np
 
