@@ -203,6 +203,7 @@ def _run(
                 provenance=provenance("bifa experiment", port, options | _length_of_walks(trials)),
                 on_event=show,
             )
+            bars.update(task, completed=len(trials))
     console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them just recorded.")
     if errors:
         console.print(

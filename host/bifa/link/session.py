@@ -8,7 +8,7 @@ Telemetry and lines of text arrive in between; they are handed on as they come.
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from bifa import __version__
@@ -36,6 +36,10 @@ class Counters:
     resent: int = 0
     samples: int = 0
     lost: int = 0
+
+    def since(self, before: "Counters") -> "Counters":
+        """What has come in addition."""
+        return Counters(**{one.name: getattr(self, one.name) - getattr(before, one.name) for one in fields(self)})
 
     def text(self) -> str:
         """As people see it everywhere."""

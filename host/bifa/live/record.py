@@ -71,13 +71,15 @@ def _record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: 
                 continue
             task = progress.add_task(f"walk {repeat} of {repeats}", total=1.0)
             planned = PlannedTrial("locomotion", gait=gait, cycles=cycles, repeat=repeat)
+            before = replace(uno.counters)
             columns, extra = record_columns(
                 rig, uno, planned, lambda share, task=task: progress.update(task, completed=share)
             )
             writer.add(replace(trial, columns=columns, session_order=repeat, extra=extra))
             if wrong := misfit_of_last(writer.trials):
                 progress.console.print(f"[yellow]warning[/yellow] {wrong}", highlight=False)
-            progress.console.print(f"walk {repeat}: {uno.counters.text()}")
+            progress.update(task, completed=1.0)
+            progress.console.print(f"walk {repeat}: {uno.counters.since(before).text()}")
     writer.finish()
     console.print(
         f"{out}: {repeats} walk{'' if repeats == 1 else 's'} of {cycles} cycles, firmware {hello.firmware}; "

@@ -1,6 +1,7 @@
 """The host's own part: units, gait files, versions, ports, the commands."""
 
 import random
+import re
 from decimal import Decimal
 
 import pytest
@@ -159,12 +160,14 @@ def test_upload_and_console_on_the_virtual_robot(tmp_path):
 def test_a_recording_is_a_data_set(tmp_path):
     from bifa.data import read_dataset
 
-    command = ["record", "--out", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2"]
+    command = ["record", "--out", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2", "--repeats", "2"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
-    assert "lost 0" in done.output
-    (trial,) = read_dataset(tmp_path / "walks").trials
-    assert trial.experiment == "locomotion"
+    trials = read_dataset(tmp_path / "walks").trials
+    assert [trial.experiment for trial in trials] == ["locomotion"] * 2
+    told = [int(samples) for samples in re.findall(r"walk \d: samples (\d+)  lost 0", done.output)]
+    # each walk's own, and some before and after it
+    assert all(len(trial.time_s) <= count < 1.5 * len(trial.time_s) for trial, count in zip(trials, told, strict=True))
 
 
 @pytest.mark.parametrize(
