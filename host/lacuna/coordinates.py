@@ -12,8 +12,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from lacuna.system import Effect, Parameter
+from lacuna.system import START_FACTORS, Effect, Parameter
 
+LIMITS = (0.4, 0.7, 0.9, 1.0, 1.2)  # of the inverse of a declared limit: fits begin there, and on both sides of it
 _FAR = 3.0  # times the typical size: where an effect is absent so far out, it is a limit
 
 
@@ -104,4 +105,7 @@ def of_effect(effect: Effect) -> tuple[Effect, dict[str, Coordinate]]:
     absent = chosen[effect.parameters[0].name].fitted(effect.absent)
     parameters = tuple(chosen[p.name].of(p) for p in effect.parameters)
     coordinates = {effect.full_name(p): chosen[p.name] for p in effect.parameters}
-    return replace(effect, parameters=parameters, absent=absent), coordinates
+    factors = effect.start_factors
+    if factors == START_FACTORS and chosen[effect.parameters[0].name] is INVERSE:
+        factors = LIMITS
+    return replace(effect, parameters=parameters, absent=absent, start_factors=factors), coordinates

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.coordinates import PLAIN, Coordinate, of_effect, of_parameter
+from lacuna.diagnosis.split import middle_conditions
 from lacuna.errors import DeclarationError, LacunaError, MisuseError
 from lacuna.records import Stretch
 from lacuna.system import (
@@ -68,12 +69,15 @@ class FunctionSystem(System):
     - `noise_time_s`: for records without repeats, the correlation time of the noise, by output or for all; or
       "estimated", from the residual of a first diagnosis. By default only the fast noise of a record counts as noise.
     - `curves`: `CorrectionSite`s at which a curve may be learnt if no effect explains the records; `theta.NAME(x)`.
-    - `experiments`: `CandidateExperiment`s that could be run next. `spare`: conditions that are never fitted.
+    - `experiments`: `CandidateExperiment`s that could be run next.
+    - `spare`: conditions that are never fitted, so that they judge; () for none. By default, of three or more repeated
+      conditions the one in the middle.
 
     Raises DeclarationError if names conflict.
     """
 
     nuisances_anew = True
+    tells_of_all = True
 
     def __init__(
         self,
@@ -90,7 +94,7 @@ class FunctionSystem(System):
         noise_time_s: Mapping[str, float] | float | str = 0.0,
         curves: Iterable[CorrectionSite] = (),
         experiments: Iterable[CandidateExperiment] = (),
-        spare: Iterable[Hashable] = (),
+        spare: Iterable[Hashable] | None = None,
     ):
         self.simulate, self.name = simulate, name or getattr(simulate, "__name__", "system")
         self.outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
@@ -134,7 +138,7 @@ class FunctionSystem(System):
         self._sites = {site.name: site for site in sites}
         if isinstance(spare, str):
             raise DeclarationError(f"spare is a collection of conditions: write [{spare!r}].")
-        self._experiments, self._spare = tuple(experiments), frozenset(spare)
+        self._experiments, self._spare = tuple(experiments), None if spare is None else frozenset(spare)
 
     def __repr__(self) -> str:
         return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"
@@ -145,7 +149,7 @@ class FunctionSystem(System):
         trials = tuple(trials)
         conditions, outputs = {t.condition for t in trials}, {name for t in trials for name in t.channels}
         experiments = {t.experiment for t in trials}
-        _check_known("spare", self._spare, conditions)
+        _check_known("spare", self._spare or (), conditions)
         for effect in self.effects.values():
             if not experiments.intersection(effect.experiments):
                 _check_known(f"experiments of effect {effect.name}", effect.experiments, experiments)
@@ -313,6 +317,8 @@ class FunctionSystem(System):
         return told.get(channel, 0.0) if isinstance(told, Mapping) else float(told)
 
     def spare(self) -> tuple[tuple[str, Hashable], ...]:
+        if self._spare is None:
+            return middle_conditions(self.trials)
         return tuple({(t.experiment, t.condition) for t in self.trials if t.condition in self._spare})
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.estimation.autocorrelation import correlation_samples
 from lacuna.estimation.fit import evaluate_on
+from lacuna.estimation.sampling import evenly, sample_period
 
 _LONG = 3.0  # samples: what remembers itself for less is white for all that matters
 
@@ -25,8 +26,8 @@ def left_over_s(diagnosis: Diagnosis) -> dict[str, float]:
             key, known = (trial.experiment, channel), residual[np.isfinite(residual)]
             if not known.size:
                 continue
-            traces[key].append(residual / max(float(np.std(known)), 1e-300))
-            periods[key].append(float(np.median(np.diff(trial.time_s))))
+            traces[key].append(evenly(trial.time_s, residual / max(float(np.std(known)), 1e-300)))
+            periods[key].append(sample_period(trial.time_s))
     for (experiment, channel), members in traces.items():
         if diagnosis.search.floor.channels[experiment, channel].repeats:
             continue

@@ -64,29 +64,40 @@ def diagnose(
                     system = system.with_noise_time(left_s)
                     found = answer(system)
                 found, raised = compared_at_misfit(system, found, answer)
+            found = _cautioned(found, system, raised, answer)
     finally:
         if isinstance(told, Progress):
             told.end()
-    return Verdict(system, _cautioned(found, system, raised))
+    return Verdict(system, found)
 
 
-def _cautioned(found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float]) -> Diagnosis:
+def _cautioned(
+    found: Diagnosis, system: System, raised: Mapping[tuple[str, str], float], answer: Callable[[System], Diagnosis]
+) -> Diagnosis:
     """With warnings about the residual: where it is far above the floor, and where only a repeat, or the user, can tell
-    whether it is noise."""
+    whether it is noise. What is advised is tried first: it is no advice where it would take a name away."""
     levels = found.search.floor.channels
-    said = [
-        f"No explanation comes near the floor of {channel} in {experiment} ({floor:.3g}): they were compared at a floor"
-        f" of {levels[experiment, channel].sd:.3g}, a fraction of the best one's residual."
+    doubted = [
+        f"No explanation comes near the floor of {channel} in {experiment} ({floor:.3g}), so doubt the floor before the"
+        f" model; a repeat would tell. They were compared at a floor of {levels[experiment, channel].sd:.3g}, a"
+        " fraction of the best one's residual."
         for (experiment, channel), floor in raised.items()
     ]
-    left_s = {} if raised else left_over_s(found)
-    said += [
-        f"The residual of {channel} has a correlation time of about {seconds:.2g} s. If it is noise, declare it:"
-        f' noise_time_s={{"{channel}": {seconds:.2g}}}, or "estimated".'
+    left_s = left_over_s(found) if found.left.matters and not raised else {}
+    advised = {
+        channel: float(f"{seconds:.2g}")
         for channel, seconds in left_s.items()
-        if seconds > 0.0 and found.left.matters and not any(system.noise_time_s(*k) for k in _keys(found, channel))
+        if seconds > 0.0 and not any(system.noise_time_s(*k) for k in _keys(found, channel))
+    }
+    if advised and isinstance(system, FunctionSystem) and found.effects:
+        named, still = ({e.name for e in one.effects} for one in (found, answer(system.with_noise_time(advised))))
+        advised = advised if named <= still else {}
+    said = [
+        f"The residual of {channel} has a correlation time of about {seconds:g} s. If it is noise, declare it:"
+        f' noise_time_s={{"{channel}": {seconds:g}}}, or "estimated".'
+        for channel, seconds in advised.items()
     ]
-    return replace(found, warnings=(*found.warnings, *said)) if said else found
+    return replace(found, warnings=(*doubted, *found.warnings, *said)) if said or doubted else found
 
 
 def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:

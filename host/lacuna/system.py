@@ -22,6 +22,7 @@ from lacuna.errors import DeclarationError
 Theta = Mapping[str, float]
 Channels = dict[str, np.ndarray]
 
+START_FACTORS = (0.1, 0.4, 1.2)  # of an effect's typical sizes: where fits begin
 LEARNT = "correction"  # what parameter names of learnt curves begin with, so that no effect may be called so
 
 
@@ -102,7 +103,7 @@ class Effect:
     source: str = ""
     sizes: int = 1
     absent: float = 0.0
-    start_factors: tuple[float, ...] = (0.1, 0.4, 1.2)
+    start_factors: tuple[float, ...] = START_FACTORS
     own: tuple[Parameter, ...] = ()
     frequency: str | None = None
     freed_at: tuple[str, ...] = ()
@@ -256,6 +257,7 @@ class System(Protocol):
 
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
     forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own
+    tells_of_all: bool = False  # whether parameters are told from a fit to every record, those too that judged
     nuisances_anew: bool = (
         False  # whether each run draws its own, so that repeats share nothing of them (`nuisances.py`)
     )

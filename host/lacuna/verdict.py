@@ -11,8 +11,7 @@ from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.named import Estimated
 from lacuna.diagnosis.record import as_record
 from lacuna.errors import MisuseError
-from lacuna.estimation.fit import Fit, evaluate_on, refit_on
-from lacuna.estimation.solve import one_thread
+from lacuna.estimation.fit import Fit
 from lacuna.estimation.structure import is_learnt
 from lacuna.function_system import FunctionSystem
 from lacuna.records import read, stretched
@@ -76,7 +75,7 @@ class Verdict:
     def __init__(self, system: System, diagnosis: Diagnosis):
         self.system, self.diagnosis = system, told(system, diagnosis)
         self.verdict, self.effects, self.warnings = diagnosis.verdict, self.diagnosis.effects, diagnosis.warnings
-        fitted = _to_all(diagnosis) if isinstance(system, FunctionSystem) else diagnosis.final
+        fitted = diagnosis.told if isinstance(system, FunctionSystem) else diagnosis.final
         self.model = Model(system, fitted)
         self.theta = self.model.theta
         self.nuisances = _nuisances(fitted)
@@ -112,16 +111,6 @@ class Verdict:
         from lacuna.report.overview import overview
 
         return overview(self.record, self.diagnosis)
-
-
-@one_thread
-def _to_all(diagnosis: Diagnosis) -> Fit:
-    """The completed model fitted to every record: those that judged it have done so, and know something, too."""
-    final, held_out = diagnosis.final, diagnosis.split.held_out
-    if not held_out:
-        return final
-    near = (final, evaluate_on(final, held_out))
-    return refit_on(final, (*final.problem.trials, *held_out), near=near)
 
 
 def _nuisances(fitted: Fit) -> dict[str, dict[str, float]]:

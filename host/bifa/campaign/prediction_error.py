@@ -17,7 +17,7 @@ _QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
 def prediction_errors(found: Diagnosis) -> list[dict[str, Any]]:
     """RMS error of each quantity on the trials that were fitted and on the held-out ones, by the base model and by the
     final one, and the floor: the RMS of what repeats differ by, over the root of 2. Plain types."""
-    known, held_out = found.final.problem.trials, found.split.held_out
+    known, held_out = found.final.problem.trials, found.split.not_fitted
     before, after = (fit.residuals() | evaluate_on(fit, held_out).residuals() for fit in (found.base, found.final))
     floors = repeat_differences(known, held_out, after)
     rows = []

@@ -16,7 +16,7 @@ _POINTS = 400  # of a trace, enough for a small figure
 def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any]]:
     """For each held-out condition the channel whose residual shrank most, in standard deviations of the noise, under
     the base model and the final one; thinned. Plain types. labels: what trials are called, by file."""
-    held_out = found.split.held_out
+    held_out = found.split.not_fitted
     before, after = evaluate_on(found.base, held_out), evaluate_on(found.final, held_out)
     shown, seen = [], set()
     for trial, old, new in zip(held_out, before.scaled_residuals(), _in_units_of(before, after), strict=True):

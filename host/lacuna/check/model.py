@@ -37,7 +37,7 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
     warnings = (
         [f"With its parameters at their initial values the model cannot predict {listed(failed)}."] if failed else []
     )
-    never_off = _never_off(system)
+    never_off = [*_never_off(system), *_unused(system, start, good, predictions)]
     idle = _idle(system, start, good, predictions)
     if idle and len(idle) == len(system.parameters):
         why = " ".join(never_off) or "Does the model use any of them?"
@@ -124,6 +124,38 @@ def _never_off(system: System) -> list[str]:
                     f" and {max(bounds):g} do not let it come near: is it absent elsewhere (a factor: absent=1)?"
                 )
     return found
+
+
+def _unused(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> list[str]:
+    """Effects that change no prediction, at none of the sizes that fits begin at."""
+    found = []
+    for name, effect in system.effects.items():
+        values = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
+        sizes = [
+            {
+                effect.full_name(p): min(max(effect.absent + by * (p.value - effect.absent), p.lower), p.upper)
+                for p in effect.parameters[: effect.sizes]
+            }
+            for by in (1.0, *effect.start_factors)
+        ]
+        seen = (t for t in trials if not effect.experiments or t.experiment in effect.experiments)
+        if not any(
+            differ(column, predictions[t.name][c], 0.0)
+            for t in seen
+            for size in sizes
+            for c, column in _sought(system, dict(start) | values | size, name, t).items()
+        ):
+            found.append(
+                f"Effect {name} changes no prediction, at none of its sizes that fits begin at: does the model use it,"
+                " and do these records reach it?"
+            )
+    return found
+
+
+def _sought(system: System, theta: Theta, effect: str, trial: Record) -> Channels:
+    """A prediction far from what is known: where there is none, that is a change."""
+    (found,) = system.predict_trials([theta | {p.name: p.value for p in system.nuisances(trial)}], (effect,), [trial])
+    return {name: found[name] for name in trial.channels}
 
 
 def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> list[str]:

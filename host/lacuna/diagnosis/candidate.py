@@ -10,7 +10,7 @@ import numpy as np
 
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.from_afar import SKETCH, begin, follow, promising
-from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import at_full_size, rms
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.diagnosis.split import Split
@@ -40,6 +40,12 @@ class Candidate:
 
     fitted: Fit
     checked: Fit
+    policy: Policy
+
+    @property
+    def judged(self) -> tuple[Fit, ...]:
+        """Fits on the trials that they were not fitted to."""
+        return (self.checked,)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -80,7 +86,7 @@ class Candidate:
         return (
             self.fitted.cost
             + self.checked.cost
-            + implausibility(self.fitted)
+            + implausibility(self.fitted, self.policy)
             + 0.5 * extra * np.log(max(self.pieces, 2.0))
             + 0.5 * own * np.log(max(self.pieces / len(self.trials), 2.0))
         )
@@ -90,16 +96,21 @@ class Candidate:
         """Of each trial that it is judged on, by name, minus the log-likelihood of its residuals."""
         return costs_by_trial([self.fitted, self.checked])
 
-    @property
+    @cached_property
     def unseen_by_trial(self) -> dict[str, float]:
-        """The same of trials that it was not fitted to, at least."""
-        return self.by_trial
+        """The same of those that it was not fitted to."""
+        return costs_by_trial(self.judged)
 
     @cached_property
     def errors(self) -> dict[str, float]:
         """Of each trial that it was not fitted to, by name, the RMS residual, large ones at their full size."""
-        trials = self.checked.problem.trials
-        return {t.name: rms([z]) for t, z in zip(trials, self.checked.scaled_residuals(), strict=True)}
+        every = (pair for fit in self.judged for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
+        return {trial.name: rms([z]) for trial, z in every}
+
+    @property
+    def left(self) -> float:
+        """Of the mean square on the trials that it was not fitted to, what noise at the floor would not leave."""
+        return max(self.checked_error[1] ** 2 - 1.0, 0.0)
 
     @property
     def excess(self) -> float:
@@ -116,12 +127,12 @@ def costs_by_trial(fits: Sequence[Fit]) -> dict[str, float]:
     }
 
 
-def implausibility(fitted: Fit) -> float:
+def implausibility(fitted: Fit, policy: Policy) -> float:
     """What it costs an explanation to need parameters that no sane system has."""
     total = 0.0
     for parameter in fitted.structure.parameters:
         if parameter.plausible is not None:
-            total += POLICY.implausible * _outside(parameter, fitted.theta[parameter.name]) ** 2
+            total += policy.implausible * _outside(parameter, fitted.theta[parameter.name]) ** 2
     return total
 
 
@@ -131,8 +142,8 @@ def _outside(parameter: Parameter, value: float) -> float:
     return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
 
 
-def judge(fitted: Fit, split: Split, near: Fit | None = None) -> Candidate:
-    return Candidate(fitted, evaluate_on(fitted, split.judging, near=near))
+def judge(fitted: Fit, split: Split, policy: Policy, near: Fit | None = None) -> Candidate:
+    return Candidate(fitted, evaluate_on(fitted, split.judging, near=near), policy)
 
 
 def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:
@@ -284,7 +295,7 @@ def finished_afresh(candidate: Candidate, split: Split, seed: int, crew: Crew) -
         return candidate
     found = renewed(problem, solve(problem, found.point, **_REFIT), **_REFIT)
     best = best_of(problem, [finished.solution, found])
-    return min(candidate, judge(best, split, near=candidate.checked), key=lambda c: c.cost)
+    return min(candidate, judge(best, split, candidate.policy, near=candidate.checked), key=lambda c: c.cost)
 
 
 def _sizes(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:

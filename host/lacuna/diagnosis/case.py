@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any
 
@@ -91,7 +91,7 @@ class Case:
         return candidate
 
     def judge(self, fitted: Fit) -> Candidate:
-        return judge(fitted, self.split)
+        return judge(fitted, self.split, self.policy)
 
     @_once
     def on_known(self, candidate: Candidate) -> Fit:
@@ -102,8 +102,12 @@ class Case:
     @_once
     def settled(self, candidate: Candidate) -> Fit:
         """The same at its very optimum, with derivatives that say how well its parameters are known: what these are
-        told from."""
-        return settle(released(self.on_known(candidate)))
+        told from. Where the system wants it so, of every trial: those that judged it have done so."""
+        fitted, others = self.on_known(candidate), self.split.not_fitted
+        if self.system.tells_of_all and others:
+            near = (fitted, evaluate_on(fitted, others))
+            fitted = refit_on(fitted, (*fitted.problem.trials, *others), near=near, relative=_FINE)
+        return settle(released(fitted))
 
     @_once
     def intervals(self, candidate: Candidate) -> dict[str, tuple[float, float]]:
@@ -156,11 +160,9 @@ class Case:
             if name not in candidate.effects
             and (effect.apart or (effect.own and helps_at_once(parent, name, self.policy.gain)))
         ]
-        least = self.policy.least_gain(1, candidate.pieces)
         for fitted, profile in sketches(profiles(parent, able, self.split, parent.problem.floor, crew), crew):
-            other = judge(fitted, self.split, near=candidate.checked)
-            both = (candidate.fitted, other.fitted), (candidate.checked, other.checked)
-            if candidate.cost - other.cost > least and self._exceeds(*both):
+            other = judge(fitted, self.split, self.policy, near=candidate.checked)
+            if candidate.cost - other.cost > self.policy.gain and self.exceeds(candidate, other):
                 return profile.effect
         return None
 
@@ -188,16 +190,22 @@ class Case:
         """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by
         their friction differ so much from repeat to repeat that what these share may pass for chance."""
         mine, others = self.converged(candidate), self.converged(better)
-        both = [(mine, others)]
+        both = [([mine], [others])]
         if unseen := self.split.unseen:
-            both.append((evaluate_on(mine, unseen), evaluate_on(others, unseen)))
+            both.append(([evaluate_on(mine, unseen)], [evaluate_on(others, unseen)]))
         return self._exceeds(*both)
 
-    def _exceeds(self, *both: tuple[Fit, Fit]) -> bool:
-        """Whether the first fit of any pair leaves by more than is relevant more than the second; or, of every pair,
+    def exceeds(self, candidate: Candidate, better: Candidate) -> bool:
+        """The same of the explanations as they are, on the trials that they are judged on."""
+        return self._exceeds(([candidate.fitted], [better.fitted]), (candidate.judged, better.judged))
+
+    def _exceeds(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
+        """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
         would have left so if a run's factors had to be foreseen, which a few runs of one pair may be by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
-        ahead = (excess_over(foreseen(mine), foreseen(other), self.system.accuracy) for mine, other in both)
+        ahead = (
+            excess_over(*([foreseen(fit) for fit in fits] for fits in pair), self.system.accuracy) for pair in both
+        )
         return max(known) > self.policy.relevance or min(ahead) > self.policy.relevance
 
     @_once

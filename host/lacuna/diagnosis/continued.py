@@ -20,7 +20,7 @@ def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split)
     structure = Structure(parent.structure.system, kept, parent.structure.sites)
     start = [starting_point(parent, structure)]
     fitted = fit(structure, split.fit, parent.problem.floor, starts=start, relative=_CONTINUED)
-    return judge(fitted, split, near=candidate.checked)
+    return judge(fitted, split, candidate.policy, near=candidate.checked)
 
 
 def led_back(base: Candidate, larger: Sequence[Candidate], split: Split) -> Candidate:

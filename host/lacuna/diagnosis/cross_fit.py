@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from lacuna.diagnosis.candidate import Candidate, costs_by_trial
+from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.residual_error import failed, rms
@@ -32,6 +32,10 @@ class CrossFitted(Candidate):
     of: Candidate
 
     @property
+    def judged(self) -> tuple[Fit, ...]:
+        return self.left_out
+
+    @property
     def checked_cost(self) -> float:
         return sum(fit.cost - fit.problem.structure_prior_cost(fit.solution.point) for fit in self.left_out)
 
@@ -39,15 +43,6 @@ class CrossFitted(Candidate):
     def checked_error(self) -> tuple[int, float]:
         lost = sum(len(failed(fit.problem.trials, fit.scaled_residuals())) for fit in self.left_out)
         return lost, rms(z for fit in self.left_out for z in fit.scaled_residuals())
-
-    @cached_property
-    def unseen_by_trial(self) -> dict[str, float]:
-        return costs_by_trial(self.left_out)
-
-    @cached_property
-    def errors(self) -> dict[str, float]:
-        every = (pair for fit in self.left_out for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
-        return {trial.name: rms([z]) for trial, z in every}
 
 
 def is_due(case: Case) -> bool:
@@ -70,7 +65,8 @@ def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
     for k, (candidate, fit) in enumerate(zip(candidates, known, strict=True)):
         mine = left_out[k * len(folds) : (k + 1) * len(folds)]
         unseen = evaluate_on(fit, case.split.unseen)
-        judged[candidate] = CrossFitted(fit, unseen, tuple([*mine, unseen] if case.split.unseen else mine), candidate)
+        left = tuple([*mine, unseen] if case.split.unseen else mine)
+        judged[candidate] = CrossFitted(fit, unseen, case.policy, left, candidate)
     return replace(
         found,
         base=judged[found.base],

@@ -1,28 +1,37 @@
-"""From fitted explanations to a choice: which effects, with what probability, and which the data cannot tell apart."""
+"""From fitted explanations to a choice: the smallest set of effects that predicts no worse than the best of all tried.
+
+A set is out if another one predicts better beyond doubt, by what matters, and by more than the wrong form of the
+effects that it has would leave. Of those that stay the smallest is chosen (the idea of a model confidence set; Hansen,
+Lunde and Nason 2011), and what may stand in the place of an effect of it is said.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.search import Search
-from lacuna.diagnosis.split import Split
+from lacuna.system import groups_of_repeats
 
 _DRAWS = 1000  # of the bootstrap over conditions
 _COMPARED = 16  # explanations, the best first
+_FEWEST = 3  # conditions that tell what differs between conditions; of fewer the trials are drawn
+
+Judgement = Callable[[Candidate, Candidate], bool]
 
 
 @dataclass(frozen=True)
 class Choice:
     """The chosen explanation, the base if nothing is worth adding.
 
-    `freed`: the same effects in a form of their own, if that explains more; `probability` of each of the effects;
-    `confusable_with`: by effect, those that it could be exchanged for; `weights`: probability of every explanation
-    compared, by its effects.
+    `freed`: the same effects in a form of their own, if that explains more; `confusable_with`: by effect, those that it
+    could be exchanged for; `probability`: of each effect or what it could be exchanged for, against every set that is
+    no larger; `weights`: of every explanation compared, by its effects.
     """
 
     candidate: Candidate
@@ -37,66 +46,110 @@ class Choice:
         return self.freed or self.candidate
 
 
-def choose(
-    search: Search,
-    split: Split,
-    policy: Policy,
-    suffices: Callable[[Candidate], bool],
-    outdone: Callable[[Candidate, Candidate], bool] = lambda held, better: False,
-) -> Choice:
-    """The set that explains best, no larger than the evidence carries. Nothing is added to one that `suffices`, but
-    what it is `outdone` by. Another effect must explain more than the chosen ones do in a form of their own."""
-    dispersion = dispersion_of(search.tried)
-    chosen = held = search.base
-    while True:
-        larger = [
-            c
-            for c in search.tried
-            if len(c.effects) > len(chosen.effects)
-            and _beyond_doubt(held, c, dispersion, policy)
-            and (_closes_much(held, c, search.base, policy) or suffices(c))
-            and (not suffices(held) or outdone(held, c))
-        ]
-        if not larger:
-            break
-        size = min(len(c.effects) for c in larger)
-        chosen = min((c for c in larger if len(c.effects) == size), key=lambda c: c.cost)
-        held = search.freed_form(chosen) or chosen
-    return weigh(search, _supported(chosen, search, split, dispersion, policy), policy)
+def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
+    """The smallest set that predicts no worse than the best one. What does so surely, if by little, has to be a part of
+    what explains: of which every effect, or what may stand in its place, has most of the weight behind it.
+    `matters(one, other)`: whether what the other predicts better is more than the accuracy that counts."""
+    against = Comparison(search, policy, matters)
+    best = min((*search.tried, *search.freed), key=lambda c: c.cost)
+    held = [c for c in search.tried if not against.outdone(c, best)]
+    held.sort(key=lambda c: (len(c.effects), against.form(c).cost))
+    weights = _weights(_compared(search, best), against.dispersion)
+    chosen = next((c for c in held if not against.surely(c, best) or _supported(c, weights, policy)), held[0])
+    while (smaller := _without_one(chosen, search, against)) is not None:
+        chosen = smaller
+    return weigh(search, chosen, policy)
 
 
-def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
-    """`chosen` with the probability of each of its effects, against everything that was tried."""
-    weights = _weights(search, chosen, dispersion_of(search.tried))
-    probability = {e: sum(w for effects, w in weights.items() if e in effects) for e in chosen.effects}
-    confusable = {e: _exchanges(e, chosen.effects, weights, policy) for e in chosen.effects}
-    return Choice(chosen, search.freed_form(chosen), probability, confusable, weights)
+def _supported(candidate: Candidate, weights: dict[tuple[str, ...], float], policy: Policy) -> bool:
+    if not candidate.effects:
+        return True
+    if candidate.effects not in weights:
+        return False
+    rivals = _rivals(candidate.effects, weights, policy)
+    return min(_behind(e, weights, rivals) for e in candidate.effects) >= policy.supported
 
 
-def worth_adding(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:
-    """Whether the larger explanation is better beyond the doubt of noise and remaining misfit, and closes a share of
-    what was left for every effect more."""
-    return _beyond_doubt(smaller, larger, dispersion, policy) and _closes_its_share(smaller, larger, policy)
+def _behind(effect: str, weights: dict[tuple[str, ...], float], rivals: Sequence[tuple[str, ...]]) -> float:
+    """The weight of all sets with this effect, or with others in its place."""
+    return sum(w for effects, w in weights.items() if effect in effects or effects in rivals)
 
 
-def _beyond_doubt(smaller: Candidate, larger: Candidate, dispersion: float, policy: Policy) -> bool:
-    """Better by more than noise and remaining misfit make of nothing, also on trials that it was not fitted to."""
-    gain = (smaller.cost - larger.cost) / dispersion
-    unseen = (smaller.checked_cost - larger.checked_cost) / dispersion
-    least = policy.least_gain(len(larger.effects) - len(smaller.effects), smaller.pieces)
-    return gain > least and unseen > policy.unseen_gain * least and larger.checked_error < smaller.checked_error
+def _without_one(chosen: Candidate, search: Search, against: Comparison) -> Candidate | None:
+    """`chosen` less an effect without which it predicts no worse."""
+    for effect in chosen.effects:
+        smaller = search.with_effects([e for e in chosen.effects if e != effect])
+        if smaller is not None and not against.outdone(smaller, against.form(chosen)):
+            return smaller
+    return None
 
 
-def _closes_its_share(smaller: Candidate, larger: Candidate, policy: Policy) -> bool:
-    """Whether each effect more closes a share of what the smaller explanation leaves."""
-    extra = len(larger.effects) - len(smaller.effects)
-    share = (smaller.cost - larger.cost) / smaller.excess if smaller.excess > 0 else 1.0
-    return share > min(extra * policy.share, 0.9)
+@dataclass(frozen=True)
+class Comparison:
+    """Of two explanations, whether one predicts worse than the other."""
+
+    search: Search
+    policy: Policy
+    matters: Judgement
+
+    def outdone(self, candidate: Candidate, better: Candidate) -> bool:
+        """Whether an explanation predicts worse, in whichever form of its own."""
+        forms = {candidate, self.form(candidate)}
+        return better not in forms and all(self.worse(form, better) for form in forms)
+
+    def form(self, candidate: Candidate) -> Candidate:
+        return self.search.freed_form(candidate) or candidate
+
+    def worse(self, one: Candidate, other: Candidate) -> bool:
+        """Whether `one` predicts worse than `other`: beyond doubt, by what matters, and by more than would be left by
+        the wrong form of an effect that is there."""
+        return self.surely(one, other) and self._by_much(one, other) and self.matters(one, other)
+
+    def surely(self, one: Candidate, other: Candidate) -> bool:
+        """Better by more than noise and remaining misfit make of nothing, also on trials that it was not fitted to, and
+        whichever conditions had been measured."""
+        least = self.policy.gain * _extra(one, other)
+        gain = (one.cost - other.cost) / self.dispersion
+        unseen = (one.checked_cost - other.checked_cost) / self.dispersion
+        return (
+            gain > least
+            and unseen > self.policy.unseen_gain * least
+            and other.checked_error < one.checked_error
+            and _by_chance(one, other) < self.policy.doubt
+        )
+
+    def _by_much(self, one: Candidate, other: Candidate) -> bool:
+        """Whether each effect more takes its share of what is left away, and a share of the gap, or half of all that is
+        left. Mean squares on trials not fitted, large residuals at their full size."""
+        squares = _mean_squares(one, other, self.search.base)
+        if squares is None:  # one of them cannot predict what the other can
+            return True
+        mine, others, base = squares
+        extra, left, gap, closed = _extra(one, other), max(mine - 1.0, 0.0), base - 1.0, mine - others
+        if gap <= self.policy.relevance:  # nuisances took up what is missing
+            return True
+        share = min(extra * self.policy.share, 0.9) * left
+        return closed > share and (closed > extra * self.policy.share_of_gap * gap or closed > (1 - 0.5**extra) * left)
+
+    @cached_property
+    def dispersion(self) -> float:
+        return dispersion_of(self.search.tried)
 
 
-def _closes_much(smaller: Candidate, larger: Candidate, base: Candidate, policy: Policy) -> bool:
-    """The same, and each effect more closes a share of the base model's gap, too."""
-    return _closes_its_share(smaller, larger, policy) and _share(smaller, larger, base) > policy.share_of_gap
+def _extra(one: Candidate, other: Candidate) -> int:
+    return max(len(other.effects) - len(one.effects), 1)
+
+
+def _mean_squares(*candidates: Candidate) -> list[float] | None:
+    """Of each on the trials that none of them was fitted to and all can predict, conditions counting alike; None if the
+    second of them can predict more of these than the first."""
+    lost = [c.checked_error[0] for c in candidates[:2]]
+    if lost[1] < lost[0]:
+        return None
+    names = {n for n in candidates[0].errors if all(np.isfinite(c.errors[n]) for c in candidates)}
+    conditions = groups_of_repeats([t for t in candidates[0].trials if t.name in names])
+    each = [[np.mean([c.errors[t.name] ** 2 for t in one]) for one in conditions] for c in candidates]
+    return [float(np.mean(of_one)) for of_one in each] if names else None
 
 
 def dispersion_of(tried: Sequence[Candidate]) -> float:
@@ -106,71 +159,78 @@ def dispersion_of(tried: Sequence[Candidate]) -> float:
     return max(1.0, best.cost / (0.5 * best.pieces))
 
 
-def _share(smaller: Candidate, larger: Candidate, base: Candidate) -> float:
-    """Of the base model's gap, what an effect more closes."""
-    extra = len(larger.effects) - len(smaller.effects)
-    return (smaller.cost - larger.cost) / max(extra * base.excess, 1e-300)
+def _by_chance(one: Candidate, other: Candidate) -> float:
+    """The probability that `one` predicts as well as `other` where the conditions are drawn anew (the Bayesian
+    bootstrap, Rubin 1981): what a model explains differs from condition to condition."""
+    costs = _by_condition([one, other], "unseen_by_trial", mean=True)
+    ahead = _drawn(costs.shape[1]) @ (costs[0] - costs[1])
+    return float(np.mean(ahead <= 0.0))
 
 
-def _supported(chosen: Candidate, search: Search, split: Split, dispersion: float, policy: Policy) -> Candidate:
-    """`chosen`, less the effects without which conditions that were never fitted are predicted no worse."""
-    unseen = split.unseen or split.select
-    for effect in chosen.effects:
-        smaller = search.with_effects([e for e in chosen.effects if e != effect])
-        if smaller is not None and not _predicts_better(chosen, smaller, unseen, dispersion, policy):
-            return _supported(smaller, search, split, dispersion, policy)
-    return chosen
+def _drawn(conditions: int) -> np.ndarray:
+    """Weights of the conditions, a row each draw; 1 on average."""
+    return np.random.default_rng(0).dirichlet(np.ones(conditions), _DRAWS) * conditions
 
 
-def _predicts_better(chosen: Candidate, smaller: Candidate, unseen, dispersion: float, policy: Policy) -> bool:
-    """By likelihood, or by a share of what is left, large residuals at their full size: these are few, and count for
-    little where they are compressed."""
-    gain = (_cost_on(smaller, unseen) - _cost_on(chosen, unseen)) / dispersion
-    before, after = _square_on(smaller, unseen), _square_on(chosen, unseen)
-    return gain > policy.unseen_gain * policy.gain or before - after > policy.share * max(
-        before - 1.0, policy.relevance
-    )
+def _by_condition(candidates: Sequence[Candidate], which: str, *, mean: bool = False) -> np.ndarray:
+    """Costs of each candidate's trials by condition, their sums or means, a row each; by trial where there are few
+    conditions."""
+    costs = [getattr(c, which) for c in candidates]
+    trials = [t for t in candidates[0].trials if t.name in costs[0]]
+    keys = [(t.experiment, t.condition) for t in trials]
+    if len(set(keys)) < _FEWEST:
+        keys = [t.name for t in trials]
+    places = {key: k for k, key in enumerate(dict.fromkeys(keys))}
+    found = np.zeros((len(candidates), len(places)))
+    for trial, key in zip(trials, keys, strict=True):
+        found[:, places[key]] += [mine[trial.name] for mine in costs]
+    return found / np.bincount([places[key] for key in keys]) if mean else found
 
 
-def _cost_on(candidate: Candidate, trials) -> float:
-    return sum(candidate.unseen_by_trial[trial.name] for trial in trials)
+def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
+    """`chosen` with the weight of each of its effects, or of what it could be exchanged for."""
+    dispersion = dispersion_of(search.tried)
+    compared = _compared(search, chosen)
+    weights = _weights(compared, dispersion)
+    no_larger = _weights([c for c in compared if len(c.effects) <= len(chosen.effects)], dispersion)
+    rivals = _rivals(chosen.effects, no_larger, policy)
+    probability = {e: _behind(e, no_larger, rivals) for e in chosen.effects}
+    confusable = {
+        e: tuple(dict.fromkeys(f for effects in rivals if e not in effects for f in effects if f not in chosen.effects))
+        for e in chosen.effects
+    }
+    return Choice(chosen, search.freed_form(chosen), probability, confusable, weights)
 
 
-def _square_on(candidate: Candidate, trials) -> float:
-    return float(np.mean([candidate.errors[trial.name] ** 2 for trial in trials]))
+def _compared(search: Search, chosen: Candidate) -> list[Candidate]:
+    """`chosen`, the base model, and the best of everything else that was tried."""
+    # what was tried of the chosen effects may have ended in another minimum than they have been found in since
+    others = [c for c in search.tried if c.effects and frozenset(c.effects) != frozenset(chosen.effects)]
+    best = sorted(others, key=lambda c: c.cost)[:_COMPARED]
+    return [chosen, *([search.base] if chosen.effects else []), *best]
 
 
-def _weights(search: Search, chosen: Candidate, dispersion: float) -> dict[tuple[str, ...], float]:
-    """Probability of each explanation, sets of every size compared, base included.
+def _weights(compared: Sequence[Candidate], dispersion: float) -> dict[tuple[str, ...], float]:
+    """Weight of each explanation among those compared (pseudo-BMA+; Yao and others 2018).
 
     A likelihood alone would be sure by e^1000 of a model that is wrong by something: what a wrong model explains well
-    differs from condition to condition. So the conditions are drawn anew (the Bayesian bootstrap, Rubin 1981), and an
-    explanation's probability is the mean, over the draws, of its share of the likelihood in units of the dispersion.
+    differs from condition to condition. So the conditions are drawn anew, and an explanation's weight is the mean, over
+    the draws, of its share of the likelihood in units of the dispersion.
     """
-    # what was tried of the chosen effects may have ended in another minimum than they have been found in since
-    others = [c for c in search.tried if frozenset(c.effects) != frozenset(chosen.effects)]
-    best = [c for c in sorted(others, key=lambda c: c.cost) if c.effects][:_COMPARED]
-    compared = [chosen, *([search.base] if chosen.effects else []), *best]
-    trials = chosen.trials
-    keys = list(dict.fromkeys((t.experiment, t.condition) for t in trials))
-    costs = np.zeros((len(compared), len(keys)))
-    for trial in trials:
-        costs[:, keys.index((trial.experiment, trial.condition))] += [c.by_trial[trial.name] for c in compared]
+    costs = _by_condition(compared, "by_trial")
     penalty = np.array([c.cost for c in compared]) - costs.sum(axis=1)
-    draw = np.random.default_rng(0)
-    drawn = draw.dirichlet(np.ones(len(keys)), _DRAWS) * len(keys) @ costs.T + penalty
+    drawn = _drawn(costs.shape[1]) @ costs.T + penalty
     likelihood = np.exp(-(drawn - drawn.min(axis=1, keepdims=True)) / dispersion)
     mean = (likelihood / likelihood.sum(axis=1, keepdims=True)).mean(axis=0)
     return {c.effects: float(w) for c, w in zip(compared, mean, strict=True)}
 
 
-def _exchanges(effect: str, chosen: tuple[str, ...], weights, policy: Policy) -> tuple[str, ...]:
-    """What `effect` could be exchanged for, the most probable first."""
-    others = frozenset(chosen) - {effect}
+def _rivals(chosen: tuple[str, ...], weights: dict[tuple[str, ...], float], policy: Policy) -> list[tuple[str, ...]]:
+    """Sets of as many effects that are not ruled out beside the chosen one, the most probable first."""
     mine = weights[chosen]
     found = [
-        (weight, next(iter(frozenset(effects) - others)))
+        (weight, effects)
         for effects, weight in weights.items()
-        if len(effects) == len(chosen) and others < frozenset(effects) and effect not in effects
+        if len(effects) == len(chosen) > 0 and effects != chosen and weight > policy.confusable * (weight + mine)
     ]
-    return tuple(name for weight, name in sorted(found, reverse=True) if weight > policy.confusable * (weight + mine))
+    return [effects for _, effects in sorted(found, reverse=True)]

@@ -7,17 +7,18 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from lacuna.check import check
-from lacuna.diagnosis.candidate import finished_afresh
+from lacuna.diagnosis.candidate import Candidate, finished_afresh
 from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.cross_fit import cross_fitted, is_due
-from lacuna.diagnosis.decide import Choice, choose, dispersion_of
+from lacuna.diagnosis.decide import Choice, choose, dispersion_of, weigh
 from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing, not_foreseen
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.explain_nuisances import explain_nuisances
 from lacuna.diagnosis.learn import holds, learn_correction
-from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, nearest
+from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, lost_without, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import POLICY, Policy
@@ -30,7 +31,7 @@ from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Finished
 from lacuna.diagnosis.warn import warnings_of
 from lacuna.errors import TooLittleDataError
-from lacuna.estimation.fit import Fit
+from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
 
@@ -58,6 +59,7 @@ class Diagnosis:
     (something matters and no mechanism is supported). `base`, `explained` and `final` are fitted to all known trials:
     the base model, that with the named effects, and that with the curves `learnt` on top where they hold.
     `base_parameters`: of the base model in company of the named effects; none where the data remain unexplained.
+    `told`: the fit that parameters, their intervals and warnings come from, fitted to every trial of a plain function.
     `signature`: where what the base model lacks lives; `left`: what the named effects leave.
     """
 
@@ -67,6 +69,7 @@ class Diagnosis:
     base: Fit
     explained: Fit
     final: Fit
+    told: Fit
     before: Error
     after: Error
     floor: Floor
@@ -128,6 +131,9 @@ def diagnose(
             crew.say("stopped: what nuisances follow is not asked (Ctrl-C again gives up)")
             stopped, say = True, lambda _: None
     judged = _judged(case, found, choice)
+    while (smaller := _without_harm(case, found, choice, judged)) is not None:
+        choice = smaller
+        judged = _judged(case, found, choice)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
         try:
@@ -138,22 +144,27 @@ def diagnose(
     say("estimating how well the parameters are known")
     shown = choice.explanation if judged.verdict == "identified" else found.base
     unforeseen = followed_by_nothing(case.followed(shown))
-    said = (*([STOPPED] if stopped else []), *cautions, *unforeseen, *warnings_of(final, split))
-    return _reported(case, found, choice, judged, final, said, time.monotonic() - began)
+    told = _told(case, judged, shown, final)
+    said = (*([STOPPED] if stopped else []), *cautions, *unforeseen, *warnings_of(told, split))
+    return _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
+
+
+def _told(case: Case, judged: _Judged, shown: Candidate, final: Fit) -> Fit:
+    """The fit that a verdict tells parameters from: of the explanation or, with curves or where nothing is explained,
+    of the final model."""
+    if judged.verdict != "unexplained" and not final.structure.sites:
+        return case.settled(shown)
+    others = case.split.not_fitted if case.system.tells_of_all else ()
+    if not others:
+        return final
+    return refit_on(final, (*final.problem.trials, *others), near=(final, evaluate_on(final, others)))
 
 
 def _chosen(case: Case, found: Search, crew: Crew | None) -> Choice:
     """What explains best; without repeats, and with a crew, by what predicts every known record."""
     if crew is None or len(found.tried) == 1 or not is_due(case):
-        return choose(found, case.split, case.policy, case.suffices, case.outdone)
-    judged = cross_fitted(case, found, crew)
-    choice = choose(
-        judged,
-        replace(case.split, select=case.split.known),
-        case.policy,
-        lambda one: case.suffices(one.of),
-        lambda held, better: case.outdone(held.of, better.of),
-    )
+        return choose(found, case.policy, case.exceeds)
+    choice = choose(cross_fitted(case, found, crew), case.policy, case.exceeds)
     return replace(choice, candidate=choice.candidate.of, freed=choice.freed and choice.freed.of)
 
 
@@ -161,7 +172,8 @@ def _chosen(case: Case, found: Search, crew: Crew | None) -> Choice:
 class _Judged:
     """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), and what each
     leaves; `besides`: where the base model leaves what matters and repeats do not surely share, a sentence that says
-    so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict."""
+    so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict. `tested`: the share of the gap that
+    these close on the final trials; None where there is no gap, or no such trial."""
 
     verdict: str
     base: Fit
@@ -171,24 +183,48 @@ class _Judged:
     besides: str
     floor: Floor
     drifts: tuple[Drift, ...]
+    tested: float | None
 
 
 def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
     besides = "" if remainder.matters else _besides(case, choice, found)
-    verdict = _verdict(case, choice, found, remainder.matters, besides, drifts)
+    floor = floor_of(chosen, case.split)
+    tested = _tested(case, base, chosen, floor) if remainder.matters else None
+    verdict = _verdict(case, choice, found, remainder.matters, besides, drifts, tested)
     explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
-    return _Judged(verdict, base, explained, remainder, left, besides, floor_of(chosen, case.split), drifts)
+    return _Judged(verdict, base, explained, remainder, left, besides, floor, drifts, tested)
+
+
+def _tested(case: Case, base: Fit, chosen: Fit, floor: Floor) -> float | None:
+    """The share of the gap that is closed on the final trials, which chose nothing."""
+    before, after = (error_of(fitted, case.split).held_out for fitted in (base, chosen))
+    least = floor.held_out**2 * (1.0 + case.policy.relevance)
+    return share_of_gap(before, after, floor.held_out) if before**2 > least or after**2 > least else None
+
+
+def _without_harm(case: Case, found: Search, choice: Choice, judged: _Judged) -> Choice | None:
+    """`choice` less the effect without which the final trials are predicted better, if it is one of several; these
+    inform no choice, but what they contradict is not named."""
+    if judged.tested is None or len(choice.candidate.effects) < 2:
+        return None
+    lost = lost_without(case, found, choice)
+    worst = min(lost, key=lost.get)
+    if lost[worst] >= -case.policy.relevance * error_of(judged.explained, case.split).held_out ** 2:
+        return None
+    rest = [e for e in choice.candidate.effects if e != worst]
+    smaller = found.with_effects(rest) or refitted_without(choice.candidate, rest, case.split)
+    return weigh(found, smaller, case.policy)
 
 
 def _besides(case: Case, choice: Choice, found: Search) -> str:
     if hidden := case.hidden(found.base):
         return f"What repeats differ by, or what the nuisances of each take up, is no noise: {hidden} would explain it."
-    if _supported(case, choice) and case.outdone(found.base, choice.explanation):
+    if choice.candidate.effects and case.outdone(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
         return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
-    if _supported(case, choice) and (taken_up := _taken_up(case, choice, found)):
+    if choice.candidate.effects and (taken_up := _taken_up(case, choice, found)):
         return f"{follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
     return ""
 
@@ -204,19 +240,21 @@ def _doubts(case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, .
     if judged.verdict == "none":
         return not_foreseen(judged.base, case.split, errors[0], judged.floor, case.policy)
     if not effects:
-        return but_too_little(choice) if _supported(case, choice) else []
-    gap = (*errors, judged.floor) if judged.remainder.matters else None
-    return doubts(choice, case.split, effects, gap)
-
-
-def _supported(case: Case, choice: Choice) -> bool:
-    return bool(choice.probability) and min(choice.probability.values()) >= case.policy.supported
+        return but_too_little(choice, case.split, judged.tested) if choice.candidate.effects else []
+    return doubts(choice, case.split, judged.tested, case.policy)
 
 
 def _reported(
-    case: Case, found: Search, choice: Choice, judged: _Judged, final: Fit, said: tuple[str, ...], seconds: float
+    case: Case,
+    found: Search,
+    choice: Choice,
+    judged: _Judged,
+    fits: tuple[Fit, Fit],
+    said: tuple[str, ...],
+    seconds: float,
 ) -> Diagnosis:
-    split, identified = case.split, judged.verdict == "identified"
+    """`fits`: the final one, and the one that is told."""
+    (final, told), split, identified = fits, case.split, judged.verdict == "identified"
     before = error_of(judged.base, split)
     explained = error_of(judged.explained, split) if identified else before
     closed = share_of_gap(before.held_out, explained.held_out, judged.floor.held_out) if identified else 0.0
@@ -229,6 +267,7 @@ def _reported(
         base=judged.base,
         explained=judged.explained,
         final=final,
+        told=told,
         before=before,
         after=error_of(final, split),
         floor=judged.floor,
@@ -237,8 +276,9 @@ def _reported(
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
+            *(one for one in said if one == STOPPED),
             *_doubts(case, choice, judged, effects, (before, explained)),
-            *said,
+            *(one for one in said if one != STOPPED),
             *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
         ),
         learnt=tuple((case.system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
@@ -270,14 +310,22 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
         return finished.search(first, case.split), True
 
 
-def _verdict(case: Case, choice: Choice, found: Search, matters: bool, besides: str, drifts: tuple[Drift, ...]) -> str:
+def _verdict(
+    case: Case,
+    choice: Choice,
+    found: Search,
+    matters: bool,
+    besides: str,
+    drifts: tuple[Drift, ...],
+    tested: float | None,
+) -> str:
     if not matters and not besides:
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
-    if not _supported(case, choice):
+    if not choice.candidate.effects:
         return "unexplained"
     # of what passes for noise, or nuisances take up, there is no gap to close half of
     hidden = besides or _taken_up(case, choice, found)
-    explains = case.closed(choice.explanation, found.base) >= case.policy.half
+    explains = case.closed(choice.explanation, found.base) >= case.policy.half and (tested is None or tested >= 0.0)
     return "identified" if explains or (hidden and case.suffices(choice.explanation)) else "unexplained"
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from lacuna.check.numbers import listed
 from lacuna.diagnosis.decide import Choice
-from lacuna.diagnosis.named import Named
 from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import Error, Floor
@@ -14,34 +13,43 @@ from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 
-_HARMFUL = 0.01  # of the gap: a share below zero by less is rounding
 _SURELY = 4.0  # standard deviations
 
 
 def not_foreseen(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
     """Of a verdict that nothing is missing: records that were not fitted, and are predicted worse than that beyond
     chance."""
-    pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.held_out)
-    above = error.held_out**2 - floor.held_out**2 if split.held_out else 0.0
+    pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.final)
+    above = error.held_out**2 - floor.held_out**2 if split.final else 0.0
     if above <= policy.relevance * floor.held_out**2 or above < _SURELY * floor.held_out**2 * (2.0 / pieces) ** 0.5:
         return []
     return [
-        f"Records that were not fitted ({listed([trial.name for trial in split.held_out])}) are predicted to"
+        f"Records that were not fitted ({listed([trial.name for trial in split.final])}) are predicted to"
         f" {error.held_out:.2f} times the noise, those fitted to {error.fitted:.2f}: something may be missing there."
     ]
 
 
-def but_too_little(choice: Choice) -> list[str]:
-    """Of a choice that is supported, and still not named."""
+def but_too_little(choice: Choice, split: Split, tested: float | None) -> list[str]:
+    """Of a choice that predicts better, and is still not named. `tested`: what it closes on the final trials."""
     named = " and ".join(choice.candidate.effects)
+    if tested is not None and tested < 0.0:
+        final = listed([trial.name for trial in split.final])
+        return [
+            f"With {named} most records are predicted better, but those that chose nothing ({final}) worse than"
+            " without: it is not named. Do they differ in something that is not told?"
+        ]
     return [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
 
 
-def doubts(choice: Choice, split: Split, effects: Sequence[Named], gap: tuple[Error, Error, Floor] | None) -> list[str]:
-    """Of named `effects`: an explanation that is more probable; or, since the final trials inform no choice, effects
-    with which these are predicted worse. `gap`: errors before and with them, and the floor, if there is a gap at all.
-    """
-    said = _harmful(choice, effects, *gap) if gap else []
+def doubts(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
+    """Of named effects: an explanation that is more probable, and final trials that tell little. `tested`: what the
+    effects close there, if there is a gap."""
+    said = []
+    if tested is not None and tested < policy.half:
+        said.append(
+            f"Of what is missing in the records that chose nothing ({listed([t.name for t in split.final])}) only"
+            f" {100 * tested:.0f} % is closed, of the others, each predicted from the rest, at least half."
+        )
     likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
     if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
         besides = [effect for effect in likeliest if effect not in choice.candidate.effects]
@@ -49,19 +57,9 @@ def doubts(choice: Choice, split: Split, effects: Sequence[Named], gap: tuple[Er
             f"With {listed(besides)}, too, the explanation would be more probable ({weight:.2f}), but that closes too"
             " little of what is left to be named, or helps too little where nothing was fitted."
         )
-    if gap and len(split.held_out) == 1:
-        said.append(f"One record alone was not fitted, {split.held_out[0].name}: the shares of the gap rest on it.")
+    if tested is not None and len(split.final) == 1:
+        said.append(f"One record alone informed no choice, {split.final[0].name}: the shares of the gap rest on it.")
     return said
-
-
-def _harmful(choice: Choice, effects: Sequence[Named], before: Error, explained: Error, floor: Floor) -> list[str]:
-    worse = [e.name for e in effects if e.share_of_gap < -_HARMFUL]
-    if explained.held_out > before.held_out:
-        named = " and ".join(choice.candidate.effects)
-        return [f"With {named} the records that were not fitted are predicted worse than without: doubt the verdict."]
-    if before.held_out > floor.held_out and worse:
-        return [f"With {listed(worse)} the records that were not fitted are predicted worse than without: doubt it."]
-    return []
 
 
 def follow_in_words(followed: Sequence[Followed]) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
-from lacuna.diagnosis.decide import Choice, dispersion_of, weigh, worth_adding
+from lacuna.diagnosis.decide import Choice, Comparison, weigh
 from lacuna.diagnosis.search import Search
 from lacuna.system import Effect
 
@@ -35,7 +35,7 @@ def _without_absent(case: Case, found: Search, choice: Choice, effect: str) -> C
     # what was tried of these effects may have ended in another minimum than they have in company
     smaller = min(refitted, found.with_effects(rest) or refitted, key=lambda c: c.cost)
     # intervals are wide where fits end in several places; that the effect is there may still be sure
-    return None if worth_adding(smaller, choice.candidate, dispersion_of(found.tried), case.policy) else smaller
+    return None if Comparison(found, case.policy, case.exceeds).worse(smaller, choice.candidate) else smaller
 
 
 def _replacing(case: Case, found: Search, choice: Choice, effect: str) -> Candidate | None:
@@ -48,10 +48,10 @@ def _replacing(case: Case, found: Search, choice: Choice, effect: str) -> Candid
         return None
     if not set(case.system.effects[effect].freed_at) & set(freed.fitted.structure.sites):
         return None
-    if smaller.excess - choice.candidate.excess > case.policy.half * smaller.excess:
+    if choice.candidate.left < case.policy.half * smaller.left:
         return None
     curve_alone = refitted_without(freed, rest, case.split)
-    return None if worth_adding(curve_alone, freed, dispersion_of(found.tried), case.policy) else curve_alone
+    return None if Comparison(found, case.policy, case.exceeds).worse(curve_alone, freed) else curve_alone
 
 
 def _others(choice: Choice, effect: str) -> tuple[str, ...]:

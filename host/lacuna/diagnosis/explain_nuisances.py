@@ -26,10 +26,9 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> 
     fresh = [name for name in case.system.effects if name not in parent.effects]
     crew.say(f"asking what {followed[0].nuisance} follows")
     near = sketches(profiles(parent.fitted, fresh, case.split, found.floor, crew), crew)
-    least = policy.least_gain(1, parent.pieces)
-    grown = sorted((judge(fitted, case.split, near=parent.checked) for fitted, _ in near), key=lambda c: c.cost)
-    promising = [c for c in grown if parent.cost - c.cost > least][:_FINISHED]
-    finished = [judge(finish(c.fitted), case.split, near=c.checked) for c in promising]
+    grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted, _ in near), key=lambda c: c.cost)
+    promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]
+    finished = [judge(finish(c.fitted), case.split, policy, near=c.checked) for c in promising]
     tried = {frozenset(c.effects): c for c in found.tried}
     for one in (*grown, *finished):
         same = frozenset(one.effects)

@@ -97,7 +97,9 @@ def _begun_anew(parent: Candidate, sites: Sequence[str], split: Split, policy: P
     most = (1.0 - policy.promising) * alone.glanced
     chosen = [one for one in promising(begun, _FOLLOWED) if one.glanced < most]
     solutions = follow(crew, "following up", chosen)
-    return [judge(Fit(one.problem, solution, 1, 1), split) for one, solution in zip(chosen, solutions, strict=True)]
+    return [
+        judge(Fit(one.problem, solution, 1, 1), split, policy) for one, solution in zip(chosen, solutions, strict=True)
+    ]
 
 
 def _best_grown(
@@ -112,7 +114,9 @@ def _best_grown(
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
     solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
-    grown = [judge(Fit(p.problem, solution, 1, 1), split) for p, solution in zip(promises, solutions, strict=True)]
+    grown = [
+        judge(Fit(p.problem, solution, 1, 1), split, policy) for p, solution in zip(promises, solutions, strict=True)
+    ]
     return _best_of([*grown, *anew], parents, split, policy)
 
 
@@ -125,7 +129,7 @@ def _best_of(
     before, best = (min(some, key=lambda c: c.checked.cost) for some in (parents, grown))
     if before.checked.cost - best.checked.cost < policy.curve * _excess(before.checked):
         return None
-    best = min(best, judge(_refined(best.fitted), split), key=lambda c: c.checked.cost)
+    best = min(best, judge(_refined(best.fitted), split, policy), key=lambda c: c.checked.cost)
     # a fit may not buy small residuals with large ones, which its cost compresses
     return best if best.checked_error < before.checked_error else None
 

@@ -19,9 +19,9 @@ _NEAREST = 5
 
 @dataclass(frozen=True)
 class Named:
-    """One effect of the verdict. `interval`: 90 % for each parameter. `share_of_gap`: of the base model's gap on
-    held-out trials, what it closes on top of those named before it. `form`: "as in the library", or where it is freed;
-    parameters are then those of the library's form that comes nearest.
+    """One effect of the verdict. `interval`: 90 % for each parameter. `share_of_gap`: of the base model's gap on final
+    trials, its part: effects share what they close together by what is lost without each. `form`: "as in the library",
+    or where it is freed; parameters are then those of the library's form that comes nearest.
     """
 
     name: str
@@ -96,24 +96,25 @@ def _closing(case: Case, before: Error, floor: Floor) -> Callable[[Fit], float]:
 
 
 def _shares(case: Case, found: Search, choice: Choice, gap: tuple[Error, Floor]) -> list[tuple[str, float]]:
-    """Each effect with the share of the gap that it closes on top of those before it, the largest first of all; what a
-    form of their own closes counts with the last."""
-    closes, candidate = _closing(case, *gap), choice.candidate
-    rest, chosen, closed, shares = list(candidate.effects), (), 0.0, []
-    while rest:
-        ahead = {}
-        for effect in rest:
-            if len(rest) == 1:
-                ahead[effect] = closes(case.converged(choice.explanation))
-                continue
-            smaller = found.with_effects((*chosen, effect))
-            smaller = smaller or refitted_without(candidate, (*chosen, effect), case.split)
-            ahead[effect] = closes(smaller.fitted)
-        best = max(ahead, key=ahead.get)
-        shares.append((best, ahead[best] - closed))
-        chosen, closed = (*chosen, best), ahead[best]
-        rest.remove(best)
-    return shares
+    """Each effect with its part of what they close together of the gap, the largest first."""
+    together = _closing(case, *gap)(case.converged(choice.explanation))
+    lost = lost_without(case, found, choice)
+    total = sum(max(each, 0.0) for each in lost.values())
+    parts = {e: max(each, 0.0) / total if total > 0.0 else 1.0 / len(lost) for e, each in lost.items()}
+    return sorted(((e, together * part) for e, part in parts.items()), key=lambda one: -one[1])
+
+
+def lost_without(case: Case, found: Search, choice: Choice) -> dict[str, float]:
+    """By effect of the choice, by how much the mean square of the final trials is higher without it, in floors."""
+    candidate, lost = choice.candidate, {}
+    if len(candidate.effects) == 1:
+        return dict.fromkeys(candidate.effects, 1.0)
+    squared = error_of(candidate.fitted, case.split).held_out ** 2
+    for effect in candidate.effects:
+        rest = [e for e in candidate.effects if e != effect]
+        smaller = found.with_effects(rest) or refitted_without(candidate, rest, case.split)
+        lost[effect] = error_of(smaller.fitted, case.split).held_out ** 2 - squared
+    return lost
 
 
 def _form(effect: Effect, choice: Choice) -> str:

@@ -52,26 +52,20 @@ class Policy:
         "what one more effect must gain beyond the cost of its parameters: odds of 3000 to 1",
         "convention",
     )
-    gain_per_piece: float = _rule(
-        5e-4,
-        "log-likelihood over dispersion, a piece",
-        "with many pieces of data, any small misfit would justify a parameter",
-        "simulation",
-    )
     unseen_gain: float = _rule(
         0.25, "of the gain required", "part of it must come from trials that were not fitted", "simulation"
     )
     share: float = _rule(
         0.15,
         "of what is left",
-        "one more effect must close this share of what the smaller set leaves, unless it leaves nothing that matters",
+        "one more effect must close this share of the mean square that the smaller set leaves above the floor",
         "simulation",
     )
     share_of_gap: float = _rule(
         0.03,
         "of the base model's gap",
-        "a further effect that closes less is as likely the wrong form of the first: it goes into the remainder,"
-        " unless it leaves nothing that matters",
+        "no formula holds to better than a sixth of what it explains (0.17 squared): a further effect that closes less"
+        " is as likely the wrong form of the first, and goes into the remainder, unless it halves what is left",
         "simulation",
     )
     half: float = _rule(
@@ -85,7 +79,13 @@ class Policy:
         0.05, "probability", "swapping in an effect at least this probable is not ruled out", "convention"
     )
     supported: float = _rule(
-        0.5, "probability", "a named effect is at least as likely as not, against everything tried", "convention"
+        0.5, "weight", "a named effect, or what may stand in its place, is in most of what was tried", "convention"
+    )
+    doubt: float = _rule(
+        0.05,
+        "probability",
+        "an explanation is worse only if it is so however the conditions are drawn anew, but for this share of draws",
+        "convention",
     )
     implausible: float = _rule(
         2.0, "log-likelihood", "cost of a parameter half its plausible range outside it", "convention"
@@ -123,10 +123,6 @@ class Policy:
     curve: float = _rule(
         0.1, "of what is left on unseen trials beyond noise", "what one more curve must remove", "simulation"
     )
-
-    def least_gain(self, extra: int, pieces: float) -> float:
-        """Log-likelihood over dispersion that `extra` effects more must gain on so many pieces of data."""
-        return extra * max(self.gain, self.gain_per_piece * pieces)
 
     @classmethod
     def table(cls) -> list[tuple[str, float, str, str, str]]:

@@ -11,13 +11,15 @@ import numpy as np
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.noise import at_times, repeat_pairs
+from lacuna.estimation.problem import FAILED
 from lacuna.system import Channels, Record
 
 
 @dataclass(frozen=True)
 class Error:
-    """RMS residual in units of the noise: over the trials that were fitted, all that were held out, those among them
-    whose conditions were never fitted, and the held-out ones by experiment (all trials where none is held out)."""
+    """RMS residual in units of the noise: over the trials that were fitted, those that informed nothing
+    (`Split.final`), those among them whose conditions were never fitted, and the same by experiment (fitted ones where
+    there are no others)."""
 
     fitted: float
     held_out: float
@@ -37,9 +39,9 @@ class Floor:
 def error_of(fitted: Fit, split: Split) -> Error:
     """Errors of a fit on its own trials and on trials that it has not seen."""
     known = dict(zip((t.name for t in fitted.problem.trials), fitted.scaled_residuals(), strict=True))
-    unseen = _on(fitted, split.held_out)
+    unseen = _on(fitted, split.final)
     by_experiment: dict[str, list[Channels]] = defaultdict(list)
-    for trial in split.held_out:
+    for trial in split.final:
         by_experiment[trial.experiment].append(unseen[trial.name])
     held_out = set(by_experiment)
     for trial in fitted.problem.trials:
@@ -55,10 +57,11 @@ def error_of(fitted: Fit, split: Split) -> Error:
 
 def floor_of(fitted: Fit, split: Split) -> Floor:
     """The floor on the same trials, from the differences between repeats' residuals."""
-    known = fitted.problem.trials
-    scaled = dict(zip((t.name for t in known), fitted.scaled_residuals(), strict=True)) | _on(fitted, split.held_out)
-    fit_pairs, held_out_pairs = repeat_differences(known, split.held_out, scaled)
-    condition_pairs = repeat_differences((), split.conditions, scaled)[1]
+    known, others = fitted.problem.trials, (*fitted.problem.trials, *split.unseen)
+    scaled = dict(zip((t.name for t in known), fitted.scaled_residuals(), strict=True)) | _on(fitted, split.not_fitted)
+    fit_pairs = repeat_differences(known, (), scaled)[0]
+    held_out_pairs = repeat_differences(others, split.final, scaled)[1]
+    condition_pairs = repeat_differences(split.unseen, split.conditions, scaled)[1]
     return Floor(*(rms(pairs) if pairs else 1.0 for pairs in (fit_pairs, held_out_pairs, condition_pairs)))
 
 
@@ -67,24 +70,27 @@ def share_of_gap(before: float, after: float, floor: float) -> float:
     return (before**2 - after**2) / max(before**2 - floor**2, 1e-12)
 
 
-def excess_over(fitted: Fit, other: Fit, accuracy: Callable[[str, str], float]) -> float:
-    """By what share the mean square of a fit's residual exceeds that of another's on the same trials: in the experiment
-    where it does so most, over all of its channels. Within `accuracy(experiment, channel)` counts as nothing."""
-    mine, others = (_mean_squares(one) for one in (fitted, other))
+def excess_over(fits: Sequence[Fit], other: Sequence[Fit], accuracy: Callable[[str, str], float]) -> float:
+    """By what share the mean square of the residuals of fits exceeds that of others on the same trials: in the
+    experiment where it does so most, over all of its channels. Within `accuracy(experiment, channel)` counts as
+    nothing."""
+    mine, others = (_mean_squares(one) for one in (fits, other))
     shares: dict[str, list[float]] = defaultdict(list)
     for (experiment, channel), square in mine.items():
         least = others[experiment, channel]
-        enough = (accuracy(experiment, channel) / fitted.problem.floor.channels[experiment, channel].sd) ** 2
+        enough = (accuracy(experiment, channel) / fits[0].problem.floor.channels[experiment, channel].sd) ** 2
         shares[experiment].append((square - least) / least if square - least > enough else 0.0)
     return max((float(np.mean(each)) for each in shares.values()), default=0.0)
 
 
-def _mean_squares(fitted: Fit) -> dict[tuple[str, str], float]:
+def _mean_squares(fits: Sequence[Fit]) -> dict[tuple[str, str], float]:
     """By experiment and channel, of the residuals that there are."""
     squares: dict[tuple[str, str], list[float]] = defaultdict(list)
-    for trial, channels in zip(fitted.problem.trials, fitted.scaled_residuals(), strict=True):
+    every = (pair for fit in fits for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
+    for trial, channels in every:
         for channel, z in channels.items():
-            squares[trial.experiment, channel].append(float(np.nanmean(z**2)))
+            known = z[np.isfinite(trial.channels[channel])]
+            squares[trial.experiment, channel].append(float(np.mean(np.nan_to_num(known, nan=FAILED) ** 2)))
     return {key: float(np.mean(each)) for key, each in squares.items()}
 
 

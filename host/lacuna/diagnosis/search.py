@@ -197,7 +197,9 @@ def _best_to_grow(tried: dict[frozenset[str], Candidate], size: int, split: Spli
 def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thoroughly: bool = True) -> Candidate:
     """The same explanation against another floor, fitted from where it stands if it is to be done thoroughly."""
     steps = _REWEIGHED_ITERATIONS if thoroughly else 0
-    return judge(reweigh(candidate.fitted, floor, max_iterations=steps), split, near=candidate.checked)
+    return judge(
+        reweigh(candidate.fitted, floor, max_iterations=steps), split, candidate.policy, near=candidate.checked
+    )
 
 
 def _grow(
@@ -237,7 +239,7 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, e
     near = sketches([p for k, p in enumerate(ranked) if k < _SKETCHED[size] or p.apart], crew)
     if not near:
         return [], None
-    first, finished = judge(near[0][0], split, near=before.checked), None
+    first, finished = judge(near[0][0], split, policy, near=before.checked), None
     fruitful = before.cost - first.cost > policy.promising * before.excess
     if fruitful and first.checked_error <= (0, policy.lost):
         first = finished = _finished(first, split, policy, crew)
@@ -272,7 +274,7 @@ def _finished(candidate: Candidate, split: Split, policy: Policy, crew: Crew) ->
     than once."""
     crew.say(f"finishing {' + '.join(candidate.effects)}")
     for _ in range(_ROUNDS):
-        further = judge(finish(candidate.fitted), split, near=candidate.checked)
+        further = judge(finish(candidate.fitted), split, candidate.policy, near=candidate.checked)
         fruitful = candidate.cost - further.cost > max(policy.promising * candidate.excess, _LEAST)
         candidate = min(candidate, further, key=lambda c: c.cost)
         if not fruitful:
@@ -289,7 +291,7 @@ def _finish(
     grown = [
         finished
         if finished and fitted.solution is finished.fitted.solution
-        else judge(fitted, split, near=before.checked)
+        else judge(fitted, split, policy, near=before.checked)
         for fitted, _ in sketched
     ]
     profiled = {candidate.effects: profile for candidate, (_, profile) in zip(grown, sketched, strict=True)}
@@ -309,7 +311,7 @@ def _finish(
         suffices = enough(candidate)
         if not suffices:
             other = finish_elsewhere(candidate.fitted, profiled[candidate.effects], crew)
-            candidate = judge(other, split, near=candidate.checked)
+            candidate = judge(other, split, candidate.policy, near=candidate.checked)
             suffices = enough(candidate)
         if suffices:
             explained = min(explained, candidate.cost)

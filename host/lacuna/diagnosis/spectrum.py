@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
+from lacuna.estimation.sampling import evenly, sample_period
 from lacuna.system import Channels, Record
 
 _CELLS_A_LINE = 3  # grid cells, at least, within the width of a line in the longest record
@@ -25,10 +26,10 @@ def peaks(
     frequencies = np.arange(lower_hz, upper_hz, resolution_hz)
     pooled, weight = np.zeros(len(frequencies)), np.zeros(len(frequencies))
     for trial, channels in zip(trials, scaled, strict=True):
-        sample_s = float(np.median(np.diff(trial.time_s)))
+        sample_s = sample_period(trial.time_s)
         resolved = (frequencies > 1.5 / (trial.time_s[-1] - trial.time_s[0])) & (frequencies < 0.4 / sample_s)
         for residual in channels.values():
-            power = _power(np.nan_to_num(residual), sample_s, frequencies, resolution_hz)
+            power = _power(np.nan_to_num(evenly(trial.time_s, residual)), sample_s, frequencies, resolution_hz)
             background = median_filter(power, size=_LOCAL, mode="nearest")
             pooled += resolved * np.minimum(power / np.maximum(background, 1e-30), _LONGEST)
             weight += resolved

@@ -6,13 +6,16 @@ from collections import defaultdict
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 
-from lacuna.system import Record
+import numpy as np
+
+from lacuna.system import Record, groups_of_repeats
 
 
 @dataclass(frozen=True)
 class Split:
-    """`fit`: fitted. `select`: further repeats of the same conditions, and `unseen`: whole conditions that are never
-    fitted; both choose between explanations. `final`: repeats (without repeats: trials) that inform nothing."""
+    """`fit`: fitted. `select`: further repeats of the same conditions, and `unseen`: repeats of whole conditions that
+    are never fitted; both choose between explanations. `final`: repeats of either kind (without repeats: trials) that
+    inform nothing, and are the test."""
 
     fit: tuple[Record, ...]
     select: tuple[Record, ...]
@@ -30,30 +33,31 @@ class Split:
         return self.select + self.unseen
 
     @property
-    def held_out(self) -> tuple[Record, ...]:
-        """Everything that the final explanation is not fitted to."""
+    def not_fitted(self) -> tuple[Record, ...]:
+        """Everything that the final explanation is not fitted to, whether it informed a choice or not."""
         return self.unseen + self.final
 
     @property
     def conditions(self) -> tuple[Record, ...]:
-        """The held-out trials of conditions that were never fitted."""
+        """The final trials of conditions that were never fitted."""
         fitted = {(t.experiment, t.condition) for t in self.known}
-        return tuple(t for t in self.held_out if (t.experiment, t.condition) not in fitted)
+        return tuple(t for t in self.final if (t.experiment, t.condition) not in fitted)
 
     @property
     def repeats(self) -> tuple[Record, ...]:
-        """The held-out trials of conditions of which other repeats were fitted."""
+        """The final trials of conditions of which other repeats were fitted."""
         names = {t.name for t in self.conditions}
-        return tuple(t for t in self.held_out if t.name not in names)
+        return tuple(t for t in self.final if t.name not in names)
 
 
 def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = ()) -> Split:
     """Split by whole trials; deterministic.
 
-    `spare`: (experiment, condition) of those that are never fitted. Of three or more repeats of any other condition
-    one goes to `final` and one to `select`, which one rotates from condition to condition, so that no part has all the
-    early or all the late runs of a session; of two, one goes to either in turn; of trials without repeats every fifth
-    is `final` and another fifth selects. None is `final` if nothing else could judge, or if it alone has a channel.
+    `spare`: (experiment, condition) of those that are never fitted: the last repeat of each is `final`, the others are
+    `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, which
+    rotates from condition to condition, so that no part has all the early or all the late runs of a session; of two,
+    one goes to either in turn; of trials without repeats every fifth is `final` and another fifth selects. None is
+    `final` if nothing else could judge, or if it alone has a channel.
     """
     groups: dict[tuple[str, Hashable], list[Record]] = defaultdict(list)
     for trial in trials:
@@ -64,7 +68,9 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
     singles = [members[0] for key, members in groups.items() if len(members) == 1 and key not in left_out]
     for turn, (key, members) in enumerate(groups.items()):
         if key in left_out:
-            parts["unseen"] += members
+            most = max(len(members) - 1, 1)
+            parts["unseen"] += members[:most]
+            parts["final"] += members[most:]
             continue
         if len(members) == 1:
             continue
@@ -74,7 +80,7 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
             pairs += 1
             continue
         for place, trial in enumerate(members):
-            role = {0: "final", 1: "select"}.get((place + turn) % len(members), "fit")
+            role = ("final", "select", "fit")[(place + turn) % 3]
             parts[role].append(trial)
     for place, trial in enumerate(singles):
         role = "final" if place % 5 == 4 else "select" if place % 5 == 2 else "fit"
@@ -92,3 +98,15 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
 
 def _channels(trial: Record) -> set[tuple[str, str]]:
     return {(trial.experiment, channel) for channel in trial.channels}
+
+
+def middle_conditions(trials: Sequence[Record], fewest: int = 3) -> tuple[tuple[str, Hashable], ...]:
+    """Of each experiment with so many repeated conditions the one between the others, by the mean of what was measured
+    first: what is never fitted where nobody has said what should be."""
+    means: dict[str, dict[Hashable, float]] = defaultdict(dict)
+    for members in groups_of_repeats(trials):
+        if len(members) > 1:
+            samples = np.concatenate([next(iter(t.channels.values())) for t in members])
+            means[members[0].experiment][members[0].condition] = float(np.nanmean(samples))
+    many = {experiment: each for experiment, each in means.items() if len(each) >= fewest}
+    return tuple((experiment, sorted(each, key=each.get)[len(each) // 2]) for experiment, each in many.items())

@@ -14,7 +14,9 @@ _NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably abs
 
 def warnings_of(fitted: Fit, split: Split) -> tuple[str, ...]:
     """One sentence each, the most serious first."""
-    held_out = evaluate_on(fitted, split.held_out) if split.held_out else None
+    known = {trial.name for trial in fitted.problem.trials}
+    others = [trial for trial in split.not_fitted if trial.name not in known]
+    held_out = evaluate_on(fitted, others) if others else None
     fits = [fitted, held_out] if held_out else [fitted]
     return (*_failed(fits), *_parameters(fitted), *_strayed(fits))
 

@@ -20,6 +20,7 @@ from scipy.ndimage import median_filter
 from scipy.optimize import brentq
 
 from lacuna.estimation.autocorrelation import correlation_samples
+from lacuna.estimation.sampling import evenly, sample_period
 from lacuna.system import Channels, Record, System, groups_of_repeats
 
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
@@ -28,6 +29,9 @@ _SHIFT_WEIGHTS /= _SHIFT_WEIGHTS.sum()
 _LONGEST_JITTER_S = 0.5
 _MOVING_SIGMAS = 6.0
 _WINDOW_S = 0.05
+_SAME_VALUE = 1e-9  # of a record's range: values that differ by less are one
+_RECUR = 0.9  # of a record's samples are values of their own at most, where values recur
+_ON_THE_GRID = 1e-3  # of a step
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,7 @@ def _from_pairs(
     scaled = []
     for record, difference in zip(records, differences, strict=True):
         variance = sd**2 + (_shift_variance(*record, jitter_s, sd) if jitter_s else 0.0)
-        scaled.append(difference / np.sqrt(variance))
+        scaled.append(evenly(record[0], difference / np.sqrt(variance)))
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
 
 
@@ -146,8 +150,8 @@ def _of_fast_noise(
 ) -> ChannelNoise:
     """Without repeats, told nothing: from the fast noise of residuals (without them of the records, as an upper bound,
     since a record may itself be fast)."""
-    known = [trial.channels if residuals is None else residuals[trial.name] for trial in members]
-    sd = float(np.median([_fast_noise(samples[channel]) for samples in known]))
+    known = [(t.time_s, t.channels if residuals is None else residuals[t.name]) for t in members]
+    sd = float(np.median([_fast_noise(time_s, samples[channel]) for time_s, samples in known]))
     return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, 1.0, 0)
 
 
@@ -163,7 +167,7 @@ def _of_correlated(
     changes, pieces = [], []
     for trial in members:
         samples = trial.channels[channel] if residuals is None else residuals[trial.name][channel]
-        period = _sample_period(trial)
+        period, samples = sample_period(trial.time_s), evenly(trial.time_s, samples)
         lag = min(max(1, round(correlated_s / period)), len(samples) // 2)
         kept = np.exp(-period / correlated_s)
         changes.append((samples[lag:] - samples[:-lag]) / np.sqrt(2.0 * (1.0 - kept**lag)))
@@ -190,11 +194,11 @@ def at_times(time_s: np.ndarray, measured_s: np.ndarray, samples: np.ndarray) ->
 
 def _moves(trial: Record, channel: str) -> np.ndarray:
     """Where a record changes within the window by much more than its fast noise."""
-    samples = trial.channels[channel]
-    window = max(1, round(_WINDOW_S / _sample_period(trial)))
+    samples, time_s, period = trial.channels[channel], trial.time_s, sample_period(trial.time_s)
+    window_s = max(1, round(_WINDOW_S / period)) * period
     smooth = _smooth(samples)
-    change = np.abs(_shifted(smooth, window) - _shifted(smooth, -window))
-    return change > _MOVING_SIGMAS * max(_fast_noise(samples), 1e-12)
+    later, sooner = (np.interp(time_s + way * window_s, time_s, smooth) for way in (1, -1))
+    return np.abs(later - sooner) > _MOVING_SIGMAS * max(_fast_noise(time_s, samples), 1e-12)
 
 
 def _jitter(records, differences, moving, sd) -> float:
@@ -231,22 +235,36 @@ def _smooth(samples: np.ndarray) -> np.ndarray:
     return median_filter(samples, size=3, mode="nearest")
 
 
-def _fast_noise(samples: np.ndarray) -> float:
-    """Standard deviation of white noise in a smooth record, from second differences; robust against jumps."""
-    bends = np.diff(samples[np.isfinite(samples)], 2)
-    return float(1.4826 * np.median(np.abs(bends)) / np.sqrt(6)) if len(bends) else 0.0
+def _fast_noise(time_s: np.ndarray, samples: np.ndarray) -> float:
+    """Standard deviation of white noise in a smooth record, from how far each sample is off the line through its
+    neighbours; robust against jumps."""
+    known = np.isfinite(samples)
+    at, seen = time_s[known], samples[known]
+    if len(seen) < 3:
+        return 0.0
+    share = (at[1:-1] - at[:-2]) / (at[2:] - at[:-2])
+    bends = seen[1:-1] - (1.0 - share) * seen[:-2] - share * seen[2:]
+    return float(1.4826 * np.median(np.abs(bends) / np.sqrt(1.0 + (1.0 - share) ** 2 + share**2)))
 
 
 def _smallest(trials: Sequence[Record], channel: str) -> float:
-    """A floor that keeps noise-free records from infinite weights: 1e-4 of the channel's spread."""
+    """What a floor is at least: what rounding leaves, and, so that records without noise do not get infinite weights,
+    1e-4 of the channel's spread."""
     spread = max(float(np.nanstd(trial.channels[channel])) for trial in trials)
-    return 1e-4 * spread or 1e-12
+    rounded = max(_rounding_step(trial.channels[channel]) for trial in trials)
+    return max(1e-4 * spread, rounded / np.sqrt(12.0)) or 1e-12
 
 
-def _sample_period(trial: Record) -> float:
-    return float(np.median(np.diff(trial.time_s)))
-
-
-def _shifted(samples: np.ndarray, by: int) -> np.ndarray:
-    index = np.clip(np.arange(len(samples)) + by, 0, len(samples) - 1)
-    return samples[index]
+def _rounding_step(samples: np.ndarray) -> float:
+    """The least step between the values of a record that was rounded; 0 if it was not. In a rounded record values recur
+    that are all multiples of one step apart, or else most samples are the same as their neighbours."""
+    known = samples[np.isfinite(samples)]
+    values = np.unique(known)
+    steps = np.diff(values)
+    steps = steps[steps > _SAME_VALUE * np.ptp(known)] if len(steps) else steps  # what arithmetic makes of equal ones
+    if len(steps) < 2:
+        return 0.0
+    least = float(steps.min())
+    off_the_grid = np.abs(steps / least - np.round(steps / least))
+    recur = len(steps) + 1 < _RECUR * len(known) and bool((off_the_grid < _ON_THE_GRID).all())
+    return least if recur or np.mean(np.diff(known) == 0.0) > 0.5 else 0.0

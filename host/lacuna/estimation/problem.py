@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 
 from lacuna.cores import usable_cores
 from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.sampling import even_grid
 from lacuna.estimation.structure import Structure
 from lacuna.system import Channels, Parameter, Record
 
@@ -24,6 +25,7 @@ _OWN_STARTS = 8  # values tried of a parameter that a trial has its own of
 _REMEMBERED = 4  # points whose residuals are kept
 _WORTH_A_PACK = 3  # trials: fewer gain little from each other, and more from a core each
 FAILED = 1e4  # residual, in standard deviations, of a simulation that failed
+_MOST = 1e8  # standard deviations: what is further off ran away, and counts as no more, or its square would overflow
 
 
 _threads: int | None = None
@@ -110,6 +112,8 @@ class Problem:
         self.floor = floor
         self.nuisances = tuple(structure.nuisances(t) for t in trials)
         self._weighing = [_weighing(t, floor) for t in trials]
+        self._spans = [{c: _span(v, floor.sd(t, c)) for c, v in t.channels.items()} for t in trials]
+        self._grids = [[even_grid(t.time_s[np.isfinite(v)]) for v in t.channels.values()] for t in trials]
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
         self._recent: dict[tuple, list[np.ndarray]] = {}  # residuals: a search begins where the one before ended
@@ -161,10 +165,18 @@ class Problem:
 
     def predict(self, point: Point, index: int, *, coarse: bool = False) -> Channels:
         """Channels of trial `index`."""
-        return self._simulate([(point.values, point.nuisances[index])], index, coarse=coarse)[0]
+        found = self._simulate([(point.values, point.nuisances[index])], index, coarse=coarse)[0]
+        return self._within_reach(found, index)
 
     def predict_all(self, point: Point) -> list[Channels]:
-        return self._of_each(point, lambda prediction, _: prediction)
+        return self._of_each(point, self._within_reach)
+
+    def _within_reach(self, prediction: Channels, index: int) -> Channels:
+        """NaN in the place of what ran away: it is no prediction, and its square may be no number."""
+        trial = self.trials[index]
+        with np.errstate(invalid="ignore"):
+            far = {c: np.abs(prediction[c]) > _MOST * self._spans[index][c] for c in trial.channels}
+        return {c: np.where(far[c], np.nan, prediction[c]) if far[c].any() else prediction[c] for c in trial.channels}
 
     def residuals(self, point: Point) -> list[np.ndarray]:
         """One vector a trial, channels one after the other, weighted."""
@@ -329,19 +341,20 @@ class Problem:
         return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 
     def _looked_at(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Deviations as the view has them, and the weight of each: blurred, each channel goes through a low-pass, and
-        as many samples of it are kept as it then has anything to say."""
+        """Deviations as the view has them, and the weight of each: blurred, each channel goes through a low-pass over
+        even times, and as many samples of it are kept as it then has anything to say."""
         _, _, thinning, keep = self._weighing[index]
         weight = thinning[keep]
         if not self.view.blur:
             return z, weight
-        keep = keep.reshape(len(self.trials[index].channels), -1)
-        samples = keep.shape[1] * self.view.blur
-        decay, every = np.exp(-1.0 / samples), max(1, round(samples / 4))
-        ends = np.cumsum(keep.sum(axis=1))[:-1]
+        known = keep.reshape(len(self.trials[index].channels), -1).sum(axis=1)
+        ends = np.cumsum(known)[:-1]
         found, weights = [], []
-        for z_, w_ in zip(np.split(z, ends, axis=1), np.split(weight, ends), strict=True):
-            found.append(lfilter([1.0 - decay], [1.0, -decay], z_)[:, every - 1 :: every])
+        for z_, w_, grid in zip(np.split(z, ends, axis=1), np.split(weight, ends), self._grids[index], strict=True):
+            samples = z_.shape[1] * self.view.blur
+            decay, every = np.exp(-1.0 / max(samples, 1e-3)), max(1, round(samples / 4))
+            even = z_ if grid is None else grid.of(z_)
+            found.append(lfilter([1.0 - decay], [1.0, -decay], even)[:, every - 1 :: every])
             weights.append(w_[every - 1 :: every] * np.sqrt(every))
         return np.concatenate(found, axis=1), np.concatenate(weights)
 
@@ -356,11 +369,12 @@ class Problem:
         measured, weight, _, keep = self._weighing[index]
         channels = self.trials[index].channels
         predicted = np.array([np.concatenate([prediction[c] for c in channels]) for prediction in predictions])
-        predicted -= measured
-        predicted *= weight
+        with np.errstate(over="ignore"):  # what ran away counts as such below
+            predicted -= measured
+            predicted *= weight
         z = predicted if keep.all() else predicted[:, keep]
         z[~np.isfinite(z)] = FAILED
-        return z
+        return np.clip(z, -_MOST, _MOST, out=z)
 
 
 def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
@@ -370,6 +384,11 @@ def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
         [np.full(v.shape, floor.samples_per_piece(trial, c) ** -0.5) for c, v in trial.channels.items()]
     )
     return measured, weight, thinning, np.isfinite(measured)
+
+
+def _span(samples: np.ndarray, sd: np.ndarray) -> float:
+    """How large a channel's samples are, noise included."""
+    return float(max(np.nanmax(np.abs(samples)), np.max(sd))) if np.isfinite(samples).any() else np.inf
 
 
 def _side_by_side(trials: Sequence[Record], at_once: int) -> list[list[int]]:

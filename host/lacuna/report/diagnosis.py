@@ -37,7 +37,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
         *_open(record),
         *_next(record["next_experiment"]),
     ]
-    lead = verdict_sentence(record["verdict"], effects, record["remainder"])
+    lead = verdict_sentence(record["verdict"], effects, record["remainder"], nearest=record["nearest"])
     return Page(f"Diagnosis of {name}", lead, sections, facts=facts)
 
 
@@ -63,7 +63,7 @@ def _errors(error: Mapping[str, Any]) -> Section:
 
 
 def _held_out(found: Diagnosis) -> Section:
-    which = "records that were not fitted" if found.split.held_out else "all records, which were fitted"
+    which = "records that were not fitted" if found.split.final else "all records, which were fitted"
     figure = both_palettes(
         lambda stream, dark: draw_held_out(found, stream, dark),
         f"measured and predicted, before and after, on {which}",

@@ -75,7 +75,7 @@ def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
 def held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
     """Records that were not fitted (without any, all), the worst predicted first: each with its worst channel,
     predictions before and after, and the floor's standard deviation of that channel."""
-    trials = diagnosis.split.held_out or diagnosis.split.known
+    trials = diagnosis.split.final or diagnosis.split.known
     before, after = (evaluate_on(fit, trials).predictions() for fit in (diagnosis.base, diagnosis.final))
     found = []
     for trial, first, last in zip(trials, before, after, strict=True):

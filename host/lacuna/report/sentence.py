@@ -32,12 +32,17 @@ def verdict_sentence(
     effects: Sequence[Mapping[str, Any]],
     remainder: Mapping[str, Any],
     words: Callable[[Mapping[str, Any]], str] = in_words,
+    nearest: Sequence[Mapping[str, Any]] = (),
 ) -> str:
-    """A verdict (of `as_record`) in one sentence; `words`: what an effect is called."""
+    """A verdict (of `as_record`) in one sentence; `words`: what an effect is called; `nearest`: what else was tried."""
     if verdict == "none":
         near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "as well as was asked for"
         return f"Nothing that matters is missing from the base model: it predicts these data {near}."
     if verdict == "unexplained":
+        near = next((one for one in nearest if (one["share_of_gap"] or 0.0) > 0.5), None)
+        if near:
+            would = f"{' and '.join(near['effects'])} would close {share_in_words(near['share_of_gap'])}"
+            return f"The base model lacks something, and no effect of the library is supported by these data: {would}."
         return "The base model lacks something that no effect of the library explains."
     names = " and ".join(words(effect) for effect in effects)
     left = remainder["share_of_gap"]

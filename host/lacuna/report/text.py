@@ -34,7 +34,7 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
 
 
 def _sentence(record: Mapping[str, Any]) -> str:
-    return verdict_sentence(record["verdict"], record["effects"], record["remainder"])
+    return verdict_sentence(record["verdict"], record["effects"], record["remainder"], nearest=record["nearest"])
 
 
 def _where(record: Mapping[str, Any]) -> Iterator[str]:

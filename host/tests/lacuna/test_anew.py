@@ -59,7 +59,7 @@ def lost(case: Case, effects=()) -> Candidate:
     point = problem.start(problem.structure.values({"mass_kg": 4.0, "stiffness_N_m": 190.0, "damping_Ns_m": 19.0}))
     solution = replace(base.solution, point=point, cost=cost_of(problem, point), sensitivities=())
     fitted = Fit(problem, solution, 1, 1)
-    return Candidate(fitted, evaluate_on(fitted, case.split.judging))
+    return Candidate(fitted, evaluate_on(fitted, case.split.judging), POLICY)
 
 
 def begin(case: Case) -> Anew:
@@ -90,7 +90,7 @@ def test_a_pair_is_begun_from_its_better_half_and_not_from_a_lost_fit():
     found = [fitted for fitted, _ in begin(case).follow(lost(case, ("coulomb",)))]
     best = min(found, key=lambda fitted: fitted.cost)
     assert set(best.structure.effects) == {"delay", "cubic_spring"}
-    assert judge(best, case.split).checked_error < (0, 1.1)
+    assert judge(best, case.split, POLICY).checked_error < (0, 1.1)
 
 
 def test_where_no_trial_isolates_parameters_every_single_effect_is_followed_and_no_pair():
@@ -117,7 +117,7 @@ def test_what_has_been_begun_is_weighed_again_against_another_floor():
         channels={key: replace(channel, sd=0.5 * channel.sd) for key, channel in problem.floor.channels.items()},
     )
     sharper = Fit(Problem(problem.structure, problem.trials, halved), before.fitted.solution, 1, 1)
-    followed = [fitted for fitted, _ in anew.follow(Candidate(sharper, before.checked))]
+    followed = [fitted for fitted, _ in anew.follow(Candidate(sharper, before.checked, POLICY))]
     assert all(fitted.problem.floor is halved for fitted in followed)
     assert np.isfinite([fitted.cost for fitted in followed]).all()
 

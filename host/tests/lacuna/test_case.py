@@ -113,7 +113,7 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
 def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case):
     right = case.judge(case.fit_base(1))
     found = search(case, case.judge(moved(right.fitted, 0.3)), enough=case.suffices, crew=NOBODY)
-    assert found.base.cost < right.cost + 1.0
+    assert found.base.cost < right.cost + 1e-3 * right.cost, "as far as such a refit goes"
     assert case.suffices(found.base)
 
 
@@ -129,7 +129,7 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
     split = split_trials(system.trials, system.spare())
     base = Case(system, split, POLICY, 0).fit_base(1)
     floor = base.problem.floor
-    bare = judge(reweigh(fit(Structure(system, ("delay",)), split.fit, floor), floor, max_iterations=0), split)
+    bare = judge(reweigh(fit(Structure(system, ("delay",)), split.fit, floor), floor, max_iterations=0), split, POLICY)
     assert not bare.fitted.solution.sensitivities
     (grown,) = _best_to_grow({frozenset(["delay"]): bare}, 1, split, floor)
     assert profiles(grown.fitted, ["coulomb"], split, floor, NOBODY)
@@ -141,10 +141,10 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
 )
 def test_what_has_to_be_foreseen_counts_only_where_it_is_so_of_every_pair(monkeypatch, known, ahead, exceeds):
     """Of a few runs, one pair of fits may differ so by chance."""
-    pairs = [(0, "other"), (1, "other")]
+    pairs = [([0], ["other"]), ([1], ["other"])]
     monkeypatch.setattr(case_module, "foreseen", lambda fitted: ("ahead", fitted))
     monkeypatch.setattr(
-        case_module, "excess_over", lambda mine, *_: ahead[mine[1]] if isinstance(mine, tuple) else known[mine]
+        case_module, "excess_over", lambda mine, *_: ahead[mine[0][1]] if isinstance(mine[0], tuple) else known[mine[0]]
     )
     system = hide({})
     case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)

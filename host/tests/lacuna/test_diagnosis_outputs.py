@@ -7,7 +7,7 @@ from dataclasses import replace
 from toy import hide
 
 from lacuna.diagnosis.diagnose import diagnose
-from lacuna.diagnosis.doubts import doubts
+from lacuna.diagnosis.doubts import but_too_little, doubts
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.record import as_record
 from lacuna.diagnosis.remainder import Remainder
@@ -57,16 +57,18 @@ def test_where_something_matters_it_is_told_where():
     assert "position_mm in sweep (0.7 x the floor)" in describe(found.base, small).text
 
 
-def test_an_effect_that_does_harm_and_a_likelier_set_speak_against_a_verdict():
+def test_final_records_and_a_likelier_set_speak_against_a_verdict():
     found = diagnose(hide({"delay.delay_s": 0.02}, seed=30))
-    gap = (found.before, found.after, found.floor)
-    assert doubts(found.choice, found.split, found.effects, gap) == []
-    harmful = (replace(found.effects[0], share_of_gap=-0.3),)
+    assert doubts(found.choice, found.split, 0.9, POLICY) == []
+    (little,) = doubts(found.choice, found.split, 0.3, POLICY)
+    assert "only 30 % is closed" in little
+    (harm,) = but_too_little(found.choice, found.split, -0.3)
+    assert "With delay most records are predicted better, but those that chose nothing" in harm
+    assert found.split.final[0].name in harm
+    assert "too little" in but_too_little(found.choice, found.split, 0.3)[0]
     likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
-    harm, odds = doubts(likelier, found.split, harmful, gap)
-    assert "With delay the records that were not fitted are predicted worse" in harm
+    (odds,) = doubts(likelier, found.split, None, POLICY)
     assert "With stiction, too," in odds
-    assert doubts(likelier, found.split, harmful, None) == [odds]
 
 
 def test_unusable_input_ends_with_status_2(tmp_path):

@@ -143,5 +143,5 @@ def test_it_is_named_though_there_is_no_gap_to_close(fading_mm_s, seed, verdict)
     assert found.verdict == verdict
     assert [e.name for e in found.effects] == (["fading"] if fading_mm_s else [])
     if fading_mm_s:
-        assert excess_over(found.base, found.explained, found.search.base.fitted.structure.system.accuracy) < 0.21
+        assert excess_over([found.base], [found.explained], found.search.base.fitted.structure.system.accuracy) < 0.21
         assert found.effects[0].parameters["speed_mm_s"] == pytest.approx(fading_mm_s, rel=0.25)

@@ -98,9 +98,9 @@ def test_it_is_said_if_the_final_records_speak_against_what_was_named():
     final = {trial.name for trial in lacuna.diagnose(heater.system(), records, progress=False).diagnosis.split.final}
     mixed = {name: (without if name in final else records)[name] for name in records}
     found = lacuna.diagnose(heater.system(), mixed, progress=False)
-    assert [effect.name for effect in found.effects] == ["sensor_lag"], "they inform no choice"
-    assert found.error["after"] > found.error["before"]
-    assert found.warnings[0].startswith("With sensor_lag the records that were not fitted are predicted worse")
+    assert list(found.diagnosis.choice.candidate.effects) == ["sensor_lag"], "they inform no choice"
+    assert (found.verdict, found.effects) == ("unexplained", ()), "but nothing is named that they contradict"
+    assert found.warnings[0].startswith("With sensor_lag most records are predicted better, but those that chose")
 
 
 def test_it_is_said_of_what_is_supported_that_it_explains_too_little(monkeypatch):

@@ -11,7 +11,7 @@ from toy import hide
 from lacuna.diagnosis.anew import Anew
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.decide import choose, weigh, worth_adding
+from lacuna.diagnosis.decide import Comparison, choose, weigh
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.drift import find_drift
 from lacuna.diagnosis.policy import POLICY, Policy
@@ -122,38 +122,25 @@ class Tried:
         return [Record(f"t{k}", "steps", k, np.zeros(1), {}) for k in range(count)]
 
     @property
-    def fitted(self):
-        return SimpleNamespace(problem=SimpleNamespace(trials=self.trials[: len(self.fitted_costs)]))
-
-    @property
-    def checked(self):
-        return SimpleNamespace(problem=SimpleNamespace(trials=self.trials[len(self.fitted_costs) :]))
-
-    @property
     def checked_cost(self):
         return sum(self.checked_costs)
 
     @property
     def unseen_by_trial(self):
-        return self.by_trial
+        return {t.name: cost for t, cost in zip(self.trials[len(self.fitted_costs) :], self.checked_costs, strict=True)}
 
     @property
     def checked_error(self):
-        return 0, np.sqrt(np.mean(self.checked_costs) + self.beyond)
+        return 0, np.sqrt(np.mean(list(self.errors.values())))
 
     @property
     def errors(self):
-        costs = zip(self.checked.problem.trials, self.checked_costs, strict=True)
         each = self.pieces / len(self.trials)
-        return {t.name: np.sqrt(2.0 * cost / each + self.beyond) for t, cost in costs}
+        return {name: np.sqrt(2.0 * cost / each + self.beyond) for name, cost in self.unseen_by_trial.items()}
 
     @property
     def cost(self):
         return sum(self.fitted_costs) + sum(self.checked_costs)
-
-    @property
-    def excess(self):
-        return max(self.cost - 0.5 * self.pieces, 0.0)
 
     @property
     def by_trial(self):
@@ -167,80 +154,85 @@ def tried(effects, excess, *, unseen=0.5, conditions=8):
     return Tried(effects, fitted, (half + unseen * excess / conditions,) * conditions)
 
 
-def chosen(*candidates, suffices=lambda c: c.excess < 1.0, policy=POLICY, unseen=0, **more):
-    base = candidates[0]
-    trials = base.checked.problem.trials
-    split = SimpleNamespace(unseen=trials[len(trials) - unseen :], select=trials[: len(trials) - unseen])
-    return choose(Search(base, NoiseFloor({}), tuple(candidates), ()), split, policy, suffices, **more)
+def found(*candidates):
+    return Search(candidates[0], NoiseFloor({}), tuple(candidates), ())
+
+
+def worse(one, other, base=None, *, matters=True, policy=POLICY):
+    """Whether `one` is out because of `other`."""
+    among = found(base or tried((), 4000.0), one, other)
+    return Comparison(among, policy, lambda *_: matters).worse(one, other)
+
+
+def chosen(*candidates, matters=lambda one, other: True, policy=POLICY):
+    return choose(found(*candidates), policy, matters)
 
 
 def test_gain_an_effect_must_bring_more_than_chance():
-    base = tried((), 40.0)
-    enough = POLICY.gain
-    assert worth_adding(base, tried(("a",), 40.0 - 1.1 * enough), 1.0, POLICY)
-    assert not worth_adding(base, tried(("a",), 40.0 - 0.9 * enough), 1.0, POLICY)
+    least = POLICY.gain
+    assert worse(tried((), 40.0), tried(("a",), 40.0 - 1.1 * least), tried((), 40.0))
+    assert not worse(tried((), 40.0), tried(("a",), 40.0 - 0.9 * least), tried((), 40.0))
 
 
 def test_gain_counts_in_units_of_what_the_best_explanation_leaves():
-    base, larger = tried((), 40.0), tried(("a",), 40.0 - 1.1 * POLICY.gain)
-    assert not worth_adding(base, larger, 1.3, POLICY)
-
-
-def test_gain_per_piece_many_pieces_ask_for_more():
-    base, larger = tried((), 40.0), tried(("a",), 20.0)
-    assert worth_adding(base, larger, 1.0, POLICY)
-    base.pieces = larger.pieces = 1.1 * 20.0 / POLICY.gain_per_piece
-    assert not worth_adding(base, larger, 1.0, POLICY)
+    one, other = tried((), 1300.0), tried(("a",), 1000.0)
+    assert worse(one, other)
+    assert not worse(one, other, policy=replace(POLICY, gain=160.0)), "of 300, in units of twice the floor"
 
 
 def test_unseen_gain_part_of_the_gain_must_be_on_trials_that_were_not_fitted():
     base = tried((), 40.0, unseen=0.5)
-    assert worth_adding(base, tried(("a",), 20.0, unseen=0.8), 1.0, POLICY), "4 of the 20 gained"
-    assert not worth_adding(base, tried(("a",), 20.0, unseen=0.95), 1.0, POLICY), "1 of the 20 gained"
+    assert worse(base, tried(("a",), 20.0, unseen=0.8), base), "4 of the 20 gained"
+    assert not worse(base, tried(("a",), 20.0, unseen=0.95), base), "1 of the 20 gained"
 
 
 def test_an_effect_must_not_buy_small_residuals_with_large_ones():
     base, larger = tried((), 40.0), tried(("a",), 20.0)
-    assert worth_adding(base, larger, 1.0, POLICY)
+    assert worse(base, larger, base)
     larger.beyond = 10.0
-    assert not worth_adding(base, larger, 1.0, POLICY), "one walk that fails costs little where it is compressed"
+    assert not worse(base, larger, base), "one walk that fails costs little where it is compressed"
+
+
+def test_doubt_what_a_few_conditions_contradict_is_not_beyond_it():
+    """Better by 40 where half of the conditions is better by 15 and half worse by 5; and by 40 in all alike."""
+    base = Tried((), (62.5,) * 8, (80.0,) * 8)
+    mixed = Tried(("a",), (62.5,) * 8, (65.0,) * 4 + (85.0,) * 4)
+    alike = Tried(("a",), (62.5,) * 8, (75.0,) * 8)
+    assert mixed.cost == alike.cost
+    assert worse(base, alike, base)
+    assert not worse(base, mixed, base, policy=replace(POLICY, doubt=1e-3))
+
+
+def test_what_does_not_matter_is_not_worse():
+    assert worse(tried((), 1000.0), tried(("a",), 0.0))
+    assert not worse(tried((), 1000.0), tried(("a",), 0.0), matters=False)
 
 
 def test_share_an_effect_must_close_a_share_of_what_is_left():
     base = tried((), 1000.0)
-    assert worth_adding(base, tried(("a",), 1000.0 * (1 - 1.1 * POLICY.share)), 1.0, POLICY)
-    assert not worth_adding(base, tried(("a",), 1000.0 * (1 - 0.9 * POLICY.share)), 1.0, POLICY)
+    assert worse(base, tried(("a",), 1000.0 * (1 - 1.1 * POLICY.share)), base)
+    assert not worse(base, tried(("a",), 1000.0 * (1 - 0.9 * POLICY.share)), base)
 
 
 def test_share_of_gap_a_further_effect_that_closes_little_goes_into_the_remainder():
-    base, one = tried((), 10_000.0), tried(("a",), 500.0)
-    assert chosen(base, one, tried(("a", "b"), 500.0 - 1.2 * POLICY.share_of_gap * 10_000)).candidate.effects == (
-        "a",
-        "b",
-    )
-    assert chosen(base, one, tried(("a", "b"), 500.0 - 0.8 * POLICY.share_of_gap * 10_000)).candidate is one
+    """By mean squares, whatever the compressed cost says of it."""
+    base, one, least = tried((), 10_000.0), tried(("a",), 1500.0), POLICY.share_of_gap * 10_000
+    both = chosen(base, one, tried(("a", "b"), 1500.0 - 1.2 * least)).candidate
+    assert both.effects == ("a", "b")
+    assert chosen(base, one, tried(("a", "b"), 1500.0 - 0.8 * least)).candidate is one
+    base.beyond = 100.0
+    assert chosen(base, one, tried(("a", "b"), 1500.0 - 1.2 * least)).candidate is one
 
 
-def test_a_further_effect_that_leaves_nothing_is_named_however_little_it_closes():
-    base, one, two = tried((), 10_000.0), tried(("a",), 200.0), tried(("a", "b"), 0.0)
+def test_a_further_effect_that_halves_what_is_left_is_named_however_little_it_closes():
+    base, one, two = tried((), 10_000.0), tried(("a",), 200.0), tried(("a", "b"), 80.0)
     assert chosen(base, one, two).candidate is two
+    assert chosen(base, one, tried(("a", "b"), 120.0)).candidate is one
 
 
-def test_nothing_is_added_to_what_suffices():
+def test_nothing_is_added_to_what_is_accurate_enough():
     base, one, two = tried((), 1000.0), tried(("a",), 400.0), tried(("a", "b"), 0.0)
-    assert chosen(base, one, two, suffices=lambda c: c is one or c is two).candidate is one
-
-
-def test_what_outdoes_an_explanation_that_suffices_is_named():
-    base, one, two = tried((), 1000.0), tried(("a",), 400.0), tried(("b",), 300.0)
-    assert chosen(base, one, two, suffices=lambda c: True).candidate is base
-    assert chosen(base, one, two, suffices=lambda c: True, outdone=lambda held, c: c is one).candidate is one
-
-
-def test_an_effect_that_leaves_nothing_need_not_close_a_share_of_what_the_floor_is_wrong_by():
-    base, one = tried((), 1000.0), tried(("a",), 1000.0 * (1 - 0.5 * POLICY.share))
-    assert chosen(base, one, suffices=lambda c: False).candidate is base
-    assert chosen(base, one, suffices=lambda c: c is one).candidate is one
+    assert chosen(base, one, two, matters=lambda c, other: c is base).candidate is one
 
 
 def test_an_effect_without_which_unfitted_conditions_are_predicted_as_well_is_not_supported():
@@ -251,11 +243,10 @@ def test_an_effect_without_which_unfitted_conditions_are_predicted_as_well_is_no
 
 def test_an_effect_that_takes_large_residuals_away_is_supported_though_compressed_they_cost_little():
     base, one = tried((), 1000.0), tried(("a",), 400.0)
-    fewer = tuple(c - 30.0 for c in one.fitted_costs)
-    two = Tried(("a", "b"), fewer, (*(c - 10.0 for c in one.checked_costs[:4]), *one.checked_costs[4:]))
-    assert chosen(base, one, two, unseen=4).candidate is one
-    one.beyond = 10.0
-    assert chosen(base, one, two, unseen=4).candidate is two
+    two = tried(("a", "b"), 340.0)
+    assert chosen(base, one, two).candidate is one
+    base.beyond, one.beyond = 30.0, 10.0
+    assert chosen(base, one, two).candidate is two
 
 
 def test_confusable_an_exchange_is_named_where_it_is_probable():
@@ -266,29 +257,62 @@ def test_confusable_an_exchange_is_named_where_it_is_probable():
     assert rival_at(10.0) == ()
 
 
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_support_belongs_to_a_group_that_the_data_cannot_tell_apart(count):
+    rivals = [tried((f"same_{k}",), 0.0) for k in range(count)]
+    choice = chosen(tried((), 1000.0), *rivals)
+    assert choice.probability["same_0"] > 0.99
+    assert choice.confusable_with["same_0"] == tuple(f"same_{k}" for k in reversed(range(1, count)))
+
+
+def test_of_two_pairs_that_explain_alike_each_effect_could_be_either_of_the_other_pair():
+    choice = chosen(tried((), 1000.0), tried(("a", "b"), 0.0), tried(("c", "d"), 0.0))
+    assert set(choice.probability.values()) == {1.0}
+    assert choice.confusable_with == {"a": ("c", "d"), "b": ("c", "d")}
+
+
+def test_a_small_set_with_an_effect_that_nothing_supports_is_not_chosen_for_being_small():
+    """d imitates b and c; all of the weight is on the three that are true."""
+    base, false = tried((), 10_000.0), tried(("a", "d"), 300.0)
+    pair, true = tried(("a", "b"), 700.0), tried(("a", "b", "c"), 200.0)
+    choice = chosen(base, false, pair, true)
+    assert choice.candidate is true
+    assert min(choice.probability.values()) > 0.99
+
+
+def test_supported_an_effect_is_in_most_of_the_weight():
+    base, small, large = tried((), 10_000.0), tried(("d",), 6.0), tried(("a", "b"), 0.0)
+    assert chosen(base, small, large).candidate is small, "it may be as good"
+    small, large = tried(("d",), 220.0), tried(("a", "b"), 200.0)
+    assert chosen(base, small, large).candidate is large
+    assert chosen(base, small, large, policy=replace(POLICY, supported=0.0)).candidate is small
+
+
 def test_a_chosen_set_in_a_better_minimum_stands_for_what_was_tried_of_it():
     base, lost, both = tried((), 1000.0), tried(("a",), 900.0), tried(("b", "a"), 30.0)
-    found = weigh(Search(base, NoiseFloor({}), (base, lost, both), ()), tried(("a",), 0.0), POLICY)
-    assert found.probability["a"] > 0.99
-    assert found.weights["a",] > 0.99
+    choice = weigh(found(base, lost, both), tried(("a",), 0.0), POLICY)
+    assert choice.probability["a"] > 0.99
+    assert choice.weights["a",] > 0.99
 
 
-def test_probability_is_not_sure_of_what_differs_from_condition_to_condition():
+def test_weights_are_not_sure_of_what_differs_from_condition_to_condition():
     """Two explanations, one better by e^60 in all: in one condition far better, in the others a little worse."""
     base = tried((), 4000.0)
     a = Tried(("a",), (62.5 - 80.0 + 100, *(62.5 + 100,) * 7), (62.5 + 100,) * 8)
     b = Tried(("b",), (62.5 + 100, *(62.5 + 98.7,) * 7), (62.5 + 98.7,) * 8)
     assert b.cost - a.cost > 60
-    found = chosen(base, a, b)
-    assert found.candidate is a
-    assert 0.5 < found.probability["a"] < 0.99
+    choice = chosen(base, a, b)
+    assert choice.candidate is a
+    assert 0.5 < choice.weights["a",] < 0.99
+    assert choice.confusable_with["a"] == ("b",)
 
 
 def test_implausible_costs_as_stated_half_a_range_outside():
     parameter = SimpleNamespace(name="mass_kg", plausible=(1.0, 3.0))
     for value, cost in ((3.0, 0.0), (4.0, POLICY.implausible), (0.0, POLICY.implausible)):
         fitted = SimpleNamespace(structure=SimpleNamespace(parameters=[parameter]), theta={"mass_kg": value})
-        assert implausibility(fitted) == pytest.approx(cost)
+        assert implausibility(fitted, POLICY) == pytest.approx(cost)
+        assert implausibility(fitted, replace(POLICY, implausible=0.0)) == 0.0
 
 
 # --- How far is the search worth its time? ---
@@ -313,7 +337,7 @@ def test_effects_are_begun_anew_where_the_base_leaves_much(monkeypatch):
 def test_a_spared_condition_is_never_fitted():
     trials = [Record(f"{c}_{r}", "steps", c, np.zeros(3), {}) for c in range(5) for r in range(3)]
     split = split_trials(trials, spare=[("steps", 3)])
-    assert {t.condition for t in split.unseen} == {3}
+    assert {t.name for t in split.unseen} == {"3_0", "3_1"}
     assert not {t.condition for t in split.known} & {3}
-    assert {t.name for t in split.conditions} == {"3_0", "3_1", "3_2"}
+    assert {t.name for t in split.conditions} == {"3_2"}, "and of it, too, something informs no choice"
     assert len(split.repeats) == 4

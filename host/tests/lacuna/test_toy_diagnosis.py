@@ -97,7 +97,9 @@ def test_final_trials_inform_nothing():
         if trial.name in final:
             trial.channels["position_mm"][:] = draw.standard_normal(len(trial.time_s))
     again = diagnose(system)
-    assert [e.parameters for e in again.effects] == [e.parameters for e in found.effects]
+    assert [(c.effects, c.cost) for c in again.search.tried] == [(c.effects, c.cost) for c in found.search.tried]
+    assert again.choice.weights == found.choice.weights
+    assert again.explained.structure.effects == (), "but what they contradict is not named"
 
 
 def test_record_has_the_agreed_form():

@@ -1,0 +1,119 @@
+"""Systems on which the engine's logic was once wrong, rewritten with invented numbers: each says what is true."""
+
+import numpy as np
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.coordinates import LIMITS
+from lacuna.diagnosis.split import middle_conditions, split_trials
+from lacuna.system import Record
+
+GAIN = [Parameter("gain", "1", 1.0, 0.1, 10.0)]
+
+
+def test_rivals_that_are_the_same_mechanism_are_named_as_a_group():
+    def simulate(record, theta):
+        u, square = record["u"], sum(v for k, v in theta.items() if k.startswith("square"))
+        return {"y": theta.gain * u + square * u**2}
+
+    draw, records = np.random.default_rng(0), []
+    for _ in range(10):
+        u = draw.uniform(0, 3) * np.sin(np.linspace(0, 20, 200)) + draw.normal(0, 0.3)
+        y = 2.0 * u + 0.3 * u**2 + 0.05 * draw.standard_normal(200)
+        records.append({"time_s": np.arange(200.0), "u": u, "y": y})
+    effects = [Effect(f"square_{k}", Parameter("per", "1", 0.3, -5.0, 5.0)) for k in range(3)]
+    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, progress=False)
+    (named,) = found.effects
+    assert {named.name, *named.confusable_with} == {"square_0", "square_1", "square_2"}
+    assert named.probability > 0.99
+    assert found.theta[f"{named.name}.per"] == named.parameters["per"], "one fit is told"
+
+
+def test_nothing_is_named_that_predicts_what_chose_nothing_worse():
+    def simulate(record, theta):
+        return {"y": theta.gain * record["u"] + theta.offset.y}
+
+    draw, records = np.random.default_rng(0), []
+    for n in range(10):
+        u = np.sin(np.linspace(0, 20, 200)) + draw.normal(0, 0.3, 200)
+        y = 2.0 * u + (-0.6 if n in (4, 9) else 1.0) + 0.05 * draw.standard_normal(200)
+        records.append({"time_s": np.arange(200.0), "u": u, "y": y})
+    system = lacuna.System(simulate, GAIN, [Effect("offset", Parameter("y", "1", 1.0, -5.0, 5.0))])
+    found = lacuna.diagnose(system, records, progress=False)
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert "those that chose nothing (record 5, record 10) worse than without" in found.warnings[0]
+
+
+def test_what_is_in_every_set_of_weight_is_named_however_little_is_closed_by_the_rest():
+    """a, b and c are true, besides something that nothing explains; d, which is false, is much like b + c/2."""
+    t, draw, records = np.linspace(0, 20, 300), np.random.default_rng(0), []
+
+    def simulate(record, theta):
+        a, b, c = (record[k] for k in "abc")
+        d = b + 0.44 * c + 0.15 * record["level"] * np.cos(7 * t)
+        return {
+            "y": theta.gain * record["u"] + theta.a.size * a + theta.b.size * b + theta.c.size * c + theta.d.size * d
+        }
+
+    for level in (1.0, 2.0, 3.0, 4.0):
+        u, a = np.sin(t), np.sign(np.cos(t))
+        b, c = level * a * np.cos(3 * t), level * np.cos(5 * t)
+        for _ in range(3):
+            y = u + 10 * a + 0.8 * b + 0.35 * c + 0.3 * level * np.cos(9 * t) + 0.1 * draw.standard_normal(len(t))
+            records.append(
+                {"time_s": t, "u": u, "a": a, "b": b, "c": c, "y": y, "level": level, "condition": f"{level:g}"}
+            )
+    effects = [Effect(k, Parameter("size", "1", 1.0, -30.0, 30.0)) for k in "abcd"]
+    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, progress=False)
+    assert found.verdict == "identified"
+    assert found.effects[0].name == "a"
+    assert {e.name for e in found.effects} <= {"a", "b", "c"}
+    assert all(e.share_of_gap >= 0.0 for e in found.effects)
+
+
+def test_an_effect_that_the_model_never_uses_is_pointed_out():
+    def simulate(record, theta):
+        return {"y": theta.gain * record["u"] + theta.used.per * record["u"] ** 2}
+
+    draw, records = np.random.default_rng(0), []
+    for _ in range(6):
+        u = draw.uniform(-1, 1, 100)
+        records.append({"time_s": np.arange(100.0), "u": u, "y": 2.0 * u + 0.05 * draw.standard_normal(100)})
+    effects = [Effect(name, Parameter("per", "1", 0.3, -5.0, 5.0)) for name in ("used", "forgotten")]
+    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, progress=False)
+    assert [w for w in found.warnings if "changes no prediction" in w] == [
+        "Effect forgotten changes no prediction, at none of its sizes that fits begin at: does the model use it, and do"
+        " these records reach it?"
+    ]
+
+
+def test_fits_with_a_limit_begin_where_it_is_declared_and_on_both_sides_of_it():
+    assert 1.0 in LIMITS
+    assert min(LIMITS) < 1.0 < max(LIMITS)
+    limit = Effect("clip", Parameter("limit_V", "V", 10.0, 3.0, np.inf), absent=np.inf)
+    plain = Effect("drag", Parameter("per", "1", 0.1, 0.0, 1.0))
+    own = Effect("clip", Parameter("limit_V", "V", 10.0, 3.0, np.inf), absent=np.inf, start_factors=(0.5,))
+    begins = [
+        lacuna.System(lambda r, t: r.time_s, GAIN, [e]).effects[e.name].start_factors for e in (limit, plain, own)
+    ]
+    assert begins == [LIMITS, (0.1, 0.4, 1.2), (0.5,)]
+
+
+def test_of_three_repeated_conditions_the_middle_one_is_never_fitted_unless_one_says_which():
+    t = np.linspace(0.0, 1.0, 20)
+    trials = [
+        Record(f"{c}{k}", "run", c, t, {"y": level + t})
+        for c, level in (("c", 3), ("a", 1), ("b", 2))
+        for k in range(3)
+    ]
+    assert middle_conditions(trials) == (("run", "b"),)
+    assert middle_conditions(trials[:6]) == ()
+    split = split_trials(trials, middle_conditions(trials))
+    assert {t.condition for t in split.known} == {"a", "c"}
+    assert [t.name for t in split.conditions] == ["b2"]
+
+
+def test_many_repeats_are_dealt_out_in_thirds():
+    t = np.linspace(0.0, 1.0, 20)
+    split = split_trials([Record(f"{k}", "run", "c", t, {"y": t}) for k in range(12)])
+    assert [len(part) for part in (split.fit, split.select, split.final)] == [4, 4, 4]

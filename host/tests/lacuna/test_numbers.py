@@ -1,0 +1,150 @@
+"""What records and models are like that nobody was careful with: rounded, sampled unevenly, run away."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.estimation.autocorrelation import correlation_samples
+from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
+from lacuna.estimation.problem import Problem, View
+from lacuna.estimation.sampling import even_grid, evenly
+from lacuna.estimation.structure import Structure
+from lacuna.run import with_records
+
+FLOOR = NoiseFloor({("run", "y"): ChannelNoise(0.1, 0.0, 1.0, 0)})
+
+
+def line(record, theta):
+    return {"y": theta.slope * record.time_s}
+
+
+def system(simulate=line, effects=()):
+    return lacuna.System(simulate, [Parameter("slope", "", 1.0, -50.0, 50.0)], effects, outputs="y")
+
+
+# --- Rounding ---
+
+
+def floor_of(samples, **more):
+    trials = with_records(system(), [{"time_s": np.arange(float(len(samples))), "y": samples}] * 2).trials
+    return estimate_noise(system(), trials, **more).channels["run", "y"].sd
+
+
+@given(st.floats(1e-6, 1e3), st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_a_floor_is_at_least_what_rounding_leaves(step, seed):
+    draw = np.random.default_rng(seed)
+    slow = np.cumsum(draw.standard_normal(400)) * 0.3
+    rounded = step * np.round(slow)
+    if len(np.unique(rounded)) > 2:
+        assert floor_of(rounded) >= 0.999 * step / np.sqrt(12.0)
+
+
+def test_a_record_that_was_not_rounded_has_no_rounding():
+    draw = np.random.default_rng(0)
+    assert floor_of(np.sin(np.linspace(0, 9, 400)) + 1e-3 * draw.standard_normal(400)) < 1.5e-3
+    again = np.tile(np.sin(np.linspace(0, 2 * np.pi, 20, endpoint=False)), 20)  # the same values, and no grid
+    assert floor_of(again, residuals={"record 1": {"y": 0 * again}, "record 2": {"y": 0 * again}}) < 1e-3
+
+
+def test_an_exact_model_of_a_rounded_record_lacks_nothing():
+    draw = np.random.default_rng(1)
+
+    def settling(record, theta):
+        return {"y": theta.slope * (1 - np.exp(-record.time_s / 80.0)) + theta.bend.per * record.time_s**2}
+
+    times = np.arange(300.0)
+    records = [
+        {"time_s": times, "k": k, "y": np.round((1.3 + 1e-9 * draw.random()) * (1 - np.exp(-times / 80.0)), 2)}
+        for k in range(6)
+    ]
+    one = system(settling, [Effect("bend", Parameter("per", "", 1e-6, -1e-3, 1e-3))])
+    assert lacuna.diagnose(one, records, progress=False).verdict == "none"
+
+
+# --- Uneven sampling ---
+
+
+def test_even_times_stay_as_they_are_and_uneven_ones_become_even():
+    even = np.arange(50) * 0.1
+    assert even_grid(even) is None
+    assert even_grid(even + 0.002 * np.sin(even)) is None
+    uneven = np.sort(np.random.default_rng(0).uniform(0, 5, 80))
+    np.testing.assert_allclose(
+        evenly(uneven, 3.0 * uneven + 1.0), 3.0 * np.linspace(uneven[0], uneven[-1], 80) + 1.0, rtol=1e-9
+    )
+
+
+def test_samples_on_either_side_of_a_gap_are_no_neighbours():
+    """Two stretches of a slow trace, far apart: joined, they would be one that remembers itself over the gap."""
+    draw = np.random.default_rng(2)
+    parts = [np.convolve(draw.standard_normal(2000), np.ones(20), mode="same") / 4.5 for _ in range(2)]
+    gap = np.full(300, np.nan)
+    assert correlation_samples([np.concatenate([parts[0], gap, parts[1]])]) == pytest.approx(
+        correlation_samples(parts), rel=0.05
+    )
+    period = np.sin(2 * np.pi * np.arange(60) / 60.0)  # half a period is missing, and again, and again
+    holes = np.where(np.arange(6000) % 60 < 30, np.tile(period, 100), np.nan)
+    halves = holes[np.isfinite(holes)]
+    assert correlation_samples([holes]) != pytest.approx(correlation_samples([halves]), rel=0.2)
+
+
+def blurred(time_s, y):
+    record = {"time_s": time_s, "y": y}
+    (trial,) = with_records(system(), [record]).trials
+    problem = Problem(Structure(system()), [trial], FLOOR, View(1 / 20, 30.0, 30.0))
+    (found,) = problem.residuals(problem.start())
+    return found
+
+
+def test_a_low_pass_is_one_in_time_whatever_the_sampling():
+    """A pulse that is measured densely, or as densely as the rest, blurs alike."""
+    even = np.linspace(0, 10, 1001)
+    dense = np.sort(np.concatenate([np.linspace(0, 4, 101), np.linspace(4, 6, 900)[1:], np.linspace(6, 10, 101)[1:]]))
+
+    def pulse(time_s):
+        return time_s + 2.0 * np.exp(-(((time_s - 5.0) / 0.05) ** 2))
+
+    a, b = blurred(even, pulse(even)), blurred(dense, pulse(dense))
+    assert np.abs(a).max() == pytest.approx(np.abs(b).max(), rel=0.1)
+    assert np.sum(a**2) == pytest.approx(np.sum(b**2), rel=0.15)
+
+
+def test_uneven_records_are_diagnosed():
+    draw = np.random.default_rng(3)
+
+    def bent(record, theta):
+        return {"y": theta.slope * record.time_s + theta.bend.per * record.time_s**2}
+
+    records = []
+    for k in range(8):
+        time_s = np.sort(draw.uniform(0.0, 3.0 + 0.2 * k, 150))
+        records.append({"time_s": time_s, "y": 2.0 * time_s + 0.4 * time_s**2 + 0.1 * draw.standard_normal(150)})
+    found = lacuna.diagnose(
+        system(bent, [Effect("bend", Parameter("per", "", 0.3, -5.0, 5.0))]), records, progress=False
+    )
+    assert [e.name for e in found.effects] == ["bend"]
+
+
+# --- Models that run away ---
+
+
+@pytest.mark.parametrize("beyond", [1e30, 1e160, 1e200, 1.7e308, np.inf, -np.inf, np.nan])
+def test_a_model_that_runs_away_beyond_a_border_ends_in_a_verdict(beyond):
+    def simulate(record, theta):
+        u, soft = record["u"], theta.soft.per
+        y = theta.slope * u + soft * u**3
+        return {"y": np.where(np.abs(soft * u**2) > 1.0, beyond * np.sign(u), y)}
+
+    draw, records = np.random.default_rng(0), []
+    for _ in range(10):
+        u = 1.5 * np.sin(np.linspace(0, 20, 200)) + draw.normal(0, 0.1)
+        y = 2.0 * u + 0.2 * u**3 + 0.01 * draw.standard_normal(200)
+        records.append({"time_s": np.arange(200.0), "u": u, "y": y})
+    one = system(simulate, [Effect("soft", Parameter("per", "1", 0.3, -5.0, 5.0))])
+    found = lacuna.diagnose(one, records, progress=False)
+    assert [e.name for e in found.effects] == ["soft"]
+    assert found.effects[0].parameters["per"] == pytest.approx(0.2, rel=0.02)
