@@ -47,15 +47,17 @@ class Choice:
 
 
 def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
-    """The smallest set that predicts no worse than the best one. What does so surely, if by little, has to be a part of
+    """The smallest set that predicts no worse than any other. What does so surely, if by little, has to be a part of
     what explains: of which every effect, or what may stand in its place, has most of the weight behind it.
     `matters(one, other)`: whether what the other predicts better is more than the accuracy that counts."""
     against = Comparison(search, policy, matters)
-    best = min((*search.tried, *search.freed), key=lambda c: c.cost)
-    held = [c for c in search.tried if not against.outdone(c, best)]
+    everything = sorted((*search.tried, *search.freed), key=lambda c: c.cost)
+    best = everything[0]
+    held = [c for c in search.tried if not any(against.outdone(c, other) for other in everything)]
     held.sort(key=lambda c: (len(c.effects), against.form(c).cost))
     weights = _weights(_compared(search, best), against.dispersion)
-    chosen = next((c for c in held if not against.surely(c, best) or _supported(c, weights, policy)), held[0])
+    chosen = next((c for c in held if not against.surely(c, best) or _supported(c, weights, policy)), None)
+    chosen = chosen or (held[0] if held else best)
     while (smaller := _without_one(chosen, search, against)) is not None:
         chosen = smaller
     return weigh(search, chosen, policy)
