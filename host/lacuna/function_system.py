@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from lacuna.coordinates import PLAIN, Coordinate, of_effect, of_parameter
-from lacuna.diagnosis.split import middle_conditions
 from lacuna.errors import DeclarationError, LacunaError, MisuseError
 from lacuna.records import Stretch
 from lacuna.system import (
@@ -27,6 +26,7 @@ from lacuna.system import (
     Record,
     System,
     Theta,
+    middle_conditions,
 )
 from lacuna.values import Values
 

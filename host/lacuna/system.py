@@ -10,6 +10,7 @@ name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
@@ -163,6 +164,18 @@ def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
     for trial in trials:
         groups.setdefault((trial.experiment, trial.condition), []).append(trial)
     return list(groups.values())
+
+
+def middle_conditions(trials: Sequence[Record], fewest: int = 3) -> tuple[tuple[str, Hashable], ...]:
+    """Of each experiment with so many repeated conditions the one between the others, by the mean of what was measured
+    first: what is never fitted where nobody has said what should be."""
+    means: dict[str, dict[Hashable, float]] = defaultdict(dict)
+    for members in groups_of_repeats(trials):
+        if len(members) > 1:
+            samples = np.concatenate([next(iter(t.channels.values())) for t in members])
+            means[members[0].experiment][members[0].condition] = float(np.nanmean(samples))
+    many = {experiment: each for experiment, each in means.items() if len(each) >= fewest}
+    return tuple((experiment, sorted(each, key=each.get)[len(each) // 2]) for experiment, each in many.items())
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
     from bifa.report.evidence import BASE, COMPLETED
     from lacuna.estimation.fit import evaluate_on
 
-    trials = found.split.held_out
+    trials = found.split.not_fitted
     models = {BASE: found.base} | ({} if found.verdict == "none" else {COMPLETED: found.final})
     predictions = {name: evaluate_on(fit, trials).predictions() for name, fit in models.items()}
     return compared_curves(trials, predictions, labels)

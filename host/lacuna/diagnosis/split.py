@@ -6,9 +6,7 @@ from collections import defaultdict
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from lacuna.system import Record, groups_of_repeats
+from lacuna.system import Record
 
 
 @dataclass(frozen=True)
@@ -98,15 +96,3 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
 
 def _channels(trial: Record) -> set[tuple[str, str]]:
     return {(trial.experiment, channel) for channel in trial.channels}
-
-
-def middle_conditions(trials: Sequence[Record], fewest: int = 3) -> tuple[tuple[str, Hashable], ...]:
-    """Of each experiment with so many repeated conditions the one between the others, by the mean of what was measured
-    first: what is never fitted where nobody has said what should be."""
-    means: dict[str, dict[Hashable, float]] = defaultdict(dict)
-    for members in groups_of_repeats(trials):
-        if len(members) > 1:
-            samples = np.concatenate([next(iter(t.channels.values())) for t in members])
-            means[members[0].experiment][members[0].condition] = float(np.nanmean(samples))
-    many = {experiment: each for experiment, each in means.items() if len(each) >= fewest}
-    return tuple((experiment, sorted(each, key=each.get)[len(each) // 2]) for experiment, each in many.items())

@@ -5,8 +5,8 @@ import numpy as np
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.coordinates import LIMITS
-from lacuna.diagnosis.split import middle_conditions, split_trials
-from lacuna.system import Record
+from lacuna.diagnosis.split import split_trials
+from lacuna.system import Record, middle_conditions
 
 GAIN = [Parameter("gain", "1", 1.0, 0.1, 10.0)]
 
