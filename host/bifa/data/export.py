@@ -106,6 +106,13 @@ def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, 
     return time_s[1:][high[1:] & ~high[:-1]]
 
 
+def dated_edges(export: Export, sheet: Sheet, rows: np.ndarray, edges: Sheet) -> np.ndarray:
+    """Edges of a file of their own, [s] since the record's first row, where both write dates."""
+    first = _date_cells(sheet, export.columns.get("time_s", "time_s"))[rows[0]]
+    cells = _date_cells(edges, "sync_time_s")
+    return _seconds(edges, export, [first, *cells], "sync_time_s")[1:]
+
+
 def _rows(sheet: Sheet, export: Export) -> np.ndarray:
     keep = np.ones(len(sheet), bool)
     for name, value in export.where.items():
@@ -149,8 +156,15 @@ def _scale(export: Export, name: str) -> float:
 
 def _dates(sheet: Sheet, export: Export, source: str) -> np.ndarray:
     """Of one column, or of several that make one date together ("Date + Time")."""
+    return _seconds(sheet, export, _date_cells(sheet, source), source)
+
+
+def _date_cells(sheet: Sheet, source: str) -> list[str]:
     parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
-    cells = [" ".join(part) for part in zip(*parts, strict=True)]
+    return [" ".join(part) for part in zip(*parts, strict=True)]
+
+
+def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.ndarray:
     zone = zone_of(export.zone) if export.zone else None
     if (row := first_that_is_none(cells, export.date_format, zone)) is not None:
         form = f"of the form {export.date_format!r}" if export.date_format else "as ISO 8601 writes it"

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
-from bifa.data.export import OWN_NAMES, Export, read_export, sync_edges
+from bifa.data.clocks import DATE
+from bifa.data.export import OWN_NAMES, Export, dated_edges, read_export, sync_edges
 from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
 from bifa.data.sheet import Sheet
@@ -126,9 +127,11 @@ def read_instrument(
             del columns[_TAIL]
         else:
             _refuse_gaps(path, columns, (_TAIL,), _LOST, lines)
-    if export is None or export.needs_sync_file:
+    if export is None or (export.needs_sync_file and export.units.get("time_s") != DATE):
         return columns, _read_edges(sync_file(path))
     try:
+        if export.needs_sync_file:
+            return columns, dated_edges(export, sheet, rows, Sheet(sync_file(path)))
         return columns, sync_edges(export, columns, sheet, rows)
     except DatasetError as error:
         raise InstrumentFileError(str(error)) from None

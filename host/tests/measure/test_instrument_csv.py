@@ -1,16 +1,22 @@
 """A lab's own instrument: its CSV lined up with the Uno's telemetry, and every way in which that can fail."""
 
 from dataclasses import replace
+from datetime import datetime, timedelta
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
 
+from bifa.data.export import parse_exports
+from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import MARK_PAUSE
 from bifa.measure.instrument_csv import InstrumentFileError, import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import open_rig
+from bifa.toml import parse_toml
+from harness.exports import EXPORTS, MACHINES, preset_of
 
 PULL = PlannedTrial("anchor_pull", None, 8.5, 20.0)
 OFFSET_S, DRIFT = 37.2, 4e-5  # instrument = OFFSET_S + (1 + DRIFT) * (Uno's time)
@@ -284,3 +290,84 @@ def test_a_code_for_no_value_is_no_value(files, code):
     (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{code},{force}", *lines[41:]]))
     with pytest.raises(InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ stands for no"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
+
+
+# -- declared exports ---------------------------------------------------------------------------------------------
+
+
+def declared(text):
+    source = Source(text, 0, "bench.toml")
+    return parse_exports(Fields(parse_toml(text)["instrument"], source, table="instrument"), source)["machine"]
+
+
+def pulled(files):
+    """The columns of the pull, and the edges."""
+    return read_instrument(files / "pull.csv", ("displacement_mm", "force_N"))
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_an_export_comes_in_by_preset_as_the_data_sets_own_form_does(files, name):
+    own, _ = import_trial(files / "pull.csv", files, PULL, files / "own")
+    columns, edges = pulled(files)
+    path = files / f"export{EXPORTS[name].suffix}"
+    path.write_bytes(EXPORTS[name].write(columns))
+    write(path.with_suffix(".sync.csv"), {"sync_time_s": edges})
+    export = declared(f'[instrument.machine]\npreset = "{preset_of(name)}"\n')
+    other, clock = import_trial(path, files, PULL, files / "out", export=export)
+    assert clock.rms_s < 1e-5
+    for column, values in own.trials[0].columns.items():
+        np.testing.assert_allclose(other.trials[0].columns[column], values, atol=2e-3)
+
+
+FORM = """[instrument.machine]
+columns = { time_s = "t", displacement_mm = "x", force_N = "F" }
+units = { time_s = "s", displacement_mm = "mm", force_N = "N" }
+"""
+
+
+def test_a_clock_of_dates_has_its_edges_as_dates(files):
+    columns, edges = pulled(files)
+    begin = datetime(2026, 11, 25, 10, 0, 0, tzinfo=ZoneInfo("Europe/Berlin"))
+
+    def dates(times_s):
+        return [(begin + timedelta(seconds=float(t))).isoformat() for t in times_s]
+
+    rows = zip(dates(columns["time_s"]), columns["displacement_mm"], columns["force_N"], strict=True)
+    (files / "dated.csv").write_text("t,x,F\n" + "".join(f"{t},{x},{force}\n" for t, x, force in rows))
+    (files / "dated.sync.csv").write_text("sync_time_s\n" + "\n".join(dates(edges)))
+    export = declared(FORM.replace('time_s = "s"', 'time_s = "date"'))
+    dataset, clock = import_trial(files / "dated.csv", files, PULL, files / "out", export=export)
+    assert clock.rms_s < 1e-5
+    own, _ = import_trial(files / "pull.csv", files, PULL, files / "own")
+    for column, values in own.trials[0].columns.items():
+        np.testing.assert_allclose(dataset.trials[0].columns[column], values, atol=1e-5)
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_frames_that_the_strobe_triggers_line_themselves_up(files):
+    """The camera's own stamps show the pause; it is frame-exact, and no second file is needed."""
+    _, edges = pulled(files)
+    (files / "take.csv").write_text("t,x,F\n" + "".join(f"{t:.6f},{20 * max(0, t - 40):.4f},1\n" for t in edges))
+    export = declared(FORM + 'sync = "frames"\n')
+    _, clock = import_trial(files / "take.csv", files, PULL, files / "out", export=export)
+    assert clock.rms_s < 1e-5
+    assert not (files / "take.sync.csv").exists()
+    frames = FORM.replace('time_s = "s"', 'time_s = "frame"') + 'sync = "frames"\nrate_hz = 100\n'
+    text = "t,x,F\n" + "".join(f"{k},{20 * max(0, k / 100 - 5):.4f},1\n" for k in range(len(edges)))
+    (files / "take.csv").write_text(text)
+    with pytest.raises(InstrumentFileError, match="pause"):  # counted frames hide it: nothing tells which is which
+        import_trial(files / "take.csv", files, PULL, files / "other", export=declared(frames))
+
+
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_a_strobe_in_a_column_lines_the_record_up(files):
+    _, edges = pulled(files)
+    time_s = np.arange(edges[0] - 0.5, edges[-1], 0.001)
+    since = time_s - edges[np.clip(np.searchsorted(edges, time_s, "right") - 1, 0, None)]
+    volts = np.where((since >= 0) & (since < 0.0026), 5.0, 0.0)
+    rows = zip(time_s, 20 * np.clip(time_s - 40.0, 0.0, 2.0), volts, strict=True)
+    (files / "daq.txt").write_text("t\tx\tF\tD10\n" + "".join(f"{t:.6f}\t{x:.4f}\t1\t{v}\n" for t, x, v in rows))
+    export = declared(FORM + 'separator = "tab"\nsync = { column = "D10" }\n')
+    _, clock = import_trial(files / "daq.txt", files, PULL, files / "out", export=export)
+    assert clock.rms_s < 1e-3
+    assert clock.offset_s == pytest.approx(-OFFSET_S, abs=2e-3)
