@@ -1,5 +1,6 @@
 """Files as instruments write them: each named program by its preset, each key of a declaration, faults by cell."""
 
+import re
 import tempfile
 from contextlib import suppress
 from datetime import datetime, timedelta
@@ -301,3 +302,13 @@ def test_a_data_set_reads_exports_as_they_came(tmp_path):
     path.write_text("\r\n".join([*lines, "0,01;1;1;1"]), encoding="cp1252")
     with pytest.raises(DatasetError, match=r"raw/one\.TRA, line 5, column time_s: time goes backwards"):
         read_dataset(tmp_path)
+
+
+@pytest.mark.parametrize("page", ["bench.md", "data-format.md"])
+def test_the_declarations_of_the_pages_are_valid(page):
+    text = (Path(__file__).parents[3] / "docs" / page).read_text(encoding="utf-8")
+    blocks = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "[instrument." in block]
+    assert blocks
+    for block in blocks:
+        source = Source(block, 0, page)
+        assert parse_exports(Fields(parse_toml(block)["instrument"], source, table="instrument"), source)
