@@ -17,11 +17,13 @@ from bifa.measure.instrument_csv import read_columns
 
 SECONDS_ALLOWED = 2.0
 NAMES = EXPERIMENTS["locomotion"].all_columns
-IMPORTS = "import pathlib; from bifa.data import read_dataset; from bifa.measure.instrument_csv import read_columns"
+IMPORTS = "import pathlib, lacuna.records; from bifa.data import read_dataset; "
+IMPORTS += "from bifa.measure.instrument_csv import read_columns"
 READERS = {
     "numpy": "numpy.loadtxt(file, delimiter=',', skiprows=1)",
     "pandas": "pandas.read_csv(file)",
     "data set": "read_dataset(sys.argv[1])",
+    "lacuna": "lacuna.records.read(pathlib.Path(file))",
     "telemetry": "read_columns(pathlib.Path(file), ('time_s',))",
 }
 GAIT = {"period_s": 5.7, "psi12_deg": 270, "psi13_deg": 90, "duty_body": 0.5, "duty_head": 0.5, "duty_tail": 0.5}

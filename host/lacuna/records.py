@@ -21,6 +21,7 @@ _TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 100
 _LABELS = ("name", "experiment", "condition", "order")
 _FEWEST = 8  # samples of a stretch
 _MOST_NAMED = 8  # columns in a message
+_NUMERIC = b"0123456789+-.eE, \t\r\n"
 _TRUTHS = {"true": 1.0, "false": 0.0}
 
 
@@ -298,6 +299,36 @@ def _refuse_settings(tables: Mapping[str, Table]) -> None:
 
 
 def _csv(file: Path) -> Table:
+    columns = _numbers_alone(file) or _cell_by_cell(file)
+    return _table({"condition": _stem(file.stem)[0]} | columns, file.stem)
+
+
+def _numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
+    """The columns of a file that has one line of names and below it plain numbers only, which NumPy reads at a tenth
+    of the cost; None of any other, which is gone through cell by cell."""
+    with file.open("rb") as lines:
+        names = next(csv.reader([lines.readline().decode("utf-8-sig", "replace")], skipinitialspace=True), [])
+        names = [name.strip() for name in names]
+        begin = lines.tell()
+        written = False
+        for block in iter(lambda: lines.read(1 << 20), b""):
+            if block.translate(None, _NUMERIC):
+                return None
+            written = written or bool(block.strip())
+        if not names or not written:
+            return None
+        lines.seek(begin)
+        try:
+            values = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+        except ValueError:
+            return None
+    plain = all(names) and len(set(names)) == len(names) and not any(_number(name) is not None for name in names)
+    if not plain or names[0].startswith("#") or values.shape[1] != len(names) or not np.isfinite(values).all():
+        return None
+    return {name: values[:, place].copy() for place, name in enumerate(names)}
+
+
+def _cell_by_cell(file: Path) -> dict[str, np.ndarray]:
     (_, names), *rows = _lines(file)
     names = [name.strip() for name in names]
     for mark, what in ((";", "semicolons"), ("\t", "tabs")):
@@ -314,8 +345,7 @@ def _csv(file: Path) -> Table:
     if twice := [name for name in names if names.count(name) > 1]:
         raise RecordError(f"{file.name} has more than one column {twice[0]!r}: give each its own name.")
     lines, cells = [line for line, _ in rows], zip(*(row for _, row in rows), strict=True)
-    columns = {name: _typed(column, file, lines, name) for name, column in zip(names, cells, strict=True)}
-    return _table({"condition": _stem(file.stem)[0]} | columns, file.stem)
+    return {name: _typed(column, file, lines, name) for name, column in zip(names, cells, strict=True)}
 
 
 def _lines(file: Path) -> list[tuple[int, list[str]]]:

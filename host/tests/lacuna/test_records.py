@@ -1,12 +1,15 @@
 """Folders of CSV as people have them: labels in words, marks of spreadsheets, and cells that are no numbers."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lacuna.decimals import decimal
-from lacuna.records import RecordError, Table, read, segments, windows
+from lacuna.records import RecordError, Table, _cell_by_cell, _numbers_alone, read, segments, windows
 
 ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
 
@@ -260,3 +263,22 @@ def test_columns_are_the_records_own_and_may_be_written_into():
     (one,) = read(table)
     one.columns["y"][:] = -1.0
     assert table["y"].tolist() == list(range(9))
+
+
+@given(st.lists(st.tuples(*[st.floats(-1e300, 1e300)] * 2), min_size=1, max_size=30), st.sampled_from(["\n", "\r\n"]))
+def test_plain_numbers_are_read_at_once_as_they_are_cell_by_cell(rows, end):
+    text = f"time_s,y{end}" + "".join(f"{a!r},{b!r}{end}" for a, b in rows)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "a.csv"
+        file.write_bytes(text.encode())
+        fast, slow = _numbers_alone(file), _cell_by_cell(file)
+    assert fast is not None
+    assert {name: values.tolist() for name, values in fast.items()} == {n: v.tolist() for n, v in slow.items()}
+
+
+@pytest.mark.parametrize(
+    "text", ["0,1\n1,2\n", "time_s,y\n0,1\n1\n", "time_s,y\n0,\n", "a,a\n0,1\n", "#t,y\n0,1\n", ""]
+)
+def test_anything_else_is_gone_through_cell_by_cell(tmp_path, text):
+    (tmp_path / "a.csv").write_text(text)
+    assert _numbers_alone(tmp_path / "a.csv") is None
