@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +19,7 @@ from bench.small.kinds import KINDS
 from bench.small.offered import Model, Offered, Run
 from lacuna import Effect, Parameter
 
+TOLD = Path(__file__).with_name("told.json")  # by truth and seed, which draw can be told
 TRUTHS = ("single", "none", "outside", "pair", "decoys")
 MANY = 20  # decoys
 _ATTEMPTS = 200
@@ -55,16 +59,41 @@ class Sealed:
 def drawn(truth: str, seed: int) -> tuple[Offered, Sealed]:
     """The set of this seed, the same on every call. `truth`: "single", "none", "outside" (one effect, not on offer),
     "pair", or "decoys" (twenty that are not there, beside one effect or nothing). Raises UntellableError."""
-    kind = list(KINDS.values())[seed % len(KINDS)]
+    attempt = which(truth, seed)
+    found = _attempt(truth, seed, attempt, tellable=lambda *given: True)
+    if found is None:
+        raise UntellableError(f"{truth} {seed}: draw {attempt} is not what it was when it was told")
+    return found
+
+
+def which(truth: str, seed: int) -> int:
+    """The first of a seed's draws that can be told: looked up where that is known, since it takes many fits. Raises
+    UntellableError."""
+    known = _told().get(f"{truth} {seed}")
+    return sought(truth, seed) if known is None else known
+
+
+def sought(truth: str, seed: int) -> int:
+    """The same by trying them. Raises UntellableError."""
     for attempt in range(_ATTEMPTS):
-        draw = np.random.default_rng([seed, TRUTHS.index(truth), attempt])
-        found = _attempt(truth, kind, seed // len(KINDS), draw, f"{truth} {seed}")
-        if found:
-            return found
-    raise UntellableError(f"{truth} {seed} ({kind.key}): nothing came out in {_ATTEMPTS} draws")
+        if _attempt(truth, seed, attempt, tellable):
+            return attempt
+    raise UntellableError(f"{truth} {seed} ({_kind(seed).key}): nothing came out in {_ATTEMPTS} draws")
 
 
-def _attempt(truth: str, kind: Kind, turn: int, draw: np.random.Generator, key: str) -> tuple[Offered, Sealed] | None:
+@cache
+def _told() -> dict[str, int]:
+    return json.loads(TOLD.read_text(encoding="utf-8"))
+
+
+def _kind(seed: int) -> Kind:
+    return list(KINDS.values())[seed % len(KINDS)]
+
+
+def _attempt(truth: str, seed: int, attempt: int, tellable: Callable[..., bool]) -> tuple[Offered, Sealed] | None:
+    """A draw; None if it cannot be told."""
+    draw = np.random.default_rng([seed, TRUTHS.index(truth), attempt])
+    kind, turn, key = _kind(seed), seed // len(KINDS), f"{truth} {seed}"
     forms = _forms(truth, kind, turn, draw)
     effects = tuple(form.effect for form in forms)
     values = _values(kind, forms, draw)

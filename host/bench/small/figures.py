@@ -73,9 +73,12 @@ def report(records: Sequence[dict]) -> None:
     for title, hits in rates(records).items():
         if hits:
             print(f"{title:46}{share_text(hits):30}{_REQUIRED[title]}")
-    print(f"\n{'':28}{'right':28}{'predicts off by, noises':26}processor, s; simulations")
+    count = sum("peers" in r for r in records)
+    print(f"\n{count} sets that others were asked, too; right: what is there and on offer, and nothing else")
+    print(f"{'':28}{'right':28}{'predicts off by, noises':26}processor, s; simulations")
     print(f"{'':28}{'':28}{'single  none  withheld':26}medians")
-    print(_row("lacuna", records, [right(r, named(r)) for r in records], records))
+    same = [r for r in records if "peers" in r] or records  # where peers were asked, on their sets alone
+    print(_row("lacuna", same, [right(r, named(r)) for r in same], same))
     for peer in dict.fromkeys(name for r in records for name in r.get("peers", {})):
         asked = [(r, r["peers"][peer]) for r in records if peer in r.get("peers", {}) and _applies(peer, r)]
         hits = [right(r, p["named"]) for r, p in asked if p["named"] is not None]

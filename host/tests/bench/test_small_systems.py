@@ -11,6 +11,7 @@ from bench import small_systems
 from bench.blind_records import losses_beside
 from bench.small import draw as drawing
 from bench.small import run as running
+from bench.small import told
 from bench.small.decoys import DECOYS, changed, effect_of
 from bench.small.distinct import closest, left_by
 from bench.small.draw import MANY, drawn
@@ -198,8 +199,8 @@ def test_sparse_regression_is_given_only_what_is_on_offer_and_even():
 def test_what_nobody_can_tell_is_drawn_again_and_then_given_up(monkeypatch):
     monkeypatch.setattr(drawing, "tellable", lambda *given: False)
     monkeypatch.setattr(drawing, "_ATTEMPTS", 2)
-    with pytest.raises(drawing.UntellableError, match="single 7000"):
-        drawn("single", 7000)
+    with pytest.raises(drawing.UntellableError, match="single 999"):
+        drawn("single", 999)
 
 
 def record(kind, truth, *named, verdict=None, matters=False):
@@ -257,3 +258,24 @@ def test_a_trial_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys)
     assert len(path.read_text().splitlines()) == 3
     assert losses_beside(path).exists()
     assert "3/3 = 1.00" in capsys.readouterr().out
+
+
+def test_which_draw_can_be_told_is_kept_as_it_is_found_out():
+    known = json.loads(drawing.TOLD.read_text(encoding="utf-8"))
+    assert known["single 7005"] == drawing.sought("single", 7005)
+    assert drawing.which("single", 7005) == known["single 7005"]
+
+
+def test_what_is_found_out_is_added_in_order(tmp_path, monkeypatch):
+    monkeypatch.setattr(told, "TOLD", tmp_path / "told.json")
+    (tmp_path / "told.json").write_text('{"none 8000": 0}')
+    told.keep({"single 7010": 3, "single 7000": 1})
+    kept = json.loads((tmp_path / "told.json").read_text())
+    assert list(kept.items()) == [("single 7000", 1), ("single 7010", 3), ("none 8000", 0)]
+
+
+def test_a_draw_that_came_out_otherwise_is_no_set(monkeypatch):
+    monkeypatch.setattr(drawing, "_told", lambda: {"single 7000": 0})
+    monkeypatch.setattr(drawing, "_attempt", lambda *given, tellable: None)
+    with pytest.raises(drawing.UntellableError, match="is not what it was"):
+        drawn("single", 7000)
