@@ -49,15 +49,40 @@ def pio(project: Path, *words: str) -> subprocess.CompletedProcess:
     return subprocess.run([PIO, *words], cwd=project, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_the_image_builds_and_builds_again_after_a_full_clean(small_project):
+@pytest.fixture
+def upload(small_project, tmp_path):
+    """Runs the upload with a program in avrdude's place; returns what that was called with, after {port}."""
+    avrdude = own_stand_ins(small_project) / "packages" / "tool-avrdude" / "bin" / "avrdude"
+    avrdude.unlink()
+    avrdude.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/call\n')
+    avrdude.chmod(0o755)
+
+    def run() -> str:
+        host_end, board_end = pty.openpty()
+        try:
+            port = os.ttyname(board_end)
+            done = pio(small_project, "run", "-e", "uno", "-t", "upload", "--upload-port", port)
+        finally:
+            os.close(host_end)
+            os.close(board_end)
+        assert done.returncode == 0, done.stderr
+        return (tmp_path / "call").read_text().replace(port, "{port}")
+
+    return run
+
+
+def test_the_image_builds_and_after_a_full_clean_the_upload_builds_it_again(small_project, upload):
     image = small_project / ".pio" / "build" / "uno" / "firmware.elf"
-    for _ in range(2):
-        built = pio(small_project, "run", "-e", "uno")
-        assert built.returncode == 0, built.stderr
-        assert image.is_file()
-        assert image.with_suffix(".hex").is_file()
-        assert pio(small_project, "run", "-e", "uno", "-t", "fullclean").returncode == 0
-        assert not image.is_file()
+    built = pio(small_project, "run", "-e", "uno")
+    assert built.returncode == 0, built.stderr
+    assert image.is_file()
+    assert image.with_suffix(".hex").is_file()
+    assert pio(small_project, "run", "-e", "uno", "-t", "fullclean").returncode == 0
+    assert not image.is_file()
+    call = upload()
+    assert image.is_file()
+    assert call.startswith("-p atmega328p -c arduino -D -b 115200 -P {port} -U flash:w:")
+    assert "firmware.hex:i" in call
 
 
 @pytest.mark.parametrize("environment", ["native", "simavr"])
@@ -85,21 +110,3 @@ def test_another_platformio_is_told_so_at_once(small_project):
     done = pio(small_project, "run", "-e", "uno")
     assert done.returncode == 1
     assert "OtherPlatformIO: the stand-ins were laid out for another PlatformIO" in done.stderr
-
-
-def test_an_upload_hands_the_image_and_the_port_to_avrdude(small_project, tmp_path):
-    avrdude = own_stand_ins(small_project) / "packages" / "tool-avrdude" / "bin" / "avrdude"
-    avrdude.unlink()
-    avrdude.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/call\n')
-    avrdude.chmod(0o755)
-    host_end, board_end = pty.openpty()
-    try:
-        port = os.ttyname(board_end)
-        done = pio(small_project, "run", "-e", "uno", "-t", "upload", "--upload-port", port)
-    finally:
-        os.close(host_end)
-        os.close(board_end)
-    assert done.returncode == 0, done.stderr
-    call = (tmp_path / "call").read_text()
-    assert call.startswith(f"-p atmega328p -c arduino -D -b 115200 -P {port} -U flash:w:")
-    assert "firmware.hex:i" in call
