@@ -14,6 +14,8 @@ from bench.systems.rivals import best_subset, engine, gaussian_process, sparse_r
 from bench.systems.table import judged
 from lacuna import Effect, Parameter, Record
 
+pytestmark = pytest.mark.slow
+
 EFFECTS = (
     Effect("square", Parameter("size", "1", 1.0, -5.0, 5.0)),
     Effect("offset", Parameter("size", "1", 1.0, -5.0, 5.0)),

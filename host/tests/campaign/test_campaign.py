@@ -8,7 +8,7 @@ import pytest
 
 from bifa.campaign.stages import PROVENANCE
 
-pytestmark = pytest.mark.uno
+pytestmark = [pytest.mark.uno, pytest.mark.slow]
 
 
 def campaign(folder, *options):

@@ -14,7 +14,7 @@ from bifa.data import read_dataset
 from bifa.rig import open_rig
 from bifa.robot.gait import BASELINE
 
-pytestmark = pytest.mark.uno
+pytestmark = [pytest.mark.uno, pytest.mark.slow]
 
 
 def test_the_baseline_walks_as_fast_as_in_the_paper(tmp_path):

@@ -19,6 +19,8 @@ from virtual_robot import gait
 from virtual_robot.sealed import specimen
 from virtual_robot.trials import Lab, Plan
 
+pytestmark = pytest.mark.slow
+
 SETS = 60
 REPEATS = 2
 STEP_S = 9.0  # of a step response, which is at rest afterwards

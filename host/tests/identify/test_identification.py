@@ -21,6 +21,8 @@ from bifa.report.page import render
 from bifa.report.terminal import print_sections, print_table
 from bifa.robot import load_model, save_model
 
+pytestmark = pytest.mark.slow
+
 _DAYS = 8
 
 

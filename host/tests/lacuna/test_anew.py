@@ -66,6 +66,7 @@ def begin(case: Case) -> Anew:
     return Anew(case.system, case.split, POLICY, NOBODY)
 
 
+@pytest.mark.slow
 def test_of_single_effects_the_right_one_is_followed_whatever_the_base_fit_was():
     case = bench({"delay.delay_s": 0.05}, 61)
     best = min((fitted for fitted, _ in begin(case).follow(lost(case))), key=lambda fitted: fitted.cost)
@@ -85,6 +86,7 @@ def test_an_effect_that_isolated_trials_cannot_show_is_followed_where_all_togeth
     assert best.theta["quadratic_drag.drag_Ns2_m2"] == pytest.approx(8.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_pair_is_begun_from_its_better_half_and_not_from_a_lost_fit():
     case = bench({"delay.delay_s": 0.06, "cubic_spring.stiffness_N_m3": 8000.0}, 62)
     found = [fitted for fitted, _ in begin(case).follow(lost(case, ("coulomb",)))]
@@ -101,12 +103,14 @@ def test_where_no_trial_isolates_parameters_every_single_effect_is_followed_and_
     assert begin(case).follow(lost(case, ("coulomb",))) == []
 
 
+@pytest.mark.slow
 def test_either_sign_of_an_effect_is_begun():
     case = bench({"asymmetric_friction.difference_N": -0.8}, 64)
     found = {fitted.structure.effects: fitted for fitted, _ in begin(case).follow(lost(case))}
     assert found[("asymmetric_friction",)].theta["asymmetric_friction.difference_N"] == pytest.approx(-0.8, abs=0.1)
 
 
+@pytest.mark.slow
 def test_what_has_been_begun_is_weighed_again_against_another_floor():
     case = bench({"delay.delay_s": 0.05}, 65)
     before, anew = lost(case), begin(case)

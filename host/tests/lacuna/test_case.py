@@ -110,6 +110,7 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
     assert led_back(right, [delayed], case.split).cost <= right.cost
 
 
+@pytest.mark.slow
 def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case):
     right = case.judge(case.fit_base(1))
     found = search(case, case.judge(moved(right.fitted, 0.3)), enough=case.suffices, crew=NOBODY)

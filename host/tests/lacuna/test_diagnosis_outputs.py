@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import pytest
 from toy import hide
 
 from lacuna.diagnosis.diagnose import diagnose
@@ -14,6 +15,8 @@ from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.signature import describe
 from lacuna.report.diagnosis import diagnosis_page
 from lacuna.report.page import render
+
+pytestmark = pytest.mark.slow
 
 KEY = ("sweep", "position_mm")
 

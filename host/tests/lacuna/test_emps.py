@@ -12,10 +12,13 @@ from lacuna.values import Values
 
 ROOT = Path(__file__).resolve().parents[3]
 DATA = ROOT.parent / "shared" / "data" / "emps"
-pytestmark = pytest.mark.skipif(
-    not (DATA / "DATA_EMPS.mat").exists(),
-    reason=f"the EMPS benchmark's records are not in {DATA.relative_to(ROOT.parent)} beside the checkout",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (DATA / "DATA_EMPS.mat").exists(),
+        reason=f"the EMPS benchmark's records are not in {DATA.relative_to(ROOT.parent)} beside the checkout",
+    ),
+]
 FILE = ROOT / "docs" / "examples" / "emps.py"
 
 

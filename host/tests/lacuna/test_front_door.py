@@ -153,6 +153,7 @@ def test_effects_stand_at_their_absent_value_while_they_are_off():
     assert pickle.loads(pickle.dumps(theta)) == theta
 
 
+@pytest.mark.slow
 def test_records_come_as_arrays_tables_and_files(tmp_path):
     pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
     arrays = heater.records(repeats=2, seed=4)
@@ -191,6 +192,7 @@ def test_what_is_predicted_need_not_be_named_where_the_function_names_it():
     assert list(with_records(heater.system(), heater.records(1)).trials[0].channels) == ["temperature_K"]
 
 
+@pytest.mark.slow
 def test_processes_and_threads_come_to_the_same_verdict(verdict):
     there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), n_jobs=2, progress=False)
     assert {**there.record, "seconds": 0} == {**verdict.record, "seconds": 0}

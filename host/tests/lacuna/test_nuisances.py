@@ -91,6 +91,7 @@ def test_probability_of_meeting_conditions_by_chance(parameters):
     assert np.mean(np.array(found) < 0.1) == pytest.approx(0.1, abs=0.05)
 
 
+@pytest.mark.slow
 def test_no_share_of_a_gap_is_given_where_nuisances_had_closed_it(tmp_path):
     found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), progress=False)
     assert found.record["effects"][0]["share_of_gap"] is None

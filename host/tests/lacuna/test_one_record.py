@@ -15,6 +15,8 @@ from lacuna.records import RecordError
 from lacuna.run import with_records
 from lacuna.values import Values
 
+pytestmark = pytest.mark.slow
+
 LIMIT = {"saturation__limit_W": 8.0}
 BOTH = LIMIT | {"sensor_lag__lag_s": 3.0}
 WRITTEN = {

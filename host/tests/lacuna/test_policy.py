@@ -81,6 +81,7 @@ def test_noise_alone_is_structure_as_seldom_as_the_rule_says():
     assert found <= 11, "binomial, 100 draws at 0.05: more than 11 happen once in 200"
 
 
+@pytest.mark.slow
 def test_drift_chance_a_trend_is_a_drift_where_shuffled_orders_seldom_show_it():
     for drift, found in ((0.0, False), (0.02, True)):
         system = hide({}, seed=16, repeats=6, drift=drift)
@@ -92,6 +93,7 @@ def test_drift_chance_a_trend_is_a_drift_where_shuffled_orders_seldom_show_it():
         )
 
 
+@pytest.mark.slow
 def test_a_drift_below_relevance_is_told_and_the_verdict_is_none():
     found = diagnose(hide({}, seed=16, repeats=6, drift=0.02))
     largest = max(drift.share for drift in found.drifts)
@@ -318,6 +320,7 @@ def test_implausible_costs_as_stated_half_a_range_outside():
 # --- How far is the search worth its time? ---
 
 
+@pytest.mark.slow
 def test_effects_are_begun_anew_where_the_base_leaves_much(monkeypatch):
     begun = []
     monkeypatch.setattr(Anew, "follow", lambda self, before: begun.append(before.effects) or [])

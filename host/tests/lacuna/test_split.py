@@ -40,6 +40,7 @@ def test_something_is_left_to_judge_by(conditions):
     assert len(split.fit + split.judging + split.final) == len(conditions)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, 4])
 def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
     given = dict(list(heater.records(repeats=1, sensor_lag__lag_s=3.0).items())[:count])

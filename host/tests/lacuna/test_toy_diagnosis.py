@@ -12,6 +12,8 @@ from lacuna.diagnosis.record import as_record
 from lacuna.errors import TooLittleDataError
 from lacuna.report.text import screen_of
 
+pytestmark = pytest.mark.slow
+
 SIZES = {
     "coulomb": {"coulomb.force_N": 0.1},
     "delay": {"delay.delay_s": 0.01},

@@ -36,6 +36,7 @@ def humming(effects: dict[str, float], amplitude_mm: float, *, seed: int) -> Hum
     return Humming(tuple(trials), quiet.effects | {"hum": HUM})
 
 
+@pytest.mark.slow
 def test_a_hum_whose_phase_no_two_trials_share_is_named():
     found = diagnose(humming({}, 0.5, seed=51))
     assert found.verdict == "identified"

@@ -17,6 +17,8 @@ from bifa.identify.start import prepare
 from bifa.robot import load_model
 from lacuna.diagnosis.diagnose import diagnose
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def sealed(tmp_path):

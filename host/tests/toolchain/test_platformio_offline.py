@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PIO = Path(sys.executable).with_name("pio")
 FIRMWARE = """
 #include <Arduino.h>

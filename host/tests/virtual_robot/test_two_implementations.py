@@ -21,6 +21,8 @@ from virtual_robot.instruments.sensors import Noise
 from virtual_robot.plant import NOMINAL, Curve, Plant, nominal_curves
 from virtual_robot.trials import Lab, Plan
 
+pytestmark = pytest.mark.slow
+
 NOISE = {"force_N": 0.15, "displacement": 0.1, "pressure": 0.06}
 PLANS = (
     Plan("static_loading", "static", "body", 4.0, 0.008),
