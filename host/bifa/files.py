@@ -1,8 +1,10 @@
 """Files that people ask for: their places checked before long work, and written whole or not at all."""
 
+import errno
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -69,6 +71,20 @@ def _refuse_same(files: tuple[Path | None, ...], folders: tuple[Path | None, ...
 def _check_writable(there: Path, asked: Path) -> None:
     if not os.access(there, os.W_OK):
         raise TargetError(f"{asked} cannot be written (no permission); choose another place")
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """All of a regular file; OSError for anything else: a pipe may never end, and a device has no end at all."""
+    path = Path(path)
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # of a folder the system says so itself
+        raise OSError(errno.EINVAL, "not a regular file but a pipe or a device: copy what it holds into one", str(path))
+    return path.read_bytes()
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """As read_bytes(), from UTF-8; also UnicodeDecodeError."""
+    return read_bytes(path).decode("utf-8").replace("\r\n", "\n")
 
 
 def named(path: Path) -> Path:

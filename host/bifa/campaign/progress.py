@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TimeElapsedColumn
 from rich.table import Column
 
 from bifa.campaign.stages import Stage
-from bifa.screen import Console
+from bifa.screen import Console, words
 
 _TITLE = 35  # characters: the longest title of a stage
 
@@ -34,9 +34,9 @@ class StageProgress:
 
     def _begin(self) -> None:
         self._bars = Progress(
-            TextColumn("{task.description}", table_column=Column(min_width=_TITLE)),
+            words("{task.description}", table_column=Column(min_width=_TITLE)),
             BarColumn(bar_width=20),
-            TextColumn("{task.fields[what]}"),
+            words("{task.fields[what]}"),
             TimeElapsedColumn(),
             console=self._console,
         )

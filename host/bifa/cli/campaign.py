@@ -75,6 +75,8 @@ def run_campaign(
 
     import json
 
+    from rich.text import Text
+
     from bifa.campaign.bench import Bench
     from bifa.screen import Console
 
@@ -101,7 +103,8 @@ def run_campaign(
 
     summary = json.loads((out / "summary.json").read_text())
     effects = "; ".join(effect_words(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
-    console.print(f"verdict: [bold]{summary['verdict']}[/bold], {plain_spaces(effects)}", highlight=False)
+    verdict = Text.assemble("verdict: ", (summary["verdict"], "bold"), f", {plain_spaces(effects)}")
+    console.print(verdict, highlight=False)
     if summary["truth"] is not None:
         inside = "; ".join(effect_words(name, values) for name, values in summary["truth"].items())
         print_lines(console, [f"the seal opened: {inside or 'nothing'}"])
@@ -150,7 +153,7 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
     if watch is not None and not watch.is_dir():
         raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
     plain = not console.encoding.lower().startswith("utf")
-    desk = Desk(lambda text: console.print(text, markup=False, highlight=False), watch)
+    desk = Desk(lambda text: console.print(text, highlight=False), watch)
     exports = partial(read_exports, bench_file) if bench_file else dict
     exports()  # what is wrong is said before anything moves
     return desk, ByHand(desk, watch, plain, exports)

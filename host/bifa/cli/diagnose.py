@@ -102,14 +102,15 @@ def _found(
     workers: AbstractContextManager[tuple[Executor | None, int]],
 ) -> Diagnosis:
     """The diagnosis of a data set; `resolved`: with experiments that separate, recorded into this folder."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
     from bifa.campaign.resolve import resolve
     from bifa.identify.start import prepare
     from bifa.report.words import spoken
+    from bifa.screen import words
     from lacuna.diagnosis.diagnose import diagnose
 
-    with Progress(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console) as progress:
+    with Progress(SpinnerColumn(), words("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("fitting stiffness curves")
 
         def said(what: str, share: float = 0.0) -> None:
@@ -207,7 +208,7 @@ def print_diagnosis(console: Console, record: dict[str, Any], labels: dict[str, 
     from bifa.report.diagnosis import further, lacking, noise_table, verdict_sentence
     from bifa.report.terminal import print_lines, print_sections, print_table
 
-    console.print(f"[bold]{record['verdict']}[/bold]")
+    console.print(str(record["verdict"]), style="bold")
     print_lines(console, [verdict_sentence(record["verdict"], record["effects"], record["remainder"])])
     print_table(console, noise_table(record["error"]))
     print_sections(console, [*lacking(record, labels), *further(record, labels)])

@@ -22,6 +22,8 @@ def doctor(
 
     Exits with status 1 if something required is missing.
     """
+    from rich.text import Text
+
     from bifa.screen import Console
     from bifa.toolchain.checks import MISSING, run_checks
 
@@ -30,7 +32,7 @@ def doctor(
     missing = False
     for finding in run_checks(port):
         missing |= finding.state == MISSING
-        console.print(f"[{colours[finding.state]}]{finding.state:9}[/] {finding.what:22} ", end="")
+        console.print(Text.assemble((f"{finding.state:9}", colours[finding.state]), f" {finding.what:22} "), end="")
         console.out(finding.found)
         if finding.remedy:
             console.out(f"{'':10}fix: {finding.remedy}")

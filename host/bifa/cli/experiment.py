@@ -165,15 +165,16 @@ def _run(
 ) -> None:
     from contextlib import nullcontext
 
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
     from bifa.cli.campaign import at_desk
     from bifa.measure.known import known_of
     from bifa.measure.session import provenance, run_session
     from bifa.rig import open_rig
+    from bifa.screen import warning, words
 
     columns = (
-        TextColumn("{task.description}"),
+        words("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
@@ -191,7 +192,7 @@ def _run(
             if event.clock_error_s is not None:
                 errors.append(event.clock_error_s)
             if event.misfit and not by_hand:
-                console.print(f"[yellow]warning[/yellow] {event.misfit}", highlight=False)
+                console.print(warning(event.misfit), highlight=False)
 
         with nullcontext() if by_hand else bars:  # a bar would redraw itself over questions and answers
             dataset = run_session(

@@ -36,20 +36,20 @@ def fit(
     import time
     from datetime import date
 
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
     from bifa.data import read_dataset
     from bifa.identify.identification import identify
     from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
     from bifa.report.terminal import print_sections, print_table
     from bifa.robot import load_model, save_model
-    from bifa.screen import Console
+    from bifa.screen import Console, words
 
     console = Console()
     measured = read_dataset(dataset)
     warn_of_units(console, measured)
     begun = time.perf_counter()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn(), words("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("reading")
         found = identify(

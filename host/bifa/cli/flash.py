@@ -47,7 +47,7 @@ def flash(
         try:
             _write(project, chosen, show)
         except KeyboardInterrupt:
-            console.print("[red]interrupted:[/red] the Uno may hold half an image; run `bifa flash` again")
+            console.print("interrupted: the Uno may hold half an image; run `bifa flash` again")
             raise
     with console.status("waiting for the firmware"), open_rig(chosen) as rig, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()

@@ -101,6 +101,7 @@ def _beside(out: Path) -> Path:
 def _best(console: "Console", robot: "Model", pool: "Simulations", settings: "list[Settings]") -> "Optimum":
     """The best optimum of one search after another, each with its line."""
     from bifa.gait import optimise
+    from bifa.screen import warning
 
     optima = []
     for one in settings:
@@ -108,7 +109,7 @@ def _best(console: "Console", robot: "Model", pool: "Simulations", settings: "li
             optima.append(optimise(robot, pool, one, progress(f"seed {one.seed}")))
         console.print(_line(optima[-1]), highlight=False)
         if optima[-1].doubt:
-            console.print(f"[yellow]warning[/yellow] {optima[-1].doubt}", highlight=False)
+            console.print(warning(str(optima[-1].doubt)), highlight=False)
     return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
 
 
@@ -127,9 +128,11 @@ def _explain(console: "Console", robot: "Model", pool: "Simulations", best: "Opt
 @contextmanager
 def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
     """Gives a function: title -> what `optimise` reports progress to."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[best]}"))
+    from bifa.screen import words
+
+    columns = (words("{task.description}"), BarColumn(), TimeElapsedColumn(), words("{task.fields[best]}"))
     with Progress(*columns, console=console, transient=True) as progress:
 
         def begin(title: str) -> Callable[[str, float, float], None]:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _CYCLES, _BUCKLING_N = 10, 27.0
 
+_RED = ("red", "red")
 EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk   |
 bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml   |
 bifa simulate --paper"""
@@ -159,6 +160,7 @@ def _print_passing(
 def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None") -> None:
     """Both shipped models, or the one given, with its fastest gait."""
     from rich.table import Table
+    from rich.text import Text
 
     from bifa import robot
 
@@ -167,11 +169,11 @@ def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None")
 
         pairs = [(model, gait or FAST)] if model else [(robot.nominal(), FAST), (robot.strong_push(), FAST_STRONG)]
         tables = [compare(*pair) for pair in pairs]
-    table = Table(title="The paper and the model; [red]red[/red]: they disagree", title_justify="left")
+    table = Table(title=Text.assemble("The paper and the model; ", _RED, ": they disagree"), title_justify="left")
     for heading in ("", "paper", *(chosen.name for chosen, _ in pairs), "remark on the first"):
         table.add_column(heading)
     for rows in zip(*tables, strict=True):
-        shown = (row.ours if row.fits else f"[red]{row.ours}[/red]" for row in rows)
+        shown = (Text(row.ours, "" if row.fits else "red") for row in rows)
         table.add_row(rows[0].what, rows[0].paper, *shown, rows[0].remark)
     console.print(table)
     for chosen, fast in pairs:
@@ -181,11 +183,12 @@ def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None")
 def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
     """The paper's section VI.B: who gets through, and which stroke is too short for it."""
     from rich.table import Table
+    from rich.text import Text
 
     from bifa.simulate.paper import obstacle_rows
 
     table = Table(
-        title=f"Obstacles, {model.name}: N that a stroke builds up / needs; [red]red[/red]: not enough",
+        title=Text.assemble(f"Obstacles, {model.name}: N that a stroke builds up / needs; ", _RED, ": not enough"),
         title_justify="left",
     )
     for heading in ("obstacle", "gait", "through", "extension", "contraction"):
@@ -193,8 +196,9 @@ def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
     for obstacle, gait, outcome in obstacle_rows(model, fast):
         strokes = (outcome.extension, outcome.contraction)
         shown = (f"{stroke.built_up_N:.0f} / {stroke.needed_N:.0f}" for stroke in strokes)
-        marked = (text if s.enough else f"[red]{text}[/red]" for text, s in zip(shown, strokes, strict=True))
-        table.add_row(obstacle, gait, f"{outcome.seconds:.0f} s" if outcome.through else "[red]no[/red]", *marked)
+        marked = (Text(text, "" if s.enough else "red") for text, s in zip(shown, strokes, strict=True))
+        through = Text(f"{outcome.seconds:.0f} s") if outcome.through else Text("no", "red")
+        table.add_row(obstacle, gait, through, *marked)
     console.print(table)
 
 

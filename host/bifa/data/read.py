@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bifa.files import read_bytes
 from bifa.ranges import RANGES
 from bifa.toml import parse_toml
 
@@ -94,7 +95,7 @@ def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
 
 def _read_toml(folder: Path) -> tuple[Fields, Source]:
     try:
-        raw = (folder / TABLE_FILE).read_bytes()
+        raw = read_bytes(folder / TABLE_FILE)
     except FileNotFoundError:
         raise DatasetError(_no_table(folder)) from None
     except OSError as error:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from bifa.files import read_bytes
 from lacuna.decimals import BLANKS, decimal, number
 
 from .errors import DatasetError
@@ -92,7 +93,7 @@ class Sheet:
 
     def _raw(self) -> bytes:
         try:
-            return self._path.read_bytes()
+            return read_bytes(self._path)
         except OSError as error:
             raise self._error(f"cannot be read ({error.strerror})") from None
 

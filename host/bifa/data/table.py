@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bifa.files import read_bytes
 from lacuna.decimals import BLANKS, DECIMAL
 
 from .errors import DatasetError
@@ -37,7 +38,7 @@ def read_table(path: Path, file: str, layout: Layout) -> dict[str, np.ndarray]:
 
 def _decode(path: Path, file: str) -> str:
     try:
-        raw = path.read_bytes()
+        raw = read_bytes(path)
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=file) from None
     if not raw:

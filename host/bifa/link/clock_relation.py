@@ -2,7 +2,8 @@
 
 Every exchange says that the Uno's time fell between the host's sending and receiving. All exchanges together confine
 the straight line host = offset + rate * uno; the extremes of what is left bound the error. An Uno's ceramic resonator
-is good to 0.5 %.
+is good to 0.5 %. Where no such line exists since one of the clocks has jumped (a host that slept, a process that was
+stopped), what was exchanged before is void: the relation is that of now.
 """
 
 from collections import deque
@@ -33,8 +34,17 @@ class ClockRelation:
 
     def add(self, sent_s: float, uno_s: float, received_s: float) -> None:
         """The Uno read `uno_s` at some moment between the host's `sent_s` and `received_s`."""
+        if self._exchanges and self._has_jumped(sent_s, uno_s, received_s):
+            self._exchanges.clear()
         self._exchanges.append((sent_s, uno_s, received_s))
         self._line = None
+
+    def _has_jumped(self, sent_s: float, uno_s: float, received_s: float) -> bool:
+        """Whether between the last exchange and this one either clock has gone otherwise than any resonator lets it."""
+        last_sent_s, last_uno_s, last_received_s = self._exchanges[-1]
+        elapsed_s = uno_s - last_uno_s
+        drift_s = LARGEST_DRIFT * abs(elapsed_s)
+        return sent_s - last_received_s > elapsed_s + drift_s or received_s - last_sent_s < elapsed_s - drift_s
 
     def to_host(self, uno_s: float) -> HostTime:
         """When the Uno's clock showed `uno_s`; raises ValueError before the first exchange."""
@@ -92,4 +102,5 @@ class ClockRelation:
         bounds = [(None, None), rate, (0, slack + 1e-12)]
         low = linprog([*objective, 0], rows, limits, bounds=bounds).fun
         high = -linprog([-objective[0], -objective[1], 0], rows, limits, bounds=bounds).fun
-        return low, high
+        disagreement = slack * objective[0]  # as much as the line may be off where the exchanges were widened
+        return low - disagreement, high + disagreement

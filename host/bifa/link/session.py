@@ -24,6 +24,12 @@ WINDOW = 4
 RESEND_AFTER_S = 0.03
 PROBE_AFTER_S = 0.5  # without progress: ask whether the Uno is still the same
 GREET_EVERY_S = 0.1
+ANSWERS = {  # of the commands that ask for something; the others are answered by `done`, and so is what is refused
+    "status": "status_report",
+    "read_set": "set_report",
+    "presets": "preset_report",
+    "read_clock": "clock_report",
+}
 LEAST_WAIT_S = 1e-4  # so that time goes on, however finely a clock counts
 
 
@@ -198,9 +204,16 @@ class Session:
             waiting = next((r for r in self._outstanding if r.sequence == report.sequence), None)
             self._go_back = self._go_back or (waiting is not None and waiting.answer is None)
         else:
-            for request in self._outstanding:
-                if request.sequence == report.sequence and request.answer is None:
+            self._take_answer(report, now)
+
+    def _take_answer(self, report: frames.Report, now: float) -> None:
+        """What answers a command with another's report, or ends one whose report is missing, is no answer to it."""
+        for request in self._outstanding:
+            if request.sequence == report.sequence and request.answer is None:
+                if report.name == ANSWERS.get(request.name, "done") or (report.name == "done" and report["result"]):
                     request.answer, request.answered_s = report, now
+                else:
+                    self.counters.bad += 1
 
     def call(self, name: str, *values, timeout_s: float = 5.0) -> frames.Report:
         """Carry out one command; raises RefusedError, NoAnswerError or RestartedError."""

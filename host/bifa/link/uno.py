@@ -22,12 +22,14 @@ CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
 PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means about so long after its strobe (docs/firmware.md)
+SAMPLE_US = 10_000
 DEAD_TIME_S = 4e-3  # from one supply to the other a chamber is vented: kDeadTime_ms and the tick that it waits for
 MARK_PAUSE = 10  # strobes that a mark leaves out (kMarkPause in lib/controller/controller.h)
 CONNECTIONS = ("off", "positive", "vacuum", "both")  # by the two valves of a chamber
 SCHEDULE_ENTRIES = 16  # lib/controller/schedule.h
 LATEST_HOLD_S = (2**32 - 1) / 1000
 _WRAP_US = 1 << 32
+_OLDEST_US = 10_000_000  # by which a sample may be older than what came before it
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ class Uno:
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
         self._time_us: int | None = None
-        self._last_sequence: int | None = None
+        self._timed_s = 0.0  # by the host's clock, when `_time_us` was heard
+        self._last_sample: tuple[int, int] | None = None  # its number and time
         self._streaming = False
         self._next_exchange_s = math.inf
         self._exchange_every_s = CLOCK_EVERY_S
@@ -123,7 +126,7 @@ class Uno:
         hello = self.session.connect(timeout_s)
         self.clock_relation = ClockRelation()
         self._time_us = None
-        self._last_sequence = None
+        self._last_sample = None
         self._streaming = False
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
@@ -324,7 +327,7 @@ class Uno:
         """Telemetry in frames, 100 samples a second."""
         self.session.call("stream", int(on))
         if on and not self._streaming:
-            self._last_sequence = None
+            self._last_sample = None
         self._streaming = on
 
     def mark_strobe(self, timeout_s: float = 1.0) -> int:
@@ -334,12 +337,12 @@ class Uno:
         Raises LinkError where no samples arrive.
         """
         deadline = self._clock.now() + timeout_s
-        while self._last_sequence is None:
+        while self._last_sample is None:
             if self._clock.now() > deadline:
                 raise LinkError("the Uno streams no samples: nothing to mark")
             self.session.poll(0.02)
         self.session.call("mark")
-        return self._unwrap_sequence(self.session.call("read_clock")["marked"])
+        return self._unwrap_sequence(self.session.call("read_clock")["marked"], self._last_sample[1])
 
     def _stream_again(self) -> None:
         if self._streaming:
@@ -368,18 +371,19 @@ class Uno:
     def _take_sample(self, report: frames.Report) -> None:
         self.counters.samples += 1
         self.may_move = self.may_move or report["valves"] != 0
+        time_us = self._unwrap(report["time_us"])
         sequence = report["sequence"]
-        if self._last_sequence is not None:
-            sequence = self._unwrap_sequence(sequence)
-            if sequence <= self._last_sequence:
+        if self._last_sample is not None:
+            sequence = self._unwrap_sequence(sequence, time_us)
+            if sequence <= self._last_sample[0]:
                 return  # a repeat
-            self.counters.lost += sequence - self._last_sequence - 1
-        self._last_sequence = sequence
+            self.counters.lost += sequence - self._last_sample[0] - 1
+        self._last_sample = (sequence, time_us)
         command = tuple({1: 0.0, 2: 1.0}.get(report["command"] >> 2 * i & 3, math.nan) for i in range(3))
         self._samples.append(
             Sample(
                 sequence=sequence,
-                time_us=self._unwrap(report["time_us"]),
+                time_us=time_us,
                 state=word(STATES, report["state"]),
                 pressure_psi=_psi(report["pressure_mpsi"]),
                 command=command,
@@ -388,17 +392,26 @@ class Uno:
             )
         )
 
-    def _unwrap_sequence(self, sequence: int) -> int:
-        """The 16 bits of a sample's number as one that goes on from the last."""
-        return self._last_sequence + (sequence - self._last_sequence + 32767) % 65536 - 32767
+    def _unwrap_sequence(self, sequence: int, time_us: int) -> int:
+        """The 16 bits of the number of a sample of that time as one that goes on from the last: samples are a fixed
+        time apart, however many are missing between."""
+        last, last_us = self._last_sample
+        due = last + round((time_us - last_us) / SAMPLE_US)
+        return due + (sequence - due + 32767) % 65536 - 32767
 
     def _unwrap(self, time_us: int) -> int:
-        """The Uno's 32-bit microseconds (they wrap every 71.6 minutes) as a time that goes on."""
+        """The Uno's 32-bit microseconds (they wrap every 71.6 minutes) as a time that goes on. What arrives may be a
+        little older than what came before; how often it has wrapped in a longer silence, the host's clock tells."""
+        now_s = self._clock.now()
         if self._time_us is None:
-            self._time_us = time_us
-        step = (time_us - self._time_us + _WRAP_US // 2) % _WRAP_US - _WRAP_US // 2
+            self._time_us, self._timed_s = time_us, now_s
+        step = (time_us - self._time_us) % _WRAP_US
+        if step >= _WRAP_US - _OLDEST_US:
+            step -= _WRAP_US
+        step += _WRAP_US * max(0, round((1e6 * (now_s - self._timed_s) - step) / _WRAP_US))
         unwrapped = self._time_us + step
-        self._time_us = max(self._time_us, unwrapped)
+        if step > 0:
+            self._time_us, self._timed_s = unwrapped, now_s
         return unwrapped
 
 

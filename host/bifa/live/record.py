@@ -21,7 +21,7 @@ from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.rig import RigError, port_of, serial_number_at
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
-from bifa.screen import Console
+from bifa.screen import Console, warning
 
 RETRY_S = 1.0
 RESTARTS = 3  # of a board that kept its power, while its port was away: each counts its boot number on by one
@@ -77,7 +77,7 @@ def _record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: 
             )
             writer.add(replace(trial, columns=columns, session_order=repeat, extra=extra))
             if wrong := misfit_of_last(writer.trials):
-                progress.console.print(f"[yellow]warning[/yellow] {wrong}", highlight=False)
+                progress.console.print(warning(wrong), highlight=False)
             progress.update(task, completed=1.0)
             progress.console.print(f"walk {repeat}: {uno.counters.since(before).text()}")
     writer.finish()
@@ -156,7 +156,7 @@ class _Recorder:
         self._console = console
         self._serial_number: str | None = None
         self._nonce: int | None = None  # of the start that was seen last; None before the first
-        self._desk = Desk(lambda text: console.print(text, markup=False, highlight=False))
+        self._desk = Desk(lambda text: console.print(text, highlight=False))
 
     def _open(self):
         if self._nonce is None:
@@ -223,7 +223,7 @@ class _Recorder:
             uno.clear()  # where opening the port restarts nothing, it is still stopped
             uno.run()
         except RefusedError as error:
-            self._console.print(f"{error}", markup=False)
+            self._console.print(str(error))
 
 
 def _next_file(out: Path) -> Path:

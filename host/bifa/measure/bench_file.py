@@ -22,7 +22,7 @@ import tomli_w
 from bifa.data.export import Export, parse_exports
 from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
-from bifa.files import write_text
+from bifa.files import read_text, write_text
 from bifa.measure.desk import Desk
 from bifa.measure.known import parse_known
 from bifa.robot.parameters import ModelParameterError
@@ -44,7 +44,7 @@ class BenchFileError(BifaError):
 
 def _read(path: Path) -> tuple[dict[str, Any], str]:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         document = parse_toml(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise BenchFileError(f"cannot read the bench's file {path}: {error}") from None

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import rich.box
 import rich.table
+from rich.text import Text
 
 from bifa.report.page import Section, Table
 from bifa.report.words import NBSP
@@ -38,14 +39,14 @@ def print_table(console: Console, content: Table) -> None:
 def print_lines(console: Console, lines: Iterable[str]) -> None:
     """Sentences, one below the other, wrapped at the terminal's width."""
     for line in lines:
-        console.print(plain_spaces(line), markup=False, highlight=False)
+        console.print(plain_spaces(line), highlight=False)
 
 
 def print_sections(console: Console, sections: Iterable[Section]) -> None:
     """Titles, sentences and tables of sections; what is drawn there is for pages."""
     for section in sections:
         if section.paragraphs or section.tables:
-            console.print(f"\n[bold]{section.title}[/bold]", highlight=False)
+            console.print(Text(f"\n{section.title}", "bold"), highlight=False)
         print_lines(console, section.paragraphs)
         for table in section.tables:
             print_table(console, table)

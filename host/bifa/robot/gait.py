@@ -11,7 +11,7 @@ from typing import Any
 import tomli_w
 
 from bifa.errors import BifaError
-from bifa.files import write_text
+from bifa.files import read_text, write_text
 from bifa.ranges import RANGES
 from bifa.robot.parameters import ModelParameterError, check_bounds
 from bifa.toml import parse_toml
@@ -81,7 +81,7 @@ class GaitFile:
 def read_gait_file(path: str | Path) -> GaitFile:
     """Read a gait file strictly: GaitError names the file, and the key that is unknown, missing or out of range."""
     try:
-        document = parse_toml(Path(path).read_text(encoding="utf-8"))
+        document = parse_toml(read_text(path))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise GaitError(f"cannot read the gait {path}: {error}") from None
     if (version := document.pop("format", FORMAT)) != FORMAT:

@@ -12,7 +12,7 @@ import numpy as np
 import tomli_w
 
 from bifa.errors import BifaError
-from bifa.files import write_text
+from bifa.files import read_text, write_text
 from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Covariance, Model
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter
@@ -43,7 +43,7 @@ def _shipped(name: str) -> Model:
 def load_model(path: str | Path) -> Model:
     """Read a model file. ModelFileError for another format, unknown or missing names, values out of range."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise ModelFileError(f"cannot read the model {path}: {error}") from None
     return _parse(text, str(path))

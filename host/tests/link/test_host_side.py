@@ -1,5 +1,6 @@
 """The host's own part: units, gait files, versions, ports, the commands."""
 
+import itertools
 import random
 import re
 from decimal import Decimal
@@ -88,12 +89,59 @@ def test_leaving_turns_the_valves_off():
     assert (board.valves, board.state) == (0, "stopped")
 
 
+SAMPLE = {"state": 0, "pressure_mpsi": (0, 0, 0), "phase": (0, 0, 0), "command": 0b100100, "valves": 0}
+
+
+def heard(uno: Uno, number: int) -> None:
+    """The sample of that number arrives, as it looks on the wire."""
+    wire = {"sequence": number % 65536, "time_us": (number * 10_000 + 3_000) % 2**32}
+    uno._take_sample(Report("sample", number % 256, SAMPLE | wire))
+
+
+class HostClock:
+    """A host's clock that is set."""
+
+    now_s = 0.0
+
+    def now(self) -> float:
+        return self.now_s
+
+
+@settings(deadline=None)
+@given(st.lists(st.integers(1, 420_000), min_size=1, max_size=20), st.integers(0, 2**20), st.booleans())
+def test_a_pause_is_counted_however_long_it_was(gaps, first, is_asleep):
+    """Up to 70 minutes, which is 6 times round the number and nearly once round the time, with the host asleep."""
+    uno, clock = Uno(Board(), HostClock()), HostClock()
+    uno._clock = clock
+    number = first
+    heard(uno, number)
+    for gap in gaps:
+        number += gap
+        clock.now_s += 0.0 if is_asleep else gap * 0.01
+        heard(uno, number)
+        heard(uno, number)  # a repeat
+    samples = uno.taken_samples()
+    assert [b.sequence - a.sequence for a, b in itertools.pairwise(samples)] == gaps
+    assert [b.time_us - a.time_us for a, b in itertools.pairwise(samples)] == [10_000 * gap for gap in gaps]
+    assert uno.counters.lost == sum(gaps) - len(gaps)
+
+
+@pytest.mark.parametrize("pause_s", [328, 400, 655, 2160, 4000, 4300, 10_000, 100_000])
+def test_time_goes_on_after_a_pause(pause_s):
+    uno, clock = Uno(Board(), HostClock()), HostClock()
+    uno._clock = clock
+    for number in (0, 1, 100 * pause_s, 100 * pause_s + 1):
+        clock.now_s = number * 0.01 * 1.005  # an Uno's clock is good to 0.5 %
+        heard(uno, number)
+    assert [sample.time_us // 10_000 for sample in uno.taken_samples()] == [0, 1, 100 * pause_s, 100 * pause_s + 1]
+    assert uno.counters.lost == 100 * pause_s - 2
+
+
 def test_lost_samples_are_counted():
     board = Board()
     uno = Uno(board, board)
-    fields = {"state": 0, "pressure_mpsi": (0, 0, 0), "phase": (0, 0, 0), "command": 0b100100, "valves": 0}
-    for sequence in (65533, 65534, 65535, 2, 3, 3, 7):
-        uno._take_sample(Report("sample", sequence % 256, {**fields, "sequence": sequence, "time_us": sequence * 10}))
+    for number in (65533, 65534, 65535, 65538, 65539, 65539, 65543):
+        heard(uno, number)
     assert (uno.counters.samples, uno.counters.lost) == (7, 5)
     samples = uno.taken_samples()
     assert [s.sequence for s in samples] == [65533, 65534, 65535, 65538, 65539, 65543]
@@ -112,6 +160,31 @@ def test_the_clock_relation_keeps_its_bound(drift, offset_s, seed):
         host = relation.to_host(uno_s)
         assert abs(host.time_s - offset_s - (1 + drift) * uno_s) <= host.bound_s + 1e-7
         assert abs(relation.estimate(uno_s) - host.time_s) <= host.bound_s + 0.01
+
+
+@pytest.mark.parametrize("jump_s", [1786.0, 60.0, 0.5, -0.5, -1786.0])
+def test_a_clock_that_jumps_voids_what_was_exchanged_before(jump_s):
+    """A host that slept: its clock stood (or was set on), and the exchanges before contradict those after."""
+    relation, here_s = ClockRelation(), 0.0
+    for i in range(63):
+        jumped_s = jump_s if i >= 50 else 0.0
+        here_s = 100.0 + i - jumped_s
+        relation.add(here_s - 0.002, float(i), here_s + 0.002)
+    now = relation.to_host(62.0)
+    assert abs(now.time_s - here_s) <= now.bound_s <= 0.01
+    assert len(relation) == 13
+
+
+@given(st.lists(st.floats(-3e-3, 3e-3), min_size=3, max_size=20))
+@settings(max_examples=40, deadline=None)
+def test_exchanges_that_contradict_one_another_widen_the_bound(wobbles):
+    """Whatever they are off by, some line is within the bound of what each of them says."""
+    relation = ClockRelation()
+    for i, wobble_s in enumerate(wobbles):
+        relation.add(100.0 + i + wobble_s - 1e-6, float(i), 100.0 + i + wobble_s + 1e-6)
+    for i, wobble_s in enumerate(wobbles):
+        host = relation.to_host(float(i))
+        assert abs(host.time_s - (100.0 + i + wobble_s)) <= host.bound_s + 2e-6
 
 
 def test_wrong_ports_are_named():

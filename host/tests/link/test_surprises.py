@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from bifa.cli import app
-from bifa.link import MismatchError, RestartedError, Uno, frames
+from bifa.link import MismatchError, NoAnswerError, RestartedError, Uno, frames
 from bifa.link.frames import Report
 from bifa.link.session import Hello
 from bifa.link.table import REPORTS, STATES
@@ -98,14 +98,14 @@ def connected() -> Uno:
 @settings(max_examples=30)
 def test_any_sample_can_be_shown_and_recorded(connected, raw):
     uno = connected
-    uno._last_sequence = None
+    uno._last_sample = None
     uno._take_sample(Report("sample", 0, frames._unpack(REPORTS["sample"], raw)))
     (sample,) = uno.taken_samples()
     assert sample.state in STATES or sample.state == f"unknown ({raw[6]})"
     monitor = Monitor(uno)
     monitor.take([sample])
     with Console(width=80).capture() as _:
-        Console(width=80).print(monitor.draw())
+        Console(width=80).print(monitor.draw(80))
     assert len(_row(uno, sample, 0)) == len(HEADER)
 
 
@@ -185,3 +185,18 @@ def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(tmp_path):
     assert done.exit_code == 0, done.output
     assert done.output.count("\\x1b]0;owned\\x07") == 3
     assert done.output.replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("ask", [Uno.status, Uno.parameters, Uno.presets, Uno.exchange_clocks])
+def test_an_answer_of_another_kind_is_none(board, ask):
+    """Each is asked again, and then said not to have been answered."""
+    uno = Uno(board, board)
+    uno.connect()
+    take = uno.session._take
+
+    def another(report, now_s):
+        take(Report("done", report.sequence, {"result": 0}) if report.name.endswith("_report") else report, now_s)
+
+    uno.session._take = another
+    with pytest.raises(NoAnswerError, match=r"[1-9]\d* bad frames"):
+        ask(uno)

@@ -1,0 +1,52 @@
+"""What commands print: text from files is text."""
+
+import io
+
+import pytest
+from rich.table import Table
+from typer.testing import CliRunner
+
+from bifa.cli import app
+from bifa.robot import nominal, save_model
+from bifa.screen import Console, warning, words
+
+NAMES = ["[/x]", "[link=https://evil.example]here[/link]", "[red]", "[bold]x[/bold]", ":warning:", "a\\[b"]
+
+
+def printed(*things, **options) -> str:
+    out = io.StringIO()
+    Console(file=out, width=200, force_terminal=True, **options).print(*things, highlight=False)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_markup_is_obeyed_wherever_it_stands(name):
+    table = Table(name, title=name)
+    table.add_row(name)
+    for thing in (name, table, warning(name)):
+        assert name in printed(thing)
+        assert "evil.example\x1b\\" not in printed(thing)
+    with Console(file=io.StringIO(), force_terminal=True).status(name):
+        pass
+    from rich.progress import Progress
+
+    out = io.StringIO()
+    with Progress(words("{task.description}"), console=Console(file=out, width=200, force_terminal=True)) as bars:
+        bars.add_task(name, total=1.0)
+    assert name in out.getvalue()
+
+
+@pytest.mark.parametrize("name", ["[/x]", "[link=https://evil.example]m[/link]"])
+@pytest.mark.parametrize("command", [("simulate", "--paper"), ("simulate",)])
+def test_a_model_may_be_called_anything(tmp_path, name, command):
+    from dataclasses import replace
+
+    save_model(tmp_path / "m.toml", replace(nominal(), name=name))
+    (tmp_path / "g.toml").write_text(
+        "period_s = 5.7\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
+    )
+    arguments = [*command, "--model", str(tmp_path / "m.toml")]
+    arguments += ["--gait", str(tmp_path / "g.toml")] if len(command) == 1 else []
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"}, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert name in result.output
