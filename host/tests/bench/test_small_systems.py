@@ -252,12 +252,26 @@ def test_a_trial_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys)
     monkeypatch.setattr(small_systems, "compiled", lambda: None)
     path = tmp_path / "small.jsonl"
     given = ["--records", str(path), "--singles", "0", "--withheld", "0", "--pairs", "0", "--decoys", "0"]
-    small_systems.main([*given, "--none", "2"])
-    small_systems.main([*given, "--none", "3"])
+    small_systems.main([*given, "--none", "2", "--without-peers"])
+    small_systems.main([*given, "--none", "3", "--without-peers"])
     assert asked == [8000, 8001, 8002]
     assert len(path.read_text().splitlines()) == 3
     assert losses_beside(path).exists()
     assert "3/3 = 1.00" in capsys.readouterr().out
+
+
+def test_peers_are_asked_later_of_sets_that_are_there_and_the_engine_is_not(tmp_path, monkeypatch, capsys):
+    said = record("none", []) | {"seed": 8000, "processor_seconds": 1.0, "simulations": 9, "version": "v", "off": 1.0}
+    path = tmp_path / "small.jsonl"
+    small_systems.lines.write(path, [said])
+    monkeypatch.setattr(small_systems, "compiled", lambda: None)
+    monkeypatch.setattr(small_systems, "drawn", lambda truth, seed: (truth, seed))
+    answer = {"named": ["wall"], "off": 2.0, "processor_seconds": 3.0}
+    monkeypatch.setattr(small_systems, "asked", lambda truth, seed: {"a peer": answer})
+    given = ["--records", str(path), "--singles", "0", "--withheld", "0", "--pairs", "0", "--decoys", "0"]
+    small_systems.main([*given, "--none", "1"])
+    assert json.loads(path.read_text())["peers"] == {"a peer": answer}
+    assert "a peer                      0/1 = 0.00" in capsys.readouterr().out
 
 
 def test_which_draw_can_be_told_is_kept_as_it_is_found_out():
