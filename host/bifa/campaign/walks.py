@@ -81,7 +81,7 @@ def predict(model: Model, trial: Trial) -> dict[str, Any]:
 def predicted_speed(model: Model, trial: Trial) -> float:
     """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
     columns = predict(model, trial)
-    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.gait["period_s"]).mean_mm_s
+    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.gait["period_s"], 0.0).mean_mm_s
 
 
 def walks_stage(

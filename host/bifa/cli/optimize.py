@@ -50,7 +50,7 @@ def optimize(
     ] = None,
     spread: Annotated[
         float | None,
-        typer.Option(help="Relative sd of every parameter; left out: the model's covariance, or 0.02 without one."),
+        typer.Option(help="Relative sd of every parameter; left out: what the model's fit knows, or a guess of 0.02."),
     ] = None,
     period: Annotated[tuple[float, float], typer.Option(help="Range of the period in s.")] = (2.0, 4.0),
     dask: Annotated[str | None, typer.Option(help=cluster.HELP)] = None,
@@ -168,6 +168,7 @@ def _summary(optimum: "Optimum") -> "Table":
         table.add_row(f"{share}th percentile of {speeds.size} robots", f"{np.percentile(speeds, share):.2f} mm/s")
     lost = float(np.mean(speeds < 0.5 * optimum.nominal_mm_s))
     table.add_row("robots that lose over half the speed, or slip", f"{100 * lost:.1f} %")
+    table.add_row("predicted, 90 %", optimum.prediction.text)
     table.add_row("uncertainty", optimum.spread.text)
     return table
 

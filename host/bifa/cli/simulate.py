@@ -78,6 +78,8 @@ def simulate(
         return
     chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
     record, speed_mm_s = _walk(console, chosen, file.gait, cycles, inclination, obstacle, buckling)
+    if not (obstacle or inclination):
+        _print_prediction(console, chosen, file.gait)
     if out:
         _write_csv(out, record.columns)
         console.print(f"channels: {out}", highlight=False)
@@ -129,11 +131,27 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Pro
         table.add_row(str(k + 1), f"{1e3 * advance:.2f}", f"{1e3 * slip:.3f}", f"{1e3 * advance / gait.period_s:.2f}")
     console.print(table)
     console.print(f"speed of the last cycle: {progress.speed_mm_s[0]:.2f} mm/s", highlight=False)
-    if len(progress.advance_m[0]) >= 3 and progress.unsettled[0] > 0.01:
+    from bifa.gait.settling import LEAST, settling
+
+    found = settling(1e3 * progress.advance_m[0])
+    if found.is_settled:
+        console.print(f"settled from cycle {found.begins + 1} on", highlight=False)
+    elif len(progress.advance_m[0]) >= LEAST:
         console.print(
-            f"not settled: the last three cycles differ by {progress.unsettled[0]:.0%}; try more --cycles",
+            f"not settled: its last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles",
             highlight=False,
         )
+
+
+def _print_prediction(console: "Console", model: "Model", gait: "Gait") -> None:
+    """What a robot will do that is known as the model is."""
+    from bifa.gait import predict_speed, spread_of
+
+    known = spread_of(model)
+    with console.status("predicting"):
+        prediction = predict_speed(model, known, gait)
+    console.print(f"predicted, 90 %: {prediction.text}", highlight=False)
+    console.print(f"what is known: {known.text}", highlight=False)
 
 
 def _print_passing(

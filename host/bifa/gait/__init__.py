@@ -11,15 +11,19 @@ import importlib
 
 _PLACES = {
     "Metric": "metric",
+    "Knowledge": "uncertainty",
     "Optimum": "search",
     "Passage": "metric",
+    "Prediction": "prediction",
     "SearchError": "search",
     "SearchSpace": "space",
     "Settings": "search",
     "SpaceError": "space",
     "UncertaintyError": "uncertainty",
     "optimise": "search",
+    "measured_speed": "measured",
     "paper_space": "space",
+    "predict_speed": "prediction",
     "simulations": "pool",
     "spread_of": "uncertainty",
 }

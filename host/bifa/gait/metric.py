@@ -48,6 +48,11 @@ class Metric:
     inclination_deg: float = 0.0
 
     @property
+    def is_plain(self) -> bool:
+        """Whether it is of a walk forward through a level pipe."""
+        return self.direction == 1 and self.inclination_deg == 0.0
+
+    @property
     def terrain(self) -> np.ndarray:
         """No obstacles."""
         return CLEAR

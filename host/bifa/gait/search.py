@@ -12,8 +12,9 @@ from bifa.gait.methods.common import Recorder
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
 from bifa.gait.pool import Simulations
+from bifa.gait.prediction import Prediction, predict_speed
 from bifa.gait.space import SearchSpace, paper_space
-from bifa.gait.uncertainty import Spread, spread_of
+from bifa.gait.uncertainty import Knowledge, spread_of
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
 from bifa.simulate import gait_rows, plant
@@ -65,8 +66,10 @@ class SearchError(BifaError):
 
 @dataclass(frozen=True)
 class Settings:
-    """How to search. `evaluations` None: a number that suits the method. `spread` None: the model's covariance,
-    or 2 % without one. `refine`: follow the method with small CMA-ES runs from its best points (the paper did not)."""
+    """How to search. `evaluations` None: a number that suits the method. `spread` None: what is known of the model, or
+    2 % where nothing was fitted; `naive`: of that the covariance alone. `share`: of the robots, how many may be slower
+    than what is maximised. `refine`: follow the method with small CMA-ES runs from its best points (the paper did not).
+    """
 
     method: str = "cma"
     robust: bool = True
@@ -76,6 +79,13 @@ class Settings:
     space: SearchSpace = field(default_factory=paper_space)
     metric: Metric | Passage = field(default_factory=Metric)
     refine: bool = True
+    naive: bool = False
+    share: float = QUANTILE
+
+    def knowledge(self, model: Model) -> Knowledge:
+        """From which the robots are drawn."""
+        known = spread_of(model, self.spread)
+        return known.naive if self.naive else known
 
 
 @dataclass(frozen=True)
@@ -83,18 +93,20 @@ class Optimum:
     """The gait and what is known of it.
 
     nominal_mm_s: verified on the model itself, 20 cycles with a finer step. speeds_mm_s: (n,) on `VERIFYING_DRAWS`
-    robots that the search never met; quantile_mm_s: their 10th percentile. explored: what the method evaluated.
+    robots that the search never met; quantile_mm_s: what all but the settings' share of them reach. explored: what the
+    method evaluated. prediction: of a walk.
     """
 
     gait: Gait
     nominal_mm_s: float
     quantile_mm_s: float
     speeds_mm_s: np.ndarray
-    spread: Spread
+    spread: Knowledge
     settings: Settings
     evaluations: int
     simulations: int
     explored: Found
+    prediction: Prediction
 
     @property
     def doubt(self) -> str:
@@ -120,7 +132,7 @@ def optimise(
         raise SearchError(f"method {settings.method!r} is not one of {', '.join(METHODS)}")
     say = on_progress or (lambda stage, share, best: None)
     started = runs.count
-    flat, spread = plant(model), spread_of(model, settings.spread)
+    flat, spread = plant(model), settings.knowledge(model)
     if settings.robust:
         objective = _on_robots(model, runs, spread, settings, _EXPLORE, 0)
     else:
@@ -143,14 +155,23 @@ def optimise(
     return Optimum(
         gait,
         nominal,
-        float(np.quantile(speeds, QUANTILE)),
+        float(np.quantile(speeds, settings.share)),
         speeds,
         spread,
         settings,
         sum(len(found.values) for found in (explored, *refined)),
         runs.count - started,
         explored,
+        _foretold(model, spread, gait, speeds, settings),
     )
+
+
+def _foretold(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, settings: Settings) -> Prediction:
+    """By the rule of measured walks; where the metric is another (up a pipe, through a tunnel), by the metric's own."""
+    plain = isinstance(settings.metric, Metric) and settings.metric.is_plain
+    if not plain:
+        return Prediction(speeds, settings.metric.cycles)
+    return predict_speed(model, known, gait, seed=settings.seed)
 
 
 def _explore(objective, screen, settings: Settings, say: OnProgress) -> Found:
@@ -201,11 +222,12 @@ def _refine_on_robots(model, runs, spread, explored: Found, settings: Settings, 
     return found[1:]
 
 
-def _on_robots(model, runs, spread: Spread, settings: Settings, stage: Round, number: int) -> RobustSpeed:
+def _on_robots(model, runs, spread: Knowledge, settings: Settings, stage: Round, number: int) -> RobustSpeed:
     """The objective of a round, on robots of its own."""
     draws = spread.plants(model, stage.draws, settings.seed + 500_000 * number)
     metric = settings.metric.quicker()
-    return RobustSpeed(runs, plant(model), draws, settings.space, metric, stage.quantile, stage.abandon)
+    share = stage.quantile * settings.share / QUANTILE
+    return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon)
 
 
 def _nominally(model, runs, explored: Found, settings, say) -> tuple[Gait, float]:
@@ -238,7 +260,7 @@ def _robustly(model, runs, spread, explored: Found, refined: Found, settings, sa
             if speed <= 0.0:
                 continue
             speeds = distribution(runs, checking, row[None], settings.metric)[0]
-            if np.quantile(speeds, _CHECK_QUANTILE) > 0.5 * speed:
+            if np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE) > 0.5 * speed:
                 return Gait(*row.tolist()), float(speed)
             if speeds.mean() > most:
                 otherwise, most = (Gait(*row.tolist()), float(speed)), speeds.mean()

@@ -1,17 +1,22 @@
-"""Robots that the model might be: draws of its parameters, the same for every gait (common random numbers)."""
+"""What is known of a robot, as draws of the robots that it may be, the same for every gait (common random numbers)."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import ndtri
 from scipy.stats import qmc
 
+from bifa.effects import library
 from bifa.errors import BifaError
-from bifa.robot.model import Model
+from bifa.robot.model import Model, Scatter
 from bifa.robot.parameters import BASE_PARAMETERS
 from bifa.simulate import Plant, plant
 
 SPREAD = 0.02  # relative standard deviation where the model has no covariance
+_RUNS = Scatter(friction=0.01)  # of a fit that does not say how its runs differ
 
 
 class UncertaintyError(BifaError):
@@ -19,30 +24,52 @@ class UncertaintyError(BifaError):
 
 
 @dataclass(frozen=True)
-class Spread:
-    """How the parameters vary: `names`, and `factor` (n, n) with covariance = factor @ factor.T."""
+class Knowledge:
+    """How a robot in its next walk may differ from the model: `names`, and `factor` (n, n) with covariance = factor @
+    factor.T, of its parameters; `scatter`: what differs from run to run, and what the model leaves unexplained.
+
+    Every draw is a robot in a walk of its own: also of its own are the values that an effect has in each trial, such as
+    a ripple's phase. What is unexplained of pressures lies on both supplies, of forces on what the body's air exerts.
+    `is_guess`: nothing was fitted.
+    """
 
     names: tuple[str, ...]
     factor: np.ndarray
     text: str
+    scatter: Scatter = field(default_factory=Scatter)
+    is_guess: bool = False
+
+    @property
+    def naive(self) -> Knowledge:
+        """The covariance alone, as if the model were true and every run the same."""
+        return replace(self, scatter=Scatter(), text=f"{self.text.split(';')[0]} alone")
 
     def plants(self, model: Model, count: int, seed: int) -> list[Plant]:
-        """`count` perturbed models, flat. A draw beyond a parameter's bounds is put on the bound.
+        """`count` robots, flat. A draw beyond a parameter's bounds is put on the bound.
 
         Drawn as a scrambled Sobol sequence, so that few draws already cover the spread; numbers differ by seed.
         """
+        own, moves = _own_values(model), _MOVES if self.scatter != Scatter() else ()
+        size = len(self.names) + len(moves) + len(own)
         power = max(0, int(np.ceil(np.log2(count))))
-        unit = qmc.Sobol(len(self.names), scramble=True, rng=np.random.default_rng([seed, 4])).random_base2(power)
-        normal = ndtri(np.clip(unit[:count], 1e-6, 1.0 - 1e-6))
-        values = np.array([model[name] for name in self.names]) + normal @ self.factor.T
-        lower, upper = np.transpose([_bounds(model, name) for name in self.names])
-        values = np.clip(values, lower, upper)
-        return [plant(model.with_values(dict(zip(self.names, row, strict=True)))) for row in values.tolist()]
+        unit = qmc.Sobol(size, scramble=True, rng=np.random.default_rng([seed, 4])).random_base2(power)[:count]
+        normal = ndtri(np.clip(unit, 1e-6, 1.0 - 1e-6))
+        drawn = np.array([model[name] for name in self.names]) + normal[:, : len(self.names)] @ self.factor.T
+        robots = []
+        for values, amounts, turns in zip(drawn, normal[:, len(self.names) :], unit[:, size - len(own) :], strict=True):
+            robot = {name: model[name] for name in _MOVED} | dict(zip(self.names, values.tolist(), strict=True))
+            for move, amount in zip(moves, amounts, strict=False):
+                move(robot, self.scatter, float(amount))
+            robot |= {
+                name: low + share * (high - low) for (name, (low, high)), share in zip(own.items(), turns, strict=True)
+            }
+            robots.append(plant(model.with_values({n: _within(model, n, v) for n, v in robot.items()})))
+        return robots
 
 
-def spread_of(model: Model, relative: float | None = None) -> Spread:
-    """From the covariance of the model's fit where it has one; otherwise, or where `relative` is given, that
-    relative standard deviation (2 % by default) on each of the base parameters, independently."""
+def spread_of(model: Model, relative: float | None = None) -> Knowledge:
+    """From the covariance of the model's fit and its scatter where it has them; otherwise, or where `relative` is
+    given, that relative standard deviation (2 % by default) on each of the base parameters, independently."""
     if model.covariance is not None and relative is None:
         values, vectors = np.linalg.eigh(model.covariance.matrix)
         if values.min() < -1e-9 * max(values.max(), 1e-300):
@@ -51,21 +78,65 @@ def spread_of(model: Model, relative: float | None = None) -> Spread:
                 "or give a relative spread"
             )
         factor = vectors * np.sqrt(np.maximum(values, 0.0))
-        names = model.covariance.names
-        return Spread(names, factor, f"the fit's covariance of {len(names)} parameters")
+        names, scatter = model.covariance.names, model.scatter or _RUNS
+        return Knowledge(names, factor, f"the fit's covariance of {len(names)} parameters; {_words(scatter)}", scatter)
     share = SPREAD if relative is None else relative
     if not 0.0 < share <= 0.5:
         raise UncertaintyError(f"spread = {share:g} must be above 0 and at most 0.5")
     names = tuple(BASE_PARAMETERS)
     factor = np.diag([share * abs(model[name]) for name in names])
-    return Spread(names, factor, f"{100 * share:g} % standard deviation of {len(names)} parameters, independent")
+    text = f"{100 * share:g} % standard deviation of {len(names)} parameters, independent"
+    return Knowledge(names, factor, text if relative is not None else f"{text}: a guess, without data", is_guess=True)
+
+
+def _words(scatter: Scatter) -> str:
+    said = [f"friction from run to run {100 * scatter.friction:.2g} %"]
+    for name, value, unit in (("pressure", scatter.pressure_psi, "psi"), ("force", scatter.force_N, "N")):
+        said += [f"{name} unexplained {value:.2g} {unit}"] if value > 0.0 else []
+    return ", ".join(said)
+
+
+def _friction(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
+    for name in ("mu_s", "mu_k"):
+        robot[name] *= 1.0 + scatter.friction * amount
+
+
+def _positive(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
+    robot["supply_positive_psi"] += scatter.pressure_psi * amount
+
+
+def _negative(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
+    robot["supply_negative_psi"] += scatter.pressure_psi * amount
+
+
+def _force(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
+    push_N = robot["body_area_N_psi"] * max(abs(robot["supply_positive_psi"]), 1.0)
+    robot["body_area_N_psi"] *= 1.0 + scatter.force_N * amount / push_N
+
+
+_MOVES = (_friction, _positive, _negative, _force)
+_MOVED = ("mu_s", "mu_k", "supply_positive_psi", "supply_negative_psi", "body_area_N_psi")
+
+
+def _own_values(model: Model) -> Mapping[str, tuple[float, float]]:
+    """Where the values lie that an active effect has in every trial: over one period, or between its bounds."""
+    found = {}
+    for effect in model.effects:
+        for parameter in library()[effect].parameters:
+            if parameter.own and effect != "instrument_shift":  # an instrument's, not the robot's
+                period = parameter.period
+                found[f"{effect}.{parameter.name}"] = (0.0, period) if period else (parameter.lower, parameter.upper)
+    return found
+
+
+def _within(model: Model, name: str, value: float) -> float:
+    lower, upper = _bounds(model, name)
+    return min(max(value, lower), upper)
 
 
 def _bounds(model: Model, name: str) -> tuple[float, float]:
     if name in model.parameters:
         return model.parameters[name].lower, model.parameters[name].upper
-    from bifa.effects import library
-
     effect, _, own = name.partition(".")
     parameter = next(p for p in library()[effect].parameters if p.name == own)
     return parameter.lower, parameter.upper

@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 
 from bifa.identify.robust import labelled, with_uncertainty
+from bifa.identify.scatter import with_scatter
 from bifa.pipe_robot.sites import learnt_curves
 from bifa.pipe_robot.system import RobotSystem
 from bifa.robot import Model
@@ -19,7 +20,7 @@ from lacuna.estimation.uncertainty import uncertainty
 
 def completed_model(fit: Fit, date: str = "") -> Model:
     """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of those
-    values that the data determine. `date`: of the fit, for its provenance."""
+    values that the data determine and with the scatter beyond it. `date`: of the fit, for its provenance."""
     structure = fit.structure
     system = cast(RobotSystem, structure.system)
     model = system.model_at(fit.theta, structure.effects)
@@ -28,4 +29,5 @@ def completed_model(fit: Fit, date: str = "") -> Model:
     sd = np.sqrt(np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fit))))
     named = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
     spread = {e.name: float(s) for e, s in zip(known.estimates, sd, strict=True) if e.determined and e.name in named}
-    return labelled(with_uncertainty(model, known, spread), system, "bifa diagnose", date)
+    model = with_scatter(with_uncertainty(model, known, spread), fit)
+    return labelled(model, system, "bifa diagnose", date)

@@ -11,6 +11,7 @@ import numpy as np
 from bifa.data import Dataset
 from bifa.identify.estimate import IntervalEstimate
 from bifa.identify.robust import labelled, with_uncertainty
+from bifa.identify.scatter import with_scatter
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import StaticFit
 from bifa.pipe_robot.inputs import ANCHOR
@@ -150,7 +151,8 @@ def _model(
 ) -> Model:
     """The identified model: fitted values with their sd, and the covariance of those that are determined."""
     sd = {name: interval.sd for name, interval in intervals.items()}
-    return labelled(with_uncertainty(system.model_at(fit.theta), known, sd), system, "bifa fit", date)
+    model = with_scatter(with_uncertainty(system.model_at(fit.theta), known, sd), fit)
+    return labelled(model, system, "bifa fit", date)
 
 
 _TOLD = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before

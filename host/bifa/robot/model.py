@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -34,6 +35,25 @@ class Covariance:
 
 
 @dataclass(frozen=True)
+class Scatter:
+    """What walks differ from the model by beyond the covariance of its values.
+
+    friction: relative standard deviation of the friction from run to run. pressure_psi, force_N: RMS of what the model
+    leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative.
+    """
+
+    friction: float = 0.0
+    pressure_psi: float = 0.0
+    force_N: float = 0.0
+    speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ModelParameterError(f"scatter.{name} = {value:g} must be a number not below 0")
+
+
+@dataclass(frozen=True)
 class Model:
     """A robot. Immutable: `with_values` and `with_effects` give changed copies, checked against the bounds.
 
@@ -49,6 +69,7 @@ class Model:
     learnt: Mapping[str, LearntCurve] = field(default_factory=dict)
     covariance: Covariance | None = None
     provenance: str = ""
+    scatter: Scatter | None = None
 
     def __post_init__(self) -> None:
         missing = [name for name in BASE_PARAMETERS if name not in self.parameters]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Set
+from dataclasses import asdict, fields
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import tomli_w
 from bifa.errors import BifaError
 from bifa.files import read_text, write_text
 from bifa.robot.learnt import LearntCurve
-from bifa.robot.model import Covariance, Model
+from bifa.robot.model import Covariance, Model, Scatter
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter
 from bifa.robot.stiffness import StiffnessCurve
 from bifa.toml import parse_toml
@@ -65,6 +66,8 @@ def save_model(path: str | Path, model: Model) -> None:
     if model.covariance is not None:
         covariance = model.covariance
         document["covariance"] = {"names": list(covariance.names), "matrix": covariance.matrix.tolist()}
+    if model.scatter is not None:
+        document["scatter"] = asdict(model.scatter)
     write_text(path, tomli_w.dumps(document))
 
 
@@ -91,7 +94,7 @@ def _parse(text: str, where: str) -> Model:
 
 
 def _build(document: dict[str, Any]) -> Model:
-    optional = {"provenance", "effects", "learnt", "covariance"}
+    optional = {"provenance", "effects", "learnt", "covariance", "scatter"}
     _only(document, "the file", {"format", "name", "parameters", "stiffness"}, optional)
     _only(document["stiffness"], "stiffness", {"body", "small"})
     entries = document["parameters"]
@@ -115,6 +118,7 @@ def _build(document: dict[str, Any]) -> Model:
         learnt={name: _learnt(name, entry) for name, entry in document.get("learnt", {}).items()},
         covariance=covariance,
         provenance=str(document.get("provenance", "")),
+        scatter=_read_scatter(document["scatter"]) if "scatter" in document else None,
     )
 
 
@@ -127,6 +131,14 @@ def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
     if sd is not None and not (isinstance(sd, (int, float)) and np.isfinite(sd) and sd >= 0):
         raise ModelFileError(f"parameters.{name}.sd must be a number not below 0")
     return base.with_value(entry["value"], sd=sd, source=str(entry.get("source", base.source)))
+
+
+def _read_scatter(entry: dict[str, Any]) -> Scatter:
+    _only(entry, "scatter", set(), {field.name for field in fields(Scatter)})
+    for name, value in entry.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ModelFileError(f"scatter.{name} must be a number not below 0")
+    return Scatter(**{name: float(value) for name, value in entry.items()})
 
 
 def _read_curve(name: str, entry: dict[str, Any]) -> StiffnessCurve:

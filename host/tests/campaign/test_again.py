@@ -15,6 +15,7 @@ from bifa.simulate import walk
 
 ROBOT = nominal()
 SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * ROBOT.values["mu_s"]})
+BRISK = ROBOT.with_values({"body_alpha_n_per_s": 1.2 * ROBOT["body_alpha_n_per_s"]})  # misses FASTER by 2 %
 FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
 FASTER = Gait(2.6, 204.5, 331.7, 0.6535, 0.439, 0.439)
 
@@ -23,7 +24,7 @@ def walked(gaits: dict[str, Gait], seed: int = 0) -> Dataset:
     draw = np.random.default_rng(seed)
     trials = []
     for name, gait in gaits.items():
-        clean = walk(ROBOT, gait, time_s=np.arange(0.0, 4 * gait.period_s, 0.01)).columns
+        clean = walk(ROBOT, gait, time_s=np.arange(0.0, 8 * gait.period_s + 0.01, 0.01)).columns
         for repeat in (1, 2, 3):
             columns = {
                 key: values + (0.1 * draw.standard_normal(len(values)) if key.startswith("displacement") else 0.0)
@@ -95,7 +96,7 @@ def test_a_gait_that_is_not_is_fed_back_and_the_next_one_judged(folders):
 
 
 def test_it_ends_where_nothing_changes_any_more(folders):
-    rounds, _ = go_round(folders, SLIPPERY, [SLIPPERY, SLIPPERY])
+    rounds, _ = go_round(folders, SLIPPERY, [BRISK, BRISK])
     assert len(rounds) == ROUNDS, "the second round names something else"
     assert [tuple(r["effects"]) for r in rounds] == [(), ("hysteresis",), ("hysteresis",)]
     assert [r["ended"] for r in rounds] == [None, None, "unchanged"]

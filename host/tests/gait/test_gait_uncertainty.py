@@ -27,7 +27,7 @@ def test_the_covariance_of_a_fit_is_used_where_there_is_one():
     names = ("mu_k", "body_area_N_psi")
     matrix = np.array([[1e-4, 0.8e-2 * 0.05], [0.8e-2 * 0.05, 0.0025]])
     model = nominal().with_values({}, Covariance(names, matrix))
-    plants = spread_of(model).plants(model, 1024, seed=3)
+    plants = spread_of(model).naive.plants(model, 1024, seed=3)
     drawn = np.cov(values(plants, "mu_k"), values(plants, "body_area_N_psi"))
     np.testing.assert_allclose(drawn, matrix, rtol=0.08)
     assert np.ptp(values(plants, "head_mass_kg")) == 0

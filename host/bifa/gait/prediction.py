@@ -1,0 +1,118 @@
+"""What is foretold of a gait: an interval of the speed, and the probability that the robot walks with it at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.gait.settling import CAMERA_MM, LEAST, STANDING_MM_S, settling
+from bifa.gait.uncertainty import Knowledge
+from bifa.robot.gait import Gait
+from bifa.robot.model import Model
+from bifa.simulate import gait_rows, speeds
+
+DRAWS = 256
+FINE_M = 1e-6  # a gait at the edge is judged with the fine step
+CYCLES = 16
+_FELL = 0.5  # of the median speed: what is slower does not walk as foretold
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Speeds in mm/s of a gait on `DRAWS` robots of what is known, each in a walk of its own, those that fall behind
+    included; `cycles`: by which nearly all have settled."""
+
+    speeds_mm_s: np.ndarray
+    cycles: int
+
+    @property
+    def walks(self) -> np.ndarray:
+        """(n,) which of the robots walk."""
+        return self.speeds_mm_s >= max(_FELL * float(np.median(self.speeds_mm_s)), STANDING_MM_S)
+
+    @property
+    def walks_probability(self) -> float:
+        """The share of them, by Laplace's rule: none is certain."""
+        return float((self.walks.sum() + 1.0) / (len(self.walks) + 2.0))
+
+    @property
+    def speed_mm_s(self) -> float:
+        """The median of those that walk; 0 where none does."""
+        return self._quantile(0.5)
+
+    def interval_mm_s(self, probability: float) -> tuple[float, float]:
+        """Of the speed, if the robot walks."""
+        return self._quantile(0.5 - 0.5 * probability), self._quantile(0.5 + 0.5 * probability)
+
+    @property
+    def interval_90_mm_s(self) -> tuple[float, float]:
+        """The same at 90 %."""
+        return self.interval_mm_s(0.9)
+
+    def holds(self, measured_mm_s: float, probability: float = 0.9) -> bool:
+        """Whether a measured speed lies in the interval."""
+        low, high = self.interval_mm_s(probability)
+        return low <= measured_mm_s <= high
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        low, high = self.interval_90_mm_s
+        return (
+            f"{self.speed_mm_s:.2f} mm/s ({low:.2f} to {high:.2f}), walks with probability {self.walks_probability:.2f}"
+        )
+
+    @property
+    def as_record(self) -> dict[str, object]:
+        """For summaries and provenance, by the names of the contract."""
+        return {
+            "speed_mm_s": round(self.speed_mm_s, 3),
+            "interval_90_mm_s": [round(v, 3) for v in self.interval_90_mm_s],
+            "interval_80_mm_s": [round(v, 3) for v in self.interval_mm_s(0.8)],
+            "walks_probability": round(self.walks_probability, 4),
+            "cycles_to_settle": self.cycles,
+        }
+
+    def _quantile(self, share: float) -> float:
+        walking = self.speeds_mm_s[self.walks]
+        return float(np.quantile(walking, share)) if walking.size else 0.0
+
+
+def predict_speed(
+    model: Model,
+    known: Knowledge,
+    gait: Gait,
+    *,
+    draws: int = DRAWS,
+    cycles: int = CYCLES,
+    seed: int = 0,
+    clock_rate: float = 1.0,
+    workers: int | None = None,
+) -> Prediction:
+    """Walk `gait` on robots drawn from what is `known` of `model`, by the rule that measured walks are judged by.
+
+    clock_rate: seconds per second of the Uno, whose cycles are longer by it; speeds are those on the Uno's clock.
+    """
+    robots = known.plants(model, draws, seed + 4_000_037)
+    row = gait_rows([gait])
+    row[:, 0] *= clock_rate
+    progress = speeds(robots, np.repeat(row, draws, axis=0), cycles, FINE_M, workers=workers)
+    advance_mm = 1e3 * progress.advance_m
+    found = [settling(one) for one in advance_mm]
+    means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
+    noise = np.random.default_rng([seed, 5]).standard_normal((2, draws))
+    means = means * (1.0 + known.scatter.speed * noise[0]) + noise[1] * camera_mm_s(gait)
+    return Prediction(np.fmax(np.nan_to_num(means), 0.0), _most(f.begins for f in found if f.is_settled) + LEAST)
+
+
+def camera_mm_s(gait: Gait, cycles: int = LEAST) -> float:
+    """Standard deviation of a speed that is measured over `cycles` cycles."""
+    return float(np.sqrt(2.0) * CAMERA_MM / (cycles * gait.period_s))
+
+
+def _most(begins: Iterable[int]) -> int:
+    """How many cycles nineteen of twenty robots take to settle."""
+    every = list(begins)
+    return int(np.ceil(np.quantile(every, 0.95))) if every else CYCLES

@@ -1,0 +1,92 @@
+"""What walks will differ from a fitted model by beyond its covariance: from run to run, and what is unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
+from bifa.pipe_robot.system import FRICTION_WOBBLE
+from bifa.robot import Model
+from bifa.robot.model import Scatter
+from lacuna.estimation.fit import Fit
+from lacuna.system import Channels
+
+_AS_EXPECTED = 5  # runs that count as having varied by what is expected beforehand
+_LAST = 50  # samples of a walk, over which its end is averaged
+
+
+def with_scatter(model: Model, fit: Fit) -> Model:
+    """`model`, fitted by `fit`, with the scatter that its residuals and its runs' friction show."""
+    return replace(model, scatter=scatter_of(fit))
+
+
+def scatter_of(fit: Fit) -> Scatter:
+    """Measured on the trials that were fitted; rounded, since it is an estimate from some tens of runs."""
+    found = {
+        "friction": _between_runs(fit),
+        "pressure_psi": _unexplained(fit, (STEP, WALK), lambda residual: _joined(residual, "pressure")),
+        "force_N": _unexplained(fit, (STATIC, ANCHOR), lambda residual: _joined(residual, "force")),
+        "speed": _speed(fit),
+    }
+    return Scatter(**{name: float(f"{value:.4g}") for name, value in found.items()})
+
+
+def _between_runs(fit: Fit) -> float:
+    """Standard deviation of the friction's factor over the runs, together with what was expected of it."""
+    factors = [
+        values[k]
+        for values, parameters in zip(fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
+        for k, parameter in enumerate(parameters)
+        if parameter.name == "friction_scale"
+    ]
+    square = sum((value - 1.0) ** 2 for value in factors) + _AS_EXPECTED * FRICTION_WOBBLE**2
+    return float(np.sqrt(square / (len(factors) + _AS_EXPECTED)))
+
+
+def _unexplained(fit: Fit, experiments: Sequence[str], part: Callable[[Channels], np.ndarray]) -> float:
+    """RMS of what the repeats of a condition share in their residuals, over the conditions of `experiments`."""
+    residuals = fit.residuals()
+    conditions: dict[object, list[np.ndarray]] = {}
+    for trial in fit.problem.trials:
+        if trial.experiment in experiments and (values := part(residuals[trial.name])).size:
+            conditions.setdefault((trial.experiment, trial.condition), []).append(values)
+    shared = [shared_square(repeats) for repeats in conditions.values()]
+    return float(np.sqrt(max(float(np.mean(shared)), 0.0))) if shared else 0.0
+
+
+def shared_square(repeats: Sequence[np.ndarray]) -> float:
+    """Mean product of two repeats' residuals: noise averages out of it. Of a single one its mean square."""
+    length = min(map(len, repeats))
+    rows = np.array([values[:length] for values in repeats])
+    if len(rows) == 1:
+        return float(np.mean(rows**2))
+    count = len(rows)
+    return float(np.mean(rows.sum(axis=0) ** 2 - (rows**2).sum(axis=0)) / (count * (count - 1)))
+
+
+def _joined(residual: Channels, quantity: str) -> np.ndarray:
+    values = [v for name, v in residual.items() if name.startswith(quantity)]
+    joined = np.concatenate(values) if values else np.zeros(0)
+    return joined[np.isfinite(joined)]
+
+
+def _speed(fit: Fit) -> float:
+    """By what part of the way walks end ahead of or behind the model, alike in every repeat."""
+    ways = {t.name: _end(t.channels) for t in fit.problem.trials if t.experiment == WALK}
+    residuals = fit.residuals()
+    conditions: dict[object, list[np.ndarray]] = {}
+    for trial in fit.problem.trials:
+        if trial.experiment == WALK and abs(ways[trial.name]) > 1.0:
+            off = np.array([_end(residuals[trial.name]) / ways[trial.name]])
+            if np.isfinite(off).all():
+                conditions.setdefault(trial.condition, []).append(off)
+    shared = [shared_square(repeats) for repeats in conditions.values()]
+    return float(np.sqrt(max(float(np.mean(shared)), 0.0))) if shared else 0.0
+
+
+def _end(channels: Channels) -> float:
+    """Where the head is at the end, mm."""
+    return float(np.mean(channels["displacement_head_mm"][-_LAST:]))

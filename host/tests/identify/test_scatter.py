@@ -1,0 +1,35 @@
+"""What repeats share, and no noise."""
+
+import numpy as np
+import pytest
+
+from bifa.errors import BifaError
+from bifa.identify.scatter import shared_square
+from bifa.robot import load_model, nominal, save_model
+from bifa.robot.model import Scatter
+
+
+def test_noise_averages_out_of_what_repeats_share():
+    draw = np.random.default_rng(0)
+    common = 0.3 * np.sin(np.linspace(0, 20, 4000))
+    repeats = [common + draw.standard_normal(4000) for _ in range(3)]
+    assert shared_square(repeats) == pytest.approx(np.mean(common**2), abs=0.04)
+    assert abs(shared_square([r - common for r in repeats])) < 0.04
+    assert shared_square(repeats[:1]) > 0.9  # a single repeat: noise cannot be told from what is unexplained
+
+
+def test_a_model_file_keeps_the_scatter(tmp_path):
+    from dataclasses import replace
+
+    model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001))
+    save_model(tmp_path / "m.toml", model)
+    assert load_model(tmp_path / "m.toml").scatter == model.scatter
+
+
+@pytest.mark.parametrize("line", ["friction = -0.1", 'friction = "much"', "friction = nan", "wind = 1.0"])
+def test_a_scatter_that_is_none_is_refused(tmp_path, line):
+    save_model(tmp_path / "m.toml", nominal())
+    with (tmp_path / "m.toml").open("a") as file:
+        file.write(f"\n[scatter]\n{line}\n")
+    with pytest.raises(BifaError, match="scatter"):
+        load_model(tmp_path / "m.toml")
