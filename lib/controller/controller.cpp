@@ -206,10 +206,7 @@ void Controller::step_oscillators() {
 void Controller::follow_schedule() {
   if (!schedule_.running()) return;
   const Critical guard;
-  if (supervisor_.is_latched()) {
-    schedule_.stop();
-    return;
-  }
+  if (supervisor_.is_latched()) schedule_.stop();
   Chamber chamber;
   ChamberState state;
   while (schedule_.take(chamber, state)) supervisor_.hold(chamber, state);
@@ -271,7 +268,6 @@ void Controller::watch_host() {
 
 void Controller::trip(Fault fault, uint8_t channel, int16_t value, int16_t limit) {
   const Critical guard;
-  schedule_.stop();
   supervisor_.trip(fault, channel, value, limit, uptime_ms_, last_second_);
 }
 

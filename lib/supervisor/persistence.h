@@ -19,8 +19,6 @@ class Persistence {
     return count_ >= needed;
   }
 
-  void reset() { count_ = 0; }
-
  private:
   uint8_t count_ = 0;
 };

@@ -55,7 +55,6 @@ void SensorWatch::reset() {
   above_.reset();
   jumping_.reset();
   out_of_range_.reset();
-  unmoved_.reset();
   last_driven_ = ChamberState::kOff;
   switched_ = false;
 }

@@ -90,10 +90,49 @@ uint8_t turns_after(uint8_t turns, uint16_t calm) {
   return 100;
 }
 
+/// Up by so many counts, down by so many, again and again.
+bool is_open_input(int16_t up, int16_t down) {
+  SensorWatch watch;
+  int16_t sum = kHalfScale;
+  samples_of(watch, 2, 0, kHalfScale);
+  for (uint8_t turn = 0; turn < 36; ++turn) {
+    sum += turn % 2 ? -down : up;
+    if (look(watch, 0, sum) != Fault::kNone) return true;
+  }
+  return false;
+}
+
+void test_both_ways_have_to_be_more_than_a_psi() {
+  TEST_ASSERT_TRUE(is_open_input(219, 300));
+  TEST_ASSERT_TRUE(is_open_input(300, 219));
+  TEST_ASSERT_FALSE(is_open_input(218, 300));
+  TEST_ASSERT_FALSE(is_open_input(300, 218));
+}
+
+void test_a_watch_that_is_reset_has_forgotten_turns_and_switches() {
+  SensorWatch watch;
+  samples_of(watch, 2, 0, kHalfScale);
+  for (uint8_t i = 0; i < 33; ++i) look(watch, 0, i % 2 ? kHalfScale : kHalfScale + 300);
+  watch.reset();
+  for (uint8_t i = 0; i < 20; ++i) {
+    TEST_ASSERT_TRUE(look(watch, 0, i % 2 ? kHalfScale : kHalfScale + 300) == Fault::kNone);
+  }
+  SensorWatch driven;
+  samples_of(driven, 2, 0, kHalfScale, kVacuum);
+  driven.reset();
+  TEST_ASSERT_TRUE(samples_of(driven, 250, 0, kHalfScale, kPositive) == Fault::kNone);
+  SensorWatch switched;
+  samples_of(switched, 2, 0, kHalfScale, kVacuum);
+  samples_of(switched, 150, 0, kHalfScale, kPositive);
+  switched.reset();
+  TEST_ASSERT_TRUE(samples_of(switched, 250, 0, kHalfScale, kPositive) == Fault::kNone);
+}
+
 void test_turns_add_up_and_are_forgotten_in_three_times_as_long() {
   TEST_ASSERT_EQUAL_UINT8(24, turns_after(20, 30));  // 60 - 30, one more for the jump that is no turn; 29 + 72 >= 100
   TEST_ASSERT_EQUAL_UINT8(34, turns_after(20, 70));
   TEST_ASSERT_EQUAL_UINT8(15, turns_after(20, 2));
+  TEST_ASSERT_EQUAL_UINT8(1, turns_after(33, 1));  // 99 - 2 + 3: exactly 100
 }
 
 void test_a_stuck_sensor_and_an_open_input_name_their_limits() {
@@ -120,6 +159,8 @@ void run() {
   RUN_TEST(test_a_reading_that_rests_is_not_stuck_while_nothing_switches);
   RUN_TEST(test_a_reading_that_moved_after_the_switch_may_rest);
   RUN_TEST(test_a_reading_that_turns_back_by_more_than_a_psi_from_sample_to_sample_is_an_open_input);
+  RUN_TEST(test_both_ways_have_to_be_more_than_a_psi);
+  RUN_TEST(test_a_watch_that_is_reset_has_forgotten_turns_and_switches);
   RUN_TEST(test_turns_add_up_and_are_forgotten_in_three_times_as_long);
   RUN_TEST(test_a_stuck_sensor_and_an_open_input_name_their_limits);
   RUN_TEST(test_a_chamber_that_was_vented_in_between_has_not_switched_unless_it_changed_supply);

@@ -72,26 +72,14 @@ void test_over_pressure_is_forgotten_in_four_times_as_long() {
   TEST_ASSERT_EQUAL_UINT8(20, samples_to_trip(10, 200));
 }
 
-void test_a_watch_that_is_reset_has_forgotten_everything() {
-  const uint16_t high = kHalfScale + 1000;
-  for (uint8_t kind = 0; kind < 4; ++kind) {
-    SensorWatch watch;
-    if (kind == 0) samples_of(watch, kTripSamples - 1, kTrip_mpsi + 1, kHalfScale);
-    if (kind == 1) samples_of(watch, 4, 0, 0);
-    if (kind == 2) {
-      for (uint8_t i = 0; i < 40; ++i) look(watch, 0, i % 2 ? high : kHalfScale);
-    }
-    if (kind == 3) {
-      look(watch, 0, kHalfScale, kVacuum);
-      samples_of(watch, 150, 0, kHalfScale, kPositive);
-    }
-    watch.reset();
-    TEST_ASSERT_TRUE(samples_of(watch, kTripSamples - 1, kTrip_mpsi + 1, kHalfScale) == Fault::kNone);
-    watch.reset();
-    TEST_ASSERT_TRUE(samples_of(watch, 4, 0, 0) == Fault::kNone);
-    watch.reset();
-    TEST_ASSERT_TRUE(samples_of(watch, 250, 0, kHalfScale, kPositive) == Fault::kNone);
-  }
+void test_a_watch_that_is_reset_has_forgotten_over_pressure_and_lost_samples() {
+  SensorWatch above, lost;
+  samples_of(above, kTripSamples - 1, kTrip_mpsi + 1, kHalfScale);
+  above.reset();
+  TEST_ASSERT_TRUE(samples_of(above, kTripSamples - 1, kTrip_mpsi + 1, kHalfScale) == Fault::kNone);
+  samples_of(lost, 4, 0, 0);
+  lost.reset();
+  TEST_ASSERT_TRUE(samples_of(lost, 4, 0, 0) == Fault::kNone);
 }
 
 void test_a_pressure_at_the_limit_is_not_above_it() {
@@ -142,6 +130,23 @@ void test_a_loose_plug_is_found_though_every_fifth_sample_is_good() {
     fault = look(watch, bifa::sensor_mpsi(sum), sum);
   }
   TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
+}
+
+/// Samples out of range after which it is a fault, of a watch that has seen 4 of them and then so many good ones.
+uint8_t lost_to_fault(uint8_t good) {
+  SensorWatch watch;
+  samples_of(watch, 4, 0, kUnplugged);
+  samples_of(watch, good, 0, kHalfScale);
+  uint8_t samples = 1;
+  while (samples < 100 && look(watch, 0, kUnplugged) == Fault::kNone) ++samples;
+  return samples;
+}
+
+void test_lost_samples_are_forgotten_in_four_times_as_long() {
+  TEST_ASSERT_EQUAL_UINT8(1, lost_to_fault(0));
+  TEST_ASSERT_EQUAL_UINT8(3, lost_to_fault(8));
+  TEST_ASSERT_EQUAL_UINT8(5, lost_to_fault(14));
+  TEST_ASSERT_EQUAL_UINT8(5, lost_to_fault(100));
 }
 
 void test_a_sample_out_of_range_now_and_then_is_borne() {
@@ -227,12 +232,13 @@ void run() {
   RUN_TEST(test_two_short_spikes_a_minute_apart_do_not_trip);
   RUN_TEST(test_over_pressure_trips_after_exactly_its_time_and_not_before);
   RUN_TEST(test_over_pressure_is_forgotten_in_four_times_as_long);
-  RUN_TEST(test_a_watch_that_is_reset_has_forgotten_everything);
+  RUN_TEST(test_a_watch_that_is_reset_has_forgotten_over_pressure_and_lost_samples);
   RUN_TEST(test_a_pressure_at_the_limit_is_not_above_it);
   RUN_TEST(test_times_are_counted_in_samples_that_fit_their_counter);
   RUN_TEST(test_a_sensor_that_is_lost_is_a_fault_though_it_reads_far_below_the_limit);
   RUN_TEST(test_a_saturated_sensor_is_a_sensor_fault);
   RUN_TEST(test_a_loose_plug_is_found_though_every_fifth_sample_is_good);
+  RUN_TEST(test_lost_samples_are_forgotten_in_four_times_as_long);
   RUN_TEST(test_a_sample_out_of_range_now_and_then_is_borne);
   RUN_TEST(test_over_pressure_is_found_through_a_loose_plug);
   RUN_TEST(test_a_sample_out_of_range_is_no_sign_that_over_pressure_is_over);

@@ -30,6 +30,8 @@ class StandInPlatform(PlatformBase):
             raise OtherPlatformIO(__version__)
         core_dir = Path(self.config.get("platformio", "core_dir"))
         destination = Path(self.config.get("platformio", "libdeps_dir")) / env
+        # PlatformIO would uninstall what platformio.ini named otherwise before, though it is what is named now.
+        (destination / "integrity.dat").unlink(missing_ok=True)
         for kept in sorted((core_dir / "stand_in_libraries" / self.name).iterdir()):
             installed = destination / kept.name
             if _same_package(kept, installed):

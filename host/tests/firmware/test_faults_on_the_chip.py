@@ -54,7 +54,7 @@ def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(ben
     bench.say("run")
     bench.wait(1.5)
     assert bench.valves_on
-    bench.board.set_analog(MONITOR, monitor_volts(12.5))  # 4 psi off, 3 are borne
+    bench.board.set_analog(MONITOR, monitor_volts(16.0))  # 7.5 psi off, 6.7 are borne
     bench.wait(2.2)
     assert bench.valves_on, "for 2.5 s it may be on its way"
     bench.wait(0.4)
@@ -62,13 +62,23 @@ def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(ben
     fault = next(line for line in bench.say("status", 0.5).splitlines() if line.startswith("[fault"))
     words = fault.split()
     assert words[1] == "regulator"
-    assert int(words[words.index("value") + 1]) == pytest.approx(12_500, abs=160)  # a count is 0.16 psi
+    assert int(words[words.index("value") + 1]) == pytest.approx(16_000, abs=160)  # a count is 0.16 psi
     assert int(words[words.index("limit") + 1]) == 8500
     assert bench.board.dac_code == 0
     assert "error" in bench.say("clear")
     bench.board.set_analog(MONITOR, monitor_volts(0))
     bench.wait(0.1)
     assert bench.say("clear").endswith("ok\r\n")
+
+
+@pytest.mark.parametrize("supply_V", [4.5, 4.75, 5.25])
+def test_supply_of_the_board_is_not_taken_for_a_regulator_that_does_not_follow(bench, supply_V):
+    """The simulated reference is 5 V; the monitor's volts do not follow the board's supply, the DAC does."""
+    for set_point_psi in (0, 8.5, 14):
+        bench.say(f"set pressure_psi {set_point_psi}")
+        bench.board.set_analog(MONITOR, monitor_volts(set_point_psi * supply_V / 5) * 5 / supply_V)
+        bench.wait(3.5)
+        assert "fault" not in bench.say("status", 0.3)
 
 
 @pytest.mark.parametrize("mode", ["absent", "stuck", "held"])

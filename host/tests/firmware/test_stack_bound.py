@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench import stack_bound
+from bench import bench_uno, parts, stack_bound
 
 pytestmark = pytest.mark.uno
 
@@ -54,4 +54,16 @@ def test_recursion_and_a_pointer_of_which_nothing_is_known_are_errors():
 
 def test_stack_of_the_image_cannot_meet_its_data():
     most, _ = stack_bound.bound()
-    assert 300 < most <= stack_bound.room()
+    assert most > 300
+    _, ram = bench_uno.image_sizes()
+    assert stack_bound.RAM_BYTES - ram - most >= bench_uno.STACK_FREE_LIMIT
+
+
+def test_image_keeps_its_budgets_and_its_parts_are_all_of_it():
+    flash, ram = bench_uno.image_sizes()
+    assert flash <= bench_uno.FLASH_LIMIT
+    assert ram <= bench_uno.RAM_LIMIT
+    costs = parts.costs()
+    assert sum(in_flash for in_flash, _ in costs.values()) == flash - bench_uno.REAL_DAC_LIBRARY_BYTES
+    assert sum(in_ram for _, in_ram in costs.values()) == ram - bench_uno.REAL_DAC_LIBRARY_RAM_BYTES
+    assert costs[parts.REST][0] < 1000, "what no symbol claims"

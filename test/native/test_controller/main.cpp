@@ -856,6 +856,18 @@ void test_a_fault_is_not_cleared_while_any_chamber_has_its_cause() {
   }
 }
 
+void test_what_stands_for_one_fault_does_not_keep_another() {
+  Bench bench;
+  bench.round.monitor = 258;  // 8.5 psi, which in a fault is off the set-point of 0
+  bench.tick(1100);
+  bench.pressure(0, 512 + 330);
+  bench.tick(230);
+  equal(Fault::kOverPressure, bench.fault());
+  bench.pressure(0, 512);
+  bench.tick(20);
+  equal(Verdict::kDone, bench.clear());
+}
+
 void test_a_fault_keeps_the_extremes_of_every_chamber() {
   Bench bench;
   bench.noisy = false;
@@ -879,6 +891,33 @@ void test_a_fault_keeps_the_extremes_of_every_chamber() {
   TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(1023 * 8), report.highest_mpsi[2]);
   TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(1023 * 8), report.value);
   TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(bifa::kSensorHigh), report.limit);
+}
+
+void test_a_regulator_that_does_not_follow_is_a_fault_and_a_clear_forgets_what_was_counted() {
+  const uint16_t at_8_5_psi = 258, at_20_psi = 330;
+  Bench bench;
+  bench.round.monitor = at_8_5_psi;
+  bench.controller.run();
+  bench.tick(2000);
+  bench.round.monitor = at_20_psi;
+  bench.tick(2400);
+  equal(State::kRunning, bench.state());
+  bench.stop_byte();
+  equal(Verdict::kDone, bench.clear());
+  bench.tick(2400);
+  equal(Fault::kNone, bench.fault());
+  bench.tick(200);
+  equal(Fault::kRegulator, bench.fault());
+  const bifa::FaultReport report = bench.controller.status().fault;
+  TEST_ASSERT_EQUAL_UINT8(bifa::kNoChannel, report.channel);
+  TEST_ASSERT_EQUAL_INT16(bifa::monitor_mpsi(at_20_psi), report.value);
+  TEST_ASSERT_EQUAL_INT16(8500, report.limit);
+  bench.round.monitor = at_8_5_psi;
+  bench.tick(20);
+  equal(Verdict::kCauseStands, bench.clear());  // in a fault the set-point is 0
+  bench.round.monitor = 205;
+  bench.tick(20);
+  equal(Verdict::kDone, bench.clear());
 }
 
 void test_without_a_time_out_the_host_may_be_silent_forever() {
@@ -1050,7 +1089,9 @@ void run() {
   RUN_TEST(test_a_clear_forgets_what_every_sensor_has_counted);
   RUN_TEST(test_a_clear_does_not_shorten_the_time_that_a_valve_needs_to_close);
   RUN_TEST(test_a_fault_is_not_cleared_while_any_chamber_has_its_cause);
+  RUN_TEST(test_what_stands_for_one_fault_does_not_keep_another);
   RUN_TEST(test_a_fault_keeps_the_extremes_of_every_chamber);
+  RUN_TEST(test_a_regulator_that_does_not_follow_is_a_fault_and_a_clear_forgets_what_was_counted);
   RUN_TEST(test_without_a_time_out_the_host_may_be_silent_forever);
   RUN_TEST(test_a_dac_that_does_not_answer_is_a_fault_until_it_does);
   RUN_TEST(test_after_the_watchdog_it_starts_in_a_fault);
