@@ -9,11 +9,11 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -171,32 +171,41 @@ class Sheet:
         last = len(frame) - int(np.argmin(empty[::-1])) if len(frame) and not empty.all() else 0
         return frame.iloc[:last]
 
-    def _parsed(self, **how: Any) -> Any:
+    def _parsed(self) -> Any:
+        """By pandas; where it finds no table, or other lines than the file has (a quote that is left open), line by
+        line as it was written."""
         import pandas
 
-        how = {
-            "header": None,
-            "sep": r"\s+" if self._form.separator == " " else self._form.separator,
-            "decimal": self._form.decimal,
-            "encoding": self._encoding,
-            "skip_blank_lines": False,
-            "skipinitialspace": True,
-            "keep_default_na": False,
-            "na_values": [""],
-            **_exact(),
-            **how,
-        }
         try:
-            return pandas.read_csv(io.BytesIO(self._rows), **how)
-        except pandas.errors.EmptyDataError:
-            return pandas.DataFrame(index=range(0), columns=range(len(self.names)), dtype=float)
-        except pandas.errors.ParserError:
-            lines = self._rows.split(b"\n")
-            cells = [len(self._cells(self._decoded(line))) for line in lines]
-            return pandas.read_csv(io.BytesIO(self._rows), **how, names=range(max(cells)))
-        except UnicodeDecodeError:
-            self._decoded(self._rows)
-            raise
+            frame = pandas.read_csv(
+                io.BytesIO(self._rows),
+                header=None,
+                sep=r"\s+" if self._form.separator == " " else self._form.separator,
+                decimal=self._form.decimal,
+                encoding=self._encoding,
+                skip_blank_lines=False,
+                skipinitialspace=True,
+                keep_default_na=False,
+                na_values=[""],
+                **_exact(),
+            )
+        except (ValueError, OverflowError, pandas.errors.ParserError):
+            frame = None
+        lines = self._rows.count(b"\n") + bool(self._rows.rpartition(b"\n")[2].strip(b"\r"))
+        if frame is not None and len(frame) == lines:
+            return frame
+        width = max([len(self.names), *map(len, self._written)])
+        rows = [[cell or None for cell in row] + [None] * (width - len(row)) for row in self._written]
+        return pandas.DataFrame(rows, columns=range(width), dtype=object)
+
+    @cached_property
+    def _written(self) -> Sequence[Sequence[str]]:
+        """The cells of each line, parted when they are asked for."""
+        lines = self._rows.split(b"\n")
+        return _Parted(lines if lines[-1].strip(b"\r") else lines[:-1], self._parts_of)
+
+    def _parts_of(self, raw: bytes) -> list[str]:
+        return self._cells(self._decoded(raw))
 
     # -- names -----------------------------------------------------------------------------------------------------
 
@@ -261,8 +270,7 @@ class Sheet:
             return [""] * len(self)
         if self._form.format == "xlsx":
             return ["" if cell != cell or cell is None else str(cell) for cell in self._frame.iloc[:, place]]
-        column = self._parsed(usecols=[place], dtype=str).iloc[: len(self), 0]
-        return ["" if cell != cell else str(cell) for cell in column]
+        return [row[place] if place < len(row) else "" for row in self._written[: len(self)]]
 
     def is_text(self, place: int) -> bool:
         """Whether no cell of a column is a number."""
@@ -289,13 +297,32 @@ class Sheet:
 
     def _refuse_beyond(self, row: int) -> None:
         width = len(self.names)
-        cells = self._cells(self._rows.split(b"\n")[row].decode(errors="replace")) if self._form.format == "csv" else []
+        cells = self._written[row] if self._form.format == "csv" else []
         raise self.error(
             f"{max(len(cells), width + 1)} fields, but {width} columns; are there commas in the numbers, or lines "
             "above the names of the columns? Save it with decimal points and without them, or declare how it is "
             "written (bifa instrument)",
             row,
         )
+
+
+class _Parted(Sequence[Sequence[str]]):
+    """Lines that are parted into cells one by one: of a file of many megabytes few are ever asked for."""
+
+    def __init__(self, lines: Sequence[bytes], parts_of: Callable[[bytes], list[str]]) -> None:
+        self._lines, self._parts_of = lines, parts_of
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    @overload
+    def __getitem__(self, place: int) -> Sequence[str]: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Sequence[str]]: ...
+    def __getitem__(self, place: int | slice) -> Any:
+        if isinstance(place, slice):
+            return _Parted(self._lines[place], self._parts_of)
+        return self._parts_of(self._lines[place])
 
 
 def _exact() -> dict[str, str]:

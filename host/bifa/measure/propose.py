@@ -152,7 +152,10 @@ def _is_utf8(raw: bytes) -> bool:
 def _split(line: str, mark: str) -> list[str]:
     if mark == " ":
         return line.split()
-    return next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])
+    try:
+        return next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])
+    except csv.Error:
+        return []
 
 
 def _numbers(lines: Sequence[str], mark: str, decimal: str) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from bifa.data import DatasetError, read_dataset
 from bifa.data.export import parse_exports, presets, read_export, sync_edges, unit_in
 from bifa.data.fields import Fields, Source
 from bifa.data.write import add_trial
+from bifa.measure.propose import look
 from bifa.toml import parse_toml
 from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
 
@@ -254,6 +255,30 @@ def test_any_number_is_read_to_the_last_bit(values, separator):
         export = declared(SIMPLE + f'separator = "{separator}"\n')
         found, _, _ = read_export(Path(folder) / "a.csv", export, MACHINE)
     assert found["displacement_mm"].tolist() == values
+
+
+FORMS = [
+    'separator = ";"\ndecimal = ","',
+    'separator = "space"',
+    'separator = "tab"\nheader = "t"',
+    'encoding = "utf-16"',
+]
+FORMS += ["skip_rows = 2\nheader_rows = 2", "units_rows = 1", "where = { x = 1 }", ""]
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.text("0123456789.,; \t\"'\r\n-eEtxF#\x00µ", max_size=80),
+    st.sampled_from(FORMS),
+    st.sampled_from(["t,x,F\n", "t;x;F\n", "t\tx\tF\n", "t x F\n", ""]),
+)
+def test_any_text_is_read_or_refused(text, form, names):
+    """Quotes that are left open, lines that end in the middle, rows of any length."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "a.csv").write_bytes((names + text).encode())
+        for work in (lambda p: read_export(p, declared(SIMPLE + form), MACHINE), look):
+            with suppress(DatasetError):
+                work(Path(folder) / "a.csv")
 
 
 @settings(max_examples=100, deadline=None)

@@ -226,7 +226,7 @@ def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
         ("pull.csv", table().replace(",", "\t"), "separated by tabs"),
         ("pull.csv", table(end=",5"), "line 2: 4 fields, but 3 columns.*decimal points"),
         ("pull.csv", table(header="time_s,displacement_mm,force_N,force_N", end=",5"), "force_N more than once"),
-        ("pull.csv", table(end="x" * 140_000), r"line 2, column force_N: '2x+\.\.\.' is not a number"),
+        ("pull.csv", table(end="x" * 140_000), "cannot be read as a CSV"),
     ],
 )
 def test_a_file_in_another_shape_is_refused_with_what_to_do(files, file, text, message):
