@@ -37,7 +37,7 @@ test: setup
 	for environment in native $(if $(quick),,sanitized simavr); do
 	    $(bin)/python tools/unity_suites.py $$environment || failed="$$failed $$environment"
 	done
-	(cd host && ../$(bin)/pytest -n 2 $(ARGS)) || failed="$$failed pytest"
+	(cd host && ../$(bin)/pytest -n 2 --dist worksteal $(ARGS)) || failed="$$failed pytest"
 	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
 
 bench: setup

@@ -42,7 +42,8 @@ def pytest_addoption(parser) -> None:
 
 def pytest_collection_modifyitems(config, items) -> None:
     """Tests in real time get a second chance. In another order where BIFA_TEST_ORDER is set, to a seed: the files
-    shuffled, and the tests in each. With --quick the slow ones and those in real time are left out."""
+    shuffled, and the tests in each; else the slow ones first, so that none is begun when all others are done. With
+    --quick the slow ones and those in real time are left out."""
     if config.getoption("quick"):
         left_out = [item for item in items if any(map(item.get_closest_marker, ("slow", "real_time")))]
         config.hook.pytest_deselected(items=left_out)
@@ -54,6 +55,8 @@ def pytest_collection_modifyitems(config, items) -> None:
         draw = random.Random(seed)
         of_file = {item.path: draw.random() for item in items}
         items.sort(key=lambda item: (of_file[item.path], draw.random()))
+    else:
+        items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

@@ -39,7 +39,9 @@ def register(app: typer.Typer) -> None:
             int | None, typer.Option(min=0, help="seed that draws a robot with an undisclosed effect")
         ] = None,
         seed: Annotated[int, typer.Option(min=0, help="seed of noise, clocks and run-to-run variation")] = 0,
-        firmware: Annotated[Path | None, typer.Option(help="ELF image instead of the one that is built")] = None,
+        firmware: Annotated[
+            Path | None, typer.Option(help="image (ELF or HEX) instead of the one that is built")
+        ] = None,
         eeprom: Annotated[
             Path | None, typer.Option(help="file that keeps the EEPROM between runs", dir_okay=False)
         ] = None,

@@ -47,7 +47,7 @@ def carried_image(folder: Path = FOLDER) -> Path:
             "this installation carries no firmware: install a wheel of a release, or work in a clone of the repository"
         ) from error
     if found != noted:
-        raise ImageError(f"{folder / HEX} is damaged; install bifa again: pip install --force-reinstall bifa")
+        raise ImageError(f"{folder / HEX} is damaged: install the wheel of bifa again")
     _check_tables(found, folder / HEX)
     return folder / HEX
 
