@@ -1,13 +1,17 @@
 """How a campaign was made, for its report: what to type to have it again."""
 
 import shlex
+from typing import TYPE_CHECKING
 
 from bifa.campaign.bench import Bench
+
+if TYPE_CHECKING:
+    from bifa.campaign.loop import Effort
 
 Pairs = list[tuple[str, str]]
 
 
-def about(bench: Bench, effort) -> tuple[str, Pairs]:
+def about(bench: Bench, effort: "Effort") -> tuple[str, Pairs]:
     """The robot in words, and how the campaign was made; the same for the same settings."""
     words = ["bifa", "campaign", "--port", bench.port]
     if bench.is_virtual:

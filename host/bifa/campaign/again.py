@@ -98,7 +98,7 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset) -> Round:
     measured = [speed.mean_mm_s for repeats in speeds(walks).values() for speed in repeats]
     return Round(
         effects,
-        dict(trials[0].gait),
+        trials[0].walked,
         predicted_speed(model, trials[0]),
         float(np.mean(measured)),
         float(np.std(measured, ddof=1)) if several else 0.0,
@@ -120,7 +120,7 @@ def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
 
 def _without_baseline(walks: Dataset) -> Dataset:
     """The optimised gait's walks: the bench has walked the baseline, for another length of time."""
-    return replace(walks, trials=tuple(t for t in walks.trials if Gait(**t.gait) != BASELINE))
+    return replace(walks, trials=tuple(t for t in walks.trials if Gait(**t.walked) != BASELINE))
 
 
 def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], trades: Trades) -> None:

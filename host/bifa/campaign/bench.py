@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from bifa.measure.by_hand import ByHand
-from bifa.rig import is_offered, open_rig
+from bifa.rig import Rig, is_offered, open_rig
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Bench:
         """Whether the robot is real: nothing is measured again unasked, and what was is kept beside the new."""
         return not self.is_virtual
 
-    def open(self, stage: int):
+    def open(self, stage: int) -> Rig:
         """The rig for stage number `stage`."""
         rig = open_rig(self.port, **self._options(stage))
         if rig.instruments is None and self.hands is not None:

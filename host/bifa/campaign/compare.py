@@ -103,7 +103,7 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
     walks = {
         _gait(t): Walk(
             TITLES[_gait(t)],
-            t.gait["period_s"],
+            t.walked["period_s"],
             {MEASURED: t.columns, COMPLETED: predict(completed, t), BASE: predict(base, t)},
         )
         for t in trials
@@ -133,7 +133,7 @@ def _gait(trial: Trial) -> str:
 
 def _when(measured: Dataset, walks: Sequence[Dataset]) -> list[tuple[str, str]]:
     """When the data was measured, by its files, and by which firmware."""
-    day = datetime.fromtimestamp((measured.path / "dataset.toml").stat().st_mtime).date().isoformat()
+    day = datetime.fromtimestamp((measured.folder / "dataset.toml").stat().st_mtime).date().isoformat()
     firmware = walks[0].provenance.get("firmware")
     return [("measured", day), *([("firmware", str(firmware))] if firmware else [])]
 
@@ -144,7 +144,7 @@ def _versions() -> tuple[str, str]:
 
 def _robustness(model: Model, trials: list[Trial]) -> dict[str, list[float]]:
     """Speeds in mm/s of every gait on robots that differ from the model by `SPREAD` in each parameter, sorted."""
-    gaits = {_gait(trial): Gait(**trial.gait) for trial in trials}
+    gaits = {_gait(trial): Gait(**trial.walked) for trial in trials}
     robots = spread_of(model, SPREAD).plants(model, _ROBOTS, 0)
     with simulations() as runs:
         speeds = distribution(runs, robots, gait_rows(list(gaits.values())), Metric())

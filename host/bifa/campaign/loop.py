@@ -30,6 +30,7 @@ from bifa.report.words import spoken
 from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from lacuna.diagnosis.diagnose import Diagnosis, diagnose
+from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
 Part = Callable[[str, float], None]
@@ -178,7 +179,7 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
         dataset = read_dataset(inputs / "bench")
         found = diagnosed(dataset)
         (outputs / "separating").mkdir()
-        ran = ()
+        ran: tuple[NextExperiment, ...] = ()
         if not bench.is_by_hand:
             dataset, found, ran = resolve(
                 dataset, found, diagnosed, lambda n: bench.open(_SEPARATING + n), outputs / "separating", part
@@ -214,8 +215,8 @@ def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
         trades = Trades(complete, lambda robot: _gait_of(robot, bench, part)[0], walk)
         again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
 
-    needs = ("bench", "separating", "walks-base", "walks-completed", "diagnosis.json")
-    needs += ("model-completed.toml", "gait-completed.toml")
+    walked = ("walks-base", "walks-completed")
+    needs = ("bench", "separating", *walked, "diagnosis.json", "model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
     settings = bench.settings(_FURTHER) | {"effort": asdict(effort)}
     kept = bench.is_kept
@@ -229,7 +230,8 @@ def _told(bench: Bench, part: Part) -> Part:
 
 def _unseal(bench: Bench) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
-        with bench.open(0) as rig:
+        virtual: Any = bench.open(0)
+        with virtual as rig:
             (outputs / "truth.json").write_text(json.dumps(rig.open_seal(), indent=1) + "\n")
 
     return Stage("unseal", "open the seal", ("diagnosis.json",), ("truth.json",), run, bench.settings(0))

@@ -97,7 +97,7 @@ def _faster(gaits: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _found(summary: Mapping[str, Any], diagnosis: Mapping) -> Section:
+def _found(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> Section:
     effects, truth = summary["effects"], summary["truth"]
     said = found_sentences(effects) if effects else []
     for experiment in diagnosis.get("separated_by", []):
@@ -112,7 +112,10 @@ def _found(summary: Mapping[str, Any], diagnosis: Mapping) -> Section:
 
 
 def _off(
-    summary: Mapping[str, Any], diagnosis: Mapping, traces: Sequence[Mapping], labels: Mapping[str, str]
+    summary: Mapping[str, Any],
+    diagnosis: Mapping[str, Any],
+    traces: Sequence[Mapping[str, Any]],
+    labels: Mapping[str, str],
 ) -> Section:
     groups = residual_charts(traces)
     return Section(

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.progress import BarColumn, Progress, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn
 from rich.table import Column
 
 from bifa.campaign.stages import Stage
@@ -22,7 +22,7 @@ class StageProgress:
         self._console = console
         self._title = ""
         self._bars: Progress | None = None
-        self._task = None
+        self._task = TaskID(0)
 
     def start(self, stage: Stage) -> None:
         """A stage begins."""
@@ -32,22 +32,22 @@ class StageProgress:
         else:
             self._begin()
 
-    def _begin(self) -> None:
-        self._bars = Progress(
+    def _begin(self) -> Progress:
+        self._bars = bars = Progress(
             words("{task.description}", table_column=Column(min_width=_TITLE)),
             BarColumn(bar_width=20),
             words("{task.fields[what]}"),
             TimeElapsedColumn(),
             console=self._console,
         )
-        self._task = self._bars.add_task(self._title, total=None, what="")
-        self._bars.start()
+        self._task = bars.add_task(self._title, total=None, what="")
+        bars.start()
+        return bars
 
     def part(self, what: str, share: float) -> None:
         """`what` inside the running stage is done to `share`, 0 to 1."""
-        if self._bars is None:
-            self._begin()
-        self._bars.update(self._task, total=1.0, completed=min(share, 0.999), what=what)
+        bars = self._bars or self._begin()
+        bars.update(self._task, total=1.0, completed=min(share, 0.999), what=what)
 
     def end(self, stage: Stage, ran: bool) -> None:
         """A stage is done; ran: it was not up to date already."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.estimation.fit import evaluate_on
+from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.system import Channels
 
 _POINTS = 400  # of a trace, enough for a small figure
 
@@ -39,7 +40,7 @@ def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any
     return shown
 
 
-def _in_units_of(reference, fitted):
+def _in_units_of(reference: Fit, fitted: Fit) -> Sequence[Channels]:
     """The scaled residuals of `fitted` in the units of `reference`'s noise floor."""
     return reference.problem.scaled(fitted.predictions())
 

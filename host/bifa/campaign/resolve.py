@@ -11,6 +11,7 @@ from typing import Any
 from bifa.data import Dataset, DatasetError, read_dataset
 from bifa.measure.plan import REPEATS, PlannedTrial
 from bifa.measure.session import run_session
+from bifa.rig import Rig
 from bifa.robot.gait import Gait
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.next_experiment import NextExperiment
@@ -19,7 +20,7 @@ ROUNDS = 3
 SPECIMEN = ("sealed", "profile", "effects", "parameters")  # of a virtual rig: what makes it the same robot again
 _WALK_CYCLES = 4
 
-OpenRig = Callable[[int], AbstractContextManager]
+OpenRig = Callable[[int], AbstractContextManager[Rig]]
 Diagnose = Callable[[Dataset], Diagnosis]
 Progress = Callable[[str, float], None]
 
@@ -68,6 +69,8 @@ def refuse_leftovers(folder: Path) -> None:
 def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:
     """The chosen experiment as trials of a session, with its repeats."""
     settings: Mapping[str, Any] = chosen.settings
+    if chosen.experiment is None:
+        raise ValueError("no experiment was chosen")
     gait = Gait(**settings["gait"]) if "gait" in settings else None
     condition = PlannedTrial(
         chosen.experiment,

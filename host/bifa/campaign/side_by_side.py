@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from bifa.report.words import (
 )
 from bifa.robot import Model, load_model
 from bifa.robot.gait import Gait, load_gait
+from bifa.robot.parameters import ModelParameter
 
 _SHADES = {"baseline": "quiet", "base": "before", "completed": "after"}
 _APART = 2.0  # standard deviations of the difference: parameters that differ by more stand out
@@ -111,7 +112,7 @@ def _lead(runs: Sequence[Run]) -> str:
     return f"They found different effects. {walks}"
 
 
-def _names(effects) -> str:
+def _names(effects: Iterable[str]) -> str:
     return " and ".join(effect_words(name) for name in sorted(effects))
 
 
@@ -169,10 +170,10 @@ def parameter_table(runs: Sequence[Run]) -> Table:
     return Table(["parameter", *(run.name for run in runs)], rows)
 
 
-def _differ(parameters) -> bool:
-    sure = [p for p in parameters if p.sd]
+def _differ(parameters: Sequence[ModelParameter]) -> bool:
+    sure = [(p.value, p.sd) for p in parameters if p.sd]
     return any(
-        abs(a.value - b.value) > _APART * np.hypot(a.sd, b.sd) for i, a in enumerate(sure) for b in sure[i + 1 :]
+        abs(a - b) > _APART * np.hypot(sd_a, sd_b) for i, (a, sd_a) in enumerate(sure) for b, sd_b in sure[i + 1 :]
     )
 
 

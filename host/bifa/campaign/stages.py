@@ -162,7 +162,7 @@ def _asked(folder: Path, stage: Stage) -> dict[str, Any]:
     }
 
 
-def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict | None) -> bool:
+def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict[str, Any] | None) -> bool:
     if record is None:
         return False
     made = record.get("artefacts", {})
@@ -184,7 +184,7 @@ def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict | Non
     return intact and same_inputs
 
 
-def _differing(old: Mapping[str, Any], new: Mapping) -> list[str]:
+def _differing(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Settings that both know and that differ, in words; another version may have more or fewer."""
     found = []
     for name in old.keys() & new.keys():
@@ -195,7 +195,7 @@ def _differing(old: Mapping[str, Any], new: Mapping) -> list[str]:
     return sorted(found)
 
 
-def _run(folder: Path, stage: Stage, asked: dict[str, Any], records: dict) -> None:
+def _run(folder: Path, stage: Stage, asked: dict[str, Any], records: dict[str, Any]) -> None:
     """Run the stage and move what it makes to its place. On record first: an interruption between the two then leaves
     nothing in the folder that is not on record, and the digests say that it is not yet what they promise."""
     scratch = _unfinished(folder, stage)
@@ -240,7 +240,7 @@ def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, An
     return begun
 
 
-def _other_inputs(begun: Mapping[str, Any], asked: Mapping) -> list[str]:
+def _other_inputs(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
     old = begun.get("inputs", {})
     return [name for name, now in asked["inputs"].items() if name in old and old[name] != now]
 

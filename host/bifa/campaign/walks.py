@@ -15,6 +15,7 @@ from bifa.measure.experiments import record_columns
 from bifa.measure.plan import PlannedTrial
 from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of
 from bifa.report.walks import MEASURED, Walk, draw_walks
+from bifa.rig import Rig
 from bifa.robot import Model
 from bifa.robot.gait import Gait
 from bifa.simulate import of_gait, walk
@@ -23,7 +24,7 @@ Progress = Callable[[str, float], None]
 
 
 def measure_walks(
-    rig,
+    rig: Rig,
     folder: Path,
     gaits: Mapping[str, Gait],
     cycles: int,
@@ -42,20 +43,16 @@ def measure_walks(
             planned = PlannedTrial("locomotion", gait=gaits[name], cycles=cycles, repeat=repeat)
             if writer.has(planned.as_trial()):
                 continue
-            trial = record(
-                rig,
-                uno,
-                planned,
-                lambda share, name=name: on_progress(name, share),
-                number=number,
-                total=total,
-                writer=writer,
-            )
+
+            def show(share: float, name: str = name) -> None:
+                on_progress(name, share)
+
+            trial = record(rig, uno, planned, show, number=number, total=total, writer=writer)
             writer.add(replace(trial, file=f"{name}_{repeat}.csv", session_order=number))
     return writer.finish()
 
 
-def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress, **_) -> Trial:
+def _walk(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
     """The `Recorder` of walks on a rig that needs nobody."""
     columns, extra = record_columns(rig, uno, planned, on_progress)
     return planned.as_trial(columns, extra=extra)
@@ -65,14 +62,14 @@ def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:
     """The measured speeds of each gait's repeats, by the name that `measure_walks` gave."""
     measured: dict[str, list[MeasuredSpeed]] = {}
     for trial in dataset.trials:
-        speed = measured_speed(trial.time_s, trial.columns["displacement_head_mm"], trial.gait["period_s"])
+        speed = measured_speed(trial.time_s, trial.columns["displacement_head_mm"], trial.walked["period_s"])
         measured.setdefault(trial.file.rsplit("_", 1)[0], []).append(speed)
     return measured
 
 
 def predict(model: Model, trial: Trial) -> dict[str, Any]:
     """The model's own record of the walk that `trial` holds, on the trial's clock: the same columns."""
-    gait = Gait(**trial.gait)
+    gait = Gait(**trial.walked)
     commands = valves_of(of_gait(gait, trial.time_s[-1] + gait.period_s), trial)
     columns = walk(model, commands=commands, time_s=trial.time_s * seconds_per_uno_s(trial)).columns
     return dict(columns) | {"time_s": trial.time_s}
@@ -81,11 +78,11 @@ def predict(model: Model, trial: Trial) -> dict[str, Any]:
 def predicted_speed(model: Model, trial: Trial) -> float:
     """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
     columns = predict(model, trial)
-    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.gait["period_s"], 0.0).mean_mm_s
+    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.walked["period_s"], 0.0).mean_mm_s
 
 
 def walks_stage(
-    open_rig: Callable[[], object],
+    open_rig: Callable[[], Rig],
     gaits: Mapping[str, tuple[str, Gait]],
     cycles: int,
     model: Model,
@@ -106,7 +103,7 @@ def walks_stage(
         columns = [
             Walk(
                 gaits[trial.file.rsplit("_", 1)[0]][0],
-                trial.gait["period_s"],
+                trial.walked["period_s"],
                 {MEASURED: trial.columns, f"{model.name} model": predict(model, trial)},
             )
             for trial in dataset.trials

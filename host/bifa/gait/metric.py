@@ -107,5 +107,5 @@ class Passage:
         left = way - (reached - progress.advance_m)[row, cycle]
         part = left / np.maximum(progress.advance_m[row, cycle], 1e-9)
         seconds = (cycle + np.clip(part, 0.0, 1.0)) * progress.period_s
-        refused = ~passed.any(axis=1)
+        refused = np.asarray(~passed.any(axis=1))
         return Judged(np.where(refused, 0.0, 1e3 * way / np.maximum(seconds, 1e-9)), refused)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class Simulations:
 
 
 def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Progress:
-    place = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
+    place: dict[str, Any] = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
     return speeds(plants, gaits, metric.cycles, metric.tolerance_m, **place, workers=1)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.gait.methods import METHODS, Found
 from bifa.gait.methods.cma_es import climb
-from bifa.gait.methods.common import Recorder
+from bifa.gait.methods.common import Objective, Recorder
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
 from bifa.gait.pool import Simulations
@@ -133,6 +133,7 @@ def optimise(
     say = on_progress or (lambda stage, share, best: None)
     started = runs.count
     flat, spread = plant(model), settings.knowledge(model)
+    objective: Objective
     if settings.robust:
         objective = _on_robots(model, runs, spread, settings, _EXPLORE, 0)
     else:
@@ -174,7 +175,7 @@ def _foretold(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, se
     return predict_speed(model, known, gait, seed=settings.seed)
 
 
-def _explore(objective, screen, settings: Settings, say: OnProgress) -> Found:
+def _explore(objective: Objective, screen: Objective, settings: Settings, say: OnProgress) -> Found:
     budget = _budget(settings)
     return METHODS[settings.method](
         objective,
@@ -190,7 +191,7 @@ def _budget(settings: Settings) -> int:
     return settings.evaluations or EVALUATIONS["robust" if settings.robust else "nominal"][settings.method]
 
 
-def _refine(objective, explored: Found, settings: Settings, say: OnProgress) -> Found:
+def _refine(objective: Objective, explored: Found, settings: Settings, say: OnProgress) -> Found:
     """CMA-ES from the best."""
     share = min(_FINAL, _budget(settings) // 3)
     recorder = Recorder(
@@ -202,18 +203,20 @@ def _refine(objective, explored: Found, settings: Settings, say: OnProgress) -> 
     return recorder.found()
 
 
-def _refine_on_robots(model, runs, spread, explored: Found, settings: Settings, say: OnProgress) -> list[Found]:
+def _refine_on_robots(
+    model: Model, runs: Simulations, spread: Knowledge, explored: Found, settings: Settings, say: OnProgress
+) -> list[Found]:
     """CMA-ES in rounds of more robots each, every time from the gait of the round before that these robots like best:
     what was best on few robots may owe it to them."""
     found, starts = [explored], _STARTS
     for number, stage in enumerate(_REFINE, start=1):
         objective = _on_robots(model, runs, spread, settings, stage, number)
         budget = max(2 * _POPULATION, min(stage.evaluations, _budget(settings) // 4))
-        recorder = Recorder(
-            objective,
-            settings.space.wraps,
-            lambda count, best, number=number, budget=budget: say(f"refine {number}", min(count / budget, 1.0), best),
-        )
+
+        def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
+            say(f"refine {number}", min(count / budget, 1.0), best)
+
+        recorder = Recorder(objective, settings.space.wraps, show)
         for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=0.02)):
             recorder(points)
         climb(recorder, recorder.found().best_point, stage.step, budget, settings.seed, _POPULATION)
@@ -222,7 +225,9 @@ def _refine_on_robots(model, runs, spread, explored: Found, settings: Settings, 
     return found[1:]
 
 
-def _on_robots(model, runs, spread: Knowledge, settings: Settings, stage: Round, number: int) -> RobustSpeed:
+def _on_robots(
+    model: Model, runs: Simulations, spread: Knowledge, settings: Settings, stage: Round, number: int
+) -> RobustSpeed:
     """The objective of a round, on robots of its own."""
     draws = spread.plants(model, stage.draws, settings.seed + 500_000 * number)
     metric = settings.metric.quicker()
@@ -230,7 +235,9 @@ def _on_robots(model, runs, spread: Knowledge, settings: Settings, stage: Round,
     return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon)
 
 
-def _nominally(model, runs, explored: Found, settings, say) -> tuple[Gait, float]:
+def _nominally(
+    model: Model, runs: Simulations, explored: Found, settings: Settings, say: OnProgress
+) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fail: the fastest gaits live at a cliff."""
     rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=0.003)))
     speeds = _finely(model, runs, rows, settings)
@@ -238,7 +245,15 @@ def _nominally(model, runs, explored: Found, settings, say) -> tuple[Gait, float
     return _best(rows, speeds)
 
 
-def _robustly(model, runs, spread, explored: Found, refined: Found, settings, say) -> tuple[Gait, float]:
+def _robustly(
+    model: Model,
+    runs: Simulations,
+    spread: Knowledge,
+    explored: Found,
+    refined: Found,
+    settings: Settings,
+    say: OnProgress,
+) -> tuple[Gait, float]:
     """The best of the finalists, over robots that the search did not meet, that stands the check; slower copies of it
     follow, for the case that all are beyond the cliff. Where none stands, the one that walks best on average."""
     groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=0.003))
@@ -274,7 +289,7 @@ def _at_periods(stage: Round, space: SearchSpace, points: np.ndarray) -> list[np
     return [space.slower(points, share) for share in stage.periods]
 
 
-def _finely(model, runs, rows: np.ndarray, settings: Settings) -> np.ndarray:
+def _finely(model: Model, runs: Simulations, rows: np.ndarray, settings: Settings) -> np.ndarray:
     which = np.zeros(len(rows), dtype=np.int64)
     return runs.judged([plant(model)], which, rows, settings.metric.finer()).counted_mm_s
 

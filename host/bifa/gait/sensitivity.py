@@ -85,7 +85,7 @@ class Front:
         better = (self.nominal_mm_s[None] > self.nominal_mm_s[:, None]) & (
             self.quantile_mm_s[None] > self.quantile_mm_s[:, None]
         )
-        return ~better.any(axis=1)
+        return np.asarray(~better.any(axis=1))
 
 
 def front(

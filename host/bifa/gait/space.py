@@ -1,6 +1,5 @@
 """Where gaits are looked for: the paper's box (section V.B), and the map between it and the unit cube."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,9 +80,9 @@ class SearchSpace:
 
 
 def paper_space(
-    period_s: Sequence[float] = (2.0, 4.0),
-    duty_body: Sequence[float] = (0.2, 0.8),
-    duty_ends: Sequence[float] = (0.2, 0.8),
+    period_s: tuple[float, float] = (2.0, 4.0),
+    duty_body: tuple[float, float] = (0.2, 0.8),
+    duty_ends: tuple[float, float] = (0.2, 0.8),
 ) -> SearchSpace:
     """The box of section V.B; d_2 = d_3 there, as the duty of both ends."""
     return SearchSpace(

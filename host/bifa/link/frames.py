@@ -96,7 +96,7 @@ class Report:
     sequence: int
     fields: dict[str, Any]
 
-    def __getitem__(self, field: str):
+    def __getitem__(self, field: str) -> Any:
         return self.fields[field]
 
 

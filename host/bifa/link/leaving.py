@@ -16,12 +16,16 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from typing import Any, Protocol
+from types import CodeType, FrameType
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from bifa.link.errors import NoAnswerError, RestartedError
 from bifa.link.frames import Report
 from bifa.link.session import Session
 from bifa.link.table import STATES
+
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 CONFIRMED_WITHIN_S = 5.0
 FIRST_ATTEMPT_S = 0.25  # the next one waits twice as long: the computer may be slow rather than the cable bad
@@ -41,10 +45,10 @@ _earlier_hook: list[Callable[..., Any]] = []
 _held: list[int] = []
 _again: list[threading.Timer] = []
 _parents: list[int] = []  # who started this program, while their death ends it
-_whole: set[Any] = set()  # code of the functions that nothing interrupts
+_whole: set[CodeType] = set()  # code of the functions that nothing interrupts
 AGAIN_AFTER_S = 0.01
 _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSIG of prctl(2)
-_DEATH = getattr(signal, "SIGUSR2", None)  # a signal of its own: it also comes when the parent's thread alone ends
+_DEATH: Any = getattr(signal, "SIGUSR2", None)  # a signal of its own: it also comes when the parent's thread alone ends
 
 
 def enter(robot: Robot) -> None:
@@ -78,12 +82,11 @@ def leave(robot: Robot) -> None:
             _held.append(signal.SIGINT)
 
 
-def uninterrupted(function: Callable[..., Any]) -> Callable:
+def uninterrupted(function: Callable[Given, Result]) -> Callable[Given, Result]:
     """Decorates what must come to its end: a signal meanwhile raises KeyboardInterrupt only after it. If that end is an
     error, it is raised from the KeyboardInterrupt, so that nobody tries again."""
 
-    @functools.wraps(function)
-    def whole(*args, **kwargs):
+    def whole(*args: Given.args, **kwargs: Given.kwargs) -> Result:
         try:
             result = function(*args, **kwargs)
         except Exception as error:
@@ -97,10 +100,10 @@ def uninterrupted(function: Callable[..., Any]) -> Callable:
         return result
 
     _whole.add(whole.__code__)
-    return whole
+    return functools.update_wrapper(whole, function)
 
 
-def _end(number: int, frame) -> None:
+def _end(number: int, frame: FrameType | None) -> None:
     while frame is not None:
         if frame.f_code in _whole:
             _held.append(number)
@@ -113,7 +116,7 @@ def _end(number: int, frame) -> None:
     raise KeyboardInterrupt
 
 
-def _suspend(number: int, frame) -> None:
+def _suspend(number: int, frame: FrameType | None) -> None:
     _stop_all()
     signal.raise_signal(signal.SIGSTOP)
     _end(number, frame)
@@ -128,7 +131,7 @@ def _stop_all() -> None:
 _ACTS = {"SIGINT": _end, "SIGTERM": _end, "SIGHUP": _end, "SIGQUIT": _end, "SIGBREAK": _end, "SIGTSTP": _suspend}
 
 
-def _orphaned(number: int, frame) -> None:
+def _orphaned(number: int, frame: FrameType | None) -> None:
     if os.getppid() != _parents[-1]:  # else only the thread that started this program has ended
         _end(number, frame)
 
@@ -156,7 +159,7 @@ def _death_signal() -> int | None:
     return now.value if _prctl(_GET_DEATH_SIGNAL, ctypes.byref(now)) == 0 else None
 
 
-def _prctl(option: int, value) -> int:
+def _prctl(option: int, value: Any) -> int:
     try:
         return ctypes.CDLL(None).prctl(option, value)
     except (OSError, AttributeError):  # a C library without it
@@ -168,7 +171,7 @@ def _cancel_again() -> None:
         _again.pop().cancel()
 
 
-def _end_again(lost) -> None:
+def _end_again(lost: "sys.UnraisableHookArgs") -> None:
     """Python drops what is raised while it clears up (`__del__`, a generator's end): raise it once more."""
     if lost.exc_type is KeyboardInterrupt:
         _again.append(threading.Timer(AGAIN_AFTER_S, signal.raise_signal, [signal.SIGINT]))

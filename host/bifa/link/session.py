@@ -82,8 +82,7 @@ class _Request:
     data: bytes
     sequence: int
     first_sent_s: float
-    answer: frames.Report | None = None
-    answered_s: float | None = None
+    answer: "Answer | None" = None
     sent_s: float = field(default=-1e9)
 
 
@@ -211,15 +210,15 @@ class Session:
         for request in self._outstanding:
             if request.sequence == report.sequence and request.answer is None:
                 if report.name == ANSWERS.get(request.name, "done") or (report.name == "done" and report["result"]):
-                    request.answer, request.answered_s = report, now
+                    request.answer = Answer(report, request.first_sent_s, now)
                 else:
                     self.counters.bad += 1
 
-    def call(self, name: str, *values, timeout_s: float = 5.0) -> frames.Report:
+    def call(self, name: str, *values: Any, timeout_s: float = 5.0) -> frames.Report:
         """Carry out one command; raises RefusedError, NoAnswerError or RestartedError."""
         return self.call_timed(name, *values, timeout_s=timeout_s).report
 
-    def call_timed(self, name: str, *values, timeout_s: float = 5.0) -> Answer:
+    def call_timed(self, name: str, *values: Any, timeout_s: float = 5.0) -> Answer:
         """As call(); with the times between which the Uno carried the command out."""
         return self.call_all([(name, values)], timeout_s)[0]
 
@@ -249,13 +248,13 @@ class Session:
         while queue or self._outstanding:
             self._send_due(queue)
             self.poll(RESEND_AFTER_S / 3)
-            while self._outstanding and self._outstanding[0].answer is not None:
+            while self._outstanding and (answer := self._outstanding[0].answer) is not None:
                 request = self._outstanding.popleft()
-                answers.append(Answer(request.answer, request.first_sent_s, request.answered_s))
+                answers.append(answer)
                 progress_s = self.clock.now()
                 probe_s = progress_s + PROBE_AFTER_S
-                if request.answer.name == "done" and request.answer["result"] != 0 and refused is None:
-                    refused = RefusedError(request.name, request.answer["result"])
+                if answer.report.name == "done" and answer.report["result"] != 0 and refused is None:
+                    refused = RefusedError(request.name, answer.report["result"])
                     queue.clear()  # what is under way already is still carried out
             self.raise_if_restarted()
             if self.clock.now() > probe_s:
@@ -304,5 +303,6 @@ class Session:
             hello = self._hellos.popleft()
             if hello.session_key != self._key:
                 self._outstanding.clear()
-                what = "restarted" if hello.boot_nonce != self.hello.boot_nonce else "lost the session"
+                is_same = self.hello is not None and hello.boot_nonce == self.hello.boot_nonce
+                what = "lost the session" if is_same else "restarted"
                 raise RestartedError(f"the Uno {what} (after {hello.start_cause}); connect again and repeat")

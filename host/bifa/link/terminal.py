@@ -1,5 +1,6 @@
 """Console lines over the port of a session: text out, text back, telemetry and clock beside them."""
 
+from bifa.link.clock import Clock
 from bifa.link.errors import NoAnswerError
 from bifa.link.uno import Uno
 
@@ -13,7 +14,7 @@ def is_answer(line: str) -> bool:
     return line.startswith(("ok", "error"))
 
 
-def settle(uno: Uno, clock) -> None:
+def settle(uno: Uno, clock: Clock) -> None:
     """End what may stand unfinished in the Uno's line, and drop what it answers to that."""
     uno.session.transport.write(b"\n")
     deadline = clock.now() + SETTLE_S
@@ -29,7 +30,7 @@ def _drop_answers(uno: Uno) -> None:
     uno.session.lines.extend(lines)
 
 
-def type_line(uno: Uno, line: str, clock) -> list[str]:
+def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
     """Send one console line; returns the lines up to its answer, that included, behind those that came unasked.
     Frames go on meanwhile. A line with characters that are no text is answered with an error here.
 

@@ -47,7 +47,8 @@ class Sample:
     @property
     def connected(self) -> tuple[str, str, str]:
         """What the valves connect each chamber to: "positive", "vacuum", "off" or, which must never be, "both"."""
-        return tuple(CONNECTIONS[self.valves >> 2 * i & 3] for i in range(3))
+        body, head, tail = (CONNECTIONS[self.valves >> 2 * i & 3] for i in range(3))
+        return body, head, tail
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,8 @@ class Uno:
 
     def presets(self) -> dict[str, bool]:
         """Names of all presets; True for those in EEPROM, False for those from the factory."""
-        presets, index = {}, 0
+        presets: dict[str, bool] = {}
+        index = 0
         while True:
             report = self.session.call("presets", index)
             if index >= report["count"]:
@@ -342,7 +344,7 @@ class Uno:
                 raise LinkError("the Uno streams no samples: nothing to mark")
             self.session.poll(0.02)
         self.session.call("mark")
-        return self._unwrap_sequence(self.session.call("read_clock")["marked"], self._last_sample[1])
+        return _unwrapped(self.session.call("read_clock")["marked"], self._last_sample[1], self._last_sample)
 
     def _stream_again(self) -> None:
         if self._streaming:
@@ -374,30 +376,23 @@ class Uno:
         time_us = self._unwrap(report["time_us"])
         sequence = report["sequence"]
         if self._last_sample is not None:
-            sequence = self._unwrap_sequence(sequence, time_us)
+            sequence = _unwrapped(sequence, time_us, self._last_sample)
             if sequence <= self._last_sample[0]:
                 return  # a repeat
             self.counters.lost += sequence - self._last_sample[0] - 1
         self._last_sample = (sequence, time_us)
-        command = tuple({1: 0.0, 2: 1.0}.get(report["command"] >> 2 * i & 3, math.nan) for i in range(3))
+        body, head, tail = ({1: 0.0, 2: 1.0}.get(report["command"] >> 2 * i & 3, math.nan) for i in range(3))
         self._samples.append(
             Sample(
                 sequence=sequence,
                 time_us=time_us,
                 state=word(STATES, report["state"]),
                 pressure_psi=_psi(report["pressure_mpsi"]),
-                command=command,
+                command=(body, head, tail),
                 phase_rad=tuple(phase * (2 * math.pi / 65536) for phase in report["phase"]),
                 valves=report["valves"],
             )
         )
-
-    def _unwrap_sequence(self, sequence: int, time_us: int) -> int:
-        """The 16 bits of the number of a sample of that time as one that goes on from the last: samples are a fixed
-        time apart, however many are missing between."""
-        last, last_us = self._last_sample
-        due = last + round((time_us - last_us) / SAMPLE_US)
-        return due + (sequence - due + 32767) % 65536 - 32767
 
     def _unwrap(self, time_us: int) -> int:
         """The Uno's 32-bit microseconds (they wrap every 71.6 minutes) as a time that goes on. What arrives may be a
@@ -416,7 +411,15 @@ class Uno:
 
 
 def _psi(milli: tuple[int, int, int]) -> tuple[float, float, float]:
-    return tuple(value / 1000 for value in milli)
+    body, head, tail = milli
+    return body / 1000, head / 1000, tail / 1000
+
+
+def _unwrapped(sequence: int, time_us: int, last: tuple[int, int]) -> int:
+    """The 16 bits of the number of a sample of that time as one that goes on from the last: samples are a fixed time
+    apart, however many are missing between. `last`: its number and time."""
+    due = last[0] + round((time_us - last[1]) / SAMPLE_US)
+    return due + (sequence - due + 32767) % 65536 - 32767
 
 
 def _name_field(preset: str) -> bytes:

@@ -1,9 +1,10 @@
 """What may come next in a console line, each with a few words beside it: a parameter's meaning, range and value."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from prompt_toolkit.completion import Completer, Completion
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
 
 from bifa.link.table import CHAMBER_STATES, CHAMBERS, CONSOLE_COMMANDS, PARAMETERS
 from bifa.link.units import BY_NAME, range_text
@@ -64,7 +65,7 @@ class LineCompleter(Completer):
     def __init__(self, known: Known) -> None:
         self._known = known
 
-    def get_completions(self, document, complete_event):
+    def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterator[Completion]:
         """See Completer."""
         before = document.text_before_cursor
         words = before.split()

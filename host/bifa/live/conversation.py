@@ -11,6 +11,7 @@ from bifa.link.terminal import settle, type_line
 from bifa.live.completion import Known
 from bifa.live.latest import Latest
 from bifa.live.pace import Pace
+from bifa.rig import Rig
 
 WAIT_S = 0.02
 
@@ -18,7 +19,7 @@ WAIT_S = 0.02
 class Conversation:
     """What was typed goes in with type(); answers and what the Uno says by itself are printed as they come."""
 
-    def __init__(self, uno: Uno, rig) -> None:
+    def __init__(self, uno: Uno, rig: Rig) -> None:
         """`uno` is connected."""
         self.uno = uno
         self.known = Known()

@@ -4,15 +4,17 @@ import os
 from pathlib import Path
 
 from prompt_toolkit import PromptSession
-from prompt_toolkit.application import get_app
+from prompt_toolkit.application import Application, get_app
+from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.history import FileHistory, History, InMemoryHistory
-from prompt_toolkit.key_binding import KeyBindings
+from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.patch_stdout import patch_stdout
 
 from bifa.link import Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.completion import LineCompleter
 from bifa.live.conversation import Conversation
+from bifa.rig import Rig
 
 STATE_STYLES = {"running": "bg:ansigreen", "holding": "bg:ansiyellow", "stopped": "bg:ansired", "fault": "bg:ansired"}
 
@@ -20,7 +22,7 @@ STATE_STYLES = {"running": "bg:ansigreen", "holding": "bg:ansiyellow", "stopped"
 _WIDE = 80
 
 
-def status_lines(conversation: Conversation, columns: int = _WIDE) -> list[tuple[str, str]]:
+def status_lines(conversation: Conversation, columns: int = _WIDE) -> StyleAndTextTuples:
     """Two lines, shorter where there are fewer than 80 columns: the robot; the link."""
     sample, link = conversation.latest.sample, conversation.uno.counters.text()
     if sample is None:
@@ -54,25 +56,25 @@ def _keys(conversation: Conversation) -> KeyBindings:
     keys = KeyBindings()
 
     @keys.add("!")
-    def _(event) -> None:
+    def _(event: KeyPressEvent) -> None:
         conversation.stop()
 
     @keys.add("c-z")
-    def _(event) -> None:
+    def _(event: KeyPressEvent) -> None:
         conversation.stop()
         event.app.suspend_to_background()  # by the signal, so that what is resumed ends
 
     @keys.add("c-c")  # while the history is searched as well
     @keys.add("c-\\")
-    def _(event) -> None:
+    def _(event: KeyPressEvent) -> None:
         conversation.stop()
         event.app.exit(exception=KeyboardInterrupt(), style="class:aborting")
 
     return keys
 
 
-def _prompt(conversation: Conversation) -> PromptSession:
-    session = PromptSession(
+def _prompt(conversation: Conversation) -> PromptSession[str]:
+    session: PromptSession[str] = PromptSession(
         "uno> ",
         history=_history(),
         completer=LineCompleter(conversation.known),
@@ -82,7 +84,7 @@ def _prompt(conversation: Conversation) -> PromptSession:
         refresh_interval=0.2,
     )
 
-    def leave_with_the_link(app) -> None:
+    def leave_with_the_link(app: Application[str]) -> None:
         if conversation.ended.is_set() and app.future is not None and not app.future.done():
             app.exit(exception=EOFError())
 
@@ -90,7 +92,7 @@ def _prompt(conversation: Conversation) -> PromptSession:
     return session
 
 
-def converse(uno: Uno, rig) -> None:
+def converse(uno: Uno, rig: Rig) -> None:
     """Prompt until Ctrl-D, Ctrl-C, Ctrl-Z or Ctrl-\\; raises what ended the link, if something did."""
     print("type help; Tab completes; ! stops at once; Ctrl-D leaves, all valves off")
     conversation = Conversation(uno, rig)

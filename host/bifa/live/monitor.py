@@ -49,7 +49,9 @@ class Monitor:
         table = Table(box=None, pad_edge=False)
         for heading in ("chamber", "psi", f"last {self._trace.seconds:.1f} s", "valves", "phase"):
             table.add_column(heading, no_wrap=True)
-        for i, name in enumerate(CHAMBERS if sample else ()):
+        for i, name in enumerate(CHAMBERS):
+            if sample is None:
+                break
             connected = sample.connected[i]
             table.add_row(
                 name,

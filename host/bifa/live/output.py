@@ -24,7 +24,7 @@ def writable() -> Iterator[None]:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as error:
-        if error.errno not in _FULL:
+        if error.errno is None or error.errno not in _FULL:
             raise
         _drop_the_rest()
         reason = os.strerror(error.errno)

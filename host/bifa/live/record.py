@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from rich.progress import Progress
+from rich.progress import Progress, TaskID
+from rich.status import Status
 
 from bifa.errors import BifaError
 from bifa.link import NoAnswerError, PortGoneError, RefusedError, RestartedError, Sample, StillMovingError, Uno
@@ -19,9 +20,12 @@ from bifa.link.table import CHAMBERS
 from bifa.link.uno import MARK_PAUSE
 from bifa.lock import locked
 from bifa.measure.desk import Desk
-from bifa.rig import RigError, port_of, serial_number_at
+from bifa.rig import Rig, RigError, port_of, serial_number_at
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
+
+if TYPE_CHECKING:
+    from bifa.data import DatasetWriter
 
 RETRY_S = 1.0
 RESTARTS = 3  # of a board that kept its power, while its port was away: each counts its boot number on by one
@@ -43,13 +47,13 @@ class RecordError(BifaError):
     """A recording cannot be made there."""
 
 
-def record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
+def record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
     """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
     with locked(out):
         _record_walks(rig, out, gait_file, cycles, repeats, console)
 
 
-def _record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
+def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
     from bifa.data import DatasetWriter, Trial
     from bifa.data.lag import misfit_of_last
     from bifa.measure.experiments import record_columns
@@ -72,9 +76,11 @@ def _record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: 
             task = progress.add_task(f"walk {repeat} of {repeats}", total=1.0)
             planned = PlannedTrial("locomotion", gait=gait, cycles=cycles, repeat=repeat)
             before = replace(uno.counters)
-            columns, extra = record_columns(
-                rig, uno, planned, lambda share, task=task: progress.update(task, completed=share)
-            )
+
+            def show(share: float, task: TaskID = task) -> None:
+                progress.update(task, completed=share)
+
+            columns, extra = record_columns(rig, uno, planned, show)
             writer.add(replace(trial, columns=columns, session_order=repeat, extra=extra))
             if wrong := misfit_of_last(writer.trials):
                 progress.console.print(warning(wrong), highlight=False)
@@ -87,7 +93,7 @@ def _record_walks(rig, out: Path, gait_file: Path | None, cycles: int, repeats: 
     )
 
 
-def _check_same(writer, settings: dict[str, object], duration_s: float) -> None:
+def _check_same(writer: "DatasetWriter", settings: dict[str, Any], duration_s: float) -> None:
     """What an interrupted session has walked is what is asked for now."""
     for kept in writer.trials:
         asked = dict(kept.gait or {}), kept.pressure_psi, float(kept.time_s[-1])
@@ -98,7 +104,7 @@ def _check_same(writer, settings: dict[str, object], duration_s: float) -> None:
             )
 
 
-def _settings(steps: GaitFile) -> dict[str, object]:
+def _settings(steps: GaitFile) -> dict[str, Any]:
     """What of a gait file is a setting of the trial that it makes."""
     beside = {key: steps.others[key] for key in ("coupling_per_s",) if key in steps.others}
     return {"gait": {**steps.gait.as_dict(), **beside}, "pressure_psi": steps.others.get("pressure_psi")}
@@ -158,7 +164,7 @@ class _Recorder:
         self._nonce: int | None = None  # of the start that was seen last; None before the first
         self._desk = Desk(lambda text: console.print(text, highlight=False))
 
-    def _open(self):
+    def _open(self) -> Any:
         if self._nonce is None:
             self._serial_number = serial_number_at(self._port)
             return self._open_rig(self._port)
@@ -166,7 +172,7 @@ class _Recorder:
 
     def record_until_gone(self, path: Path) -> None:
         """Into the new file `path`; raises one of GONE when the Uno is."""
-        uno = None
+        uno: Uno | None = None
         try:
             with self._open() as rig, self._console.status("waiting for the Uno") as status:
                 uno = Uno(rig.transport, rig.clock)
@@ -183,7 +189,7 @@ class _Recorder:
                             self._ask(known) if is_back else uno.run()
                         self._record(uno, writer, file, status, marked)
         finally:
-            if path.exists():
+            if uno is not None and path.exists():
                 self._console.print(f"{path}: {uno.counters.text()}", soft_wrap=True)
 
     def _greet(self, uno: Uno) -> str:
@@ -203,7 +209,7 @@ class _Recorder:
             f"{known}: recording without walking, as nobody can be asked; to walk, start the command anew"
         )
 
-    def _record(self, uno: Uno, writer, file: TextIO, status, marked: int) -> None:
+    def _record(self, uno: Uno, writer: Any, file: TextIO, status: Status, marked: int) -> None:
         try:
             while time.monotonic() < self._end_s:
                 writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))

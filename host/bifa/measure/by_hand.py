@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from bifa.data import DatasetWriter, Trial
 from bifa.data.check import check_trial
@@ -22,6 +23,7 @@ from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import idle
 from bifa.measure.sketch import sketch
 from bifa.mistakes import mistakes_in
+from bifa.rig import Rig
 
 _REPEAT = ("r", "repeat")
 _LOOK_S = 0.25
@@ -43,14 +45,22 @@ class ByHand:
         self._instruments = OwnInstruments(desk, watch, exports)
         self.before: Callable[[], None] = lambda: None
 
-    def equip(self, rig) -> None:
+    def equip(self, rig: Any) -> None:
         """Let `rig`, which has no instruments of its own, use the lab's."""
         self.before()
         rig.instruments = self._instruments
         rig.recorder = self
 
     def __call__(
-        self, rig, uno: Uno, planned: PlannedTrial, on_progress, *, number: int, total: int, writer: DatasetWriter
+        self,
+        rig: Rig,
+        uno: Uno,
+        planned: PlannedTrial,
+        on_progress: Callable[[float], None],
+        *,
+        number: int,
+        total: int,
+        writer: DatasetWriter,
     ) -> Trial:
         """One trial, as often as the person likes; see session.Recorder.
 
@@ -63,7 +73,9 @@ class ByHand:
         finally:
             self._desk.clear()
 
-    def _until_kept(self, rig, uno: Uno, turn: Turn, on_progress, writer: DatasetWriter) -> Trial:
+    def _until_kept(
+        self, rig: Rig, uno: Uno, turn: Turn, on_progress: Callable[[float], None], writer: DatasetWriter
+    ) -> Trial:
         planned, number, total = turn.planned, turn.number, turn.total
         while True:
             self._desk.say(f"\nTrial {number} of {total}: {planned.title}")
@@ -80,7 +92,7 @@ class ByHand:
                 self._instruments.keep(writer.partial / RAW)
                 return trial
 
-    def _accepted(self, rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
+    def _accepted(self, rig: Rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
         for line in sketch(trial, self._plain):
             self._desk.say(line)
         wrong = [str(finding) for finding in [*check_trial(trial), *mistakes_in(trial)]]
@@ -89,7 +101,17 @@ class ByHand:
         seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."
         return self._review(rig, uno, turn, seen, "Enter keeps it, r repeats it", keep=True, findings=wrong)
 
-    def _review(self, rig, uno: Uno, turn: Turn, seen: str, choice: str, *, keep: bool, findings=()) -> bool:
+    def _review(
+        self,
+        rig: Rig,
+        uno: Uno,
+        turn: Turn,
+        seen: str,
+        choice: str,
+        *,
+        keep: bool,
+        findings: Sequence[str] = (),
+    ) -> bool:
         self._desk.ask(
             "review", f"{seen} {choice}, q discards it and stops.", turn.told() | {"findings": list(findings)}
         )

@@ -38,7 +38,8 @@ class Desk:
     def __init__(self, say: Callable[[str], None], watch: Path | None = None) -> None:
         self.say = say
         self._watch = watch
-        self._lines: queue.Queue[str | None] | None = None
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        self._is_listening = False
         self.is_asking = False
         self._is_stopped = False
 
@@ -73,14 +74,14 @@ class Desk:
 
     def attend(self) -> None:
         """While nothing is asked: raises KeyboardInterrupt if somebody has asked to stop."""
-        if self.is_asking or self._lines is None:
+        if self.is_asking or not self._is_listening:
             return
         self._forget()
         if self._is_stopped:
             raise KeyboardInterrupt
 
     def _taken(self) -> str | None:
-        if self._watch is not None and (text := self._from_file()) is not None:
+        if self._watch is not None and (text := _from_file(self._watch / ANSWER)) is not None:
             return text
         try:
             line = self._lines.get_nowait()
@@ -100,18 +101,9 @@ class Desk:
         if self._watch is not None:
             (self._watch / ASKS).unlink(missing_ok=True)
 
-    def _from_file(self) -> str | None:
-        path = self._watch / ANSWER
-        try:
-            text = path.read_bytes()[:_LONGEST].decode("utf-8", "replace").strip()
-            path.unlink()
-        except OSError:
-            return None
-        return text
-
     def _forget(self) -> None:
         """What was typed ahead must not start anything; lines from a pipe were meant for what is to come."""
-        early = [self._from_file()] if self._watch is not None else []
+        early = [_from_file(self._watch / ANSWER)] if self._watch is not None else []
         with contextlib.suppress(queue.Empty):
             while sys.stdin.isatty():
                 if (line := self._lines.get_nowait()) is _END:
@@ -121,13 +113,22 @@ class Desk:
         self._is_stopped = self._is_stopped or any(_is_stop(line) for line in early if line)
 
     def _listen(self) -> None:
-        if self._lines is None:
-            self._lines = queue.Queue()
+        if not self._is_listening:
+            self._is_listening = True
             threading.Thread(target=_read_lines, args=(self._lines,), daemon=True).start()
 
 
 def _is_stop(line: str) -> bool:
     return line.strip().lower() in STOP
+
+
+def _from_file(path: Path) -> str | None:
+    try:
+        text = path.read_bytes()[:_LONGEST].decode("utf-8", "replace").strip()
+        path.unlink()
+    except OSError:
+        return None
+    return text
 
 
 def _read_lines(lines: queue.Queue[str | None]) -> None:

@@ -16,6 +16,7 @@ from bifa.measure.locomotion import noted, record_walk
 from bifa.measure.plan import PULL_MM, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, idle, instruments_of, mount
 from bifa.measure.undisturbed import refuse_disturbed
+from bifa.rig import Rig
 
 CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
@@ -30,10 +31,11 @@ STILL_S = 1.0  # kept before and after the motion
 ATTEMPTS = 3  # at a trial in which no telemetry is lost and the clocks line up
 
 Progress = Callable[[float], None]
+Recorded = tuple[dict[str, np.ndarray], dict[str, Any], int]  # columns, what is noted, lost samples
 
 
 def record_trial(
-    rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
+    rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
 ) -> Trial:
     """Run one planned trial and return it as a data set holds it; the valves are off afterwards.
 
@@ -48,7 +50,7 @@ def record_trial(
 
 
 def record_columns(
-    rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
+    rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """As `record_trial`: the columns and what is noted, without asking the Uno for anything more."""
     instruments_of(rig)
@@ -65,44 +67,45 @@ def record_columns(
     raise BifaError(f"{planned.title}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
 
 
-def _static(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+def _static(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(rig, uno, "static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
-    chamber = CHAMBER_OF[planned.actuator]
-    _pressurise(rig, uno, chamber, planned.pressure_psi)
+    instruments, chamber = instruments_of(rig), CHAMBER_OF[planned.tested]
+    _pressurise(rig, uno, chamber, planned.commanded_psi)
     with Recording(rig, uno, on_progress) as tape:
         tape.wait(LEAD_S)
-        rig.instruments.move()
-        tape.wait_while(lambda: rig.instruments.moving, 2 * 54.0 / planned.rate_mm_s)
+        instruments.move()
+        tape.wait_while(lambda: instruments.moving, 2 * 54.0 / planned.commanded_mm_s)
         tape.wait(LEAD_S)
-    _refuse_unheld(tape, chamber, planned.pressure_psi)
+    _refuse_unheld(tape, chamber, planned.commanded_psi)
     moved = _moving_span(tape)
     return _machine_columns(tape, chamber, moved), noted(tape.clock), tape.lost_samples
 
 
-def _pull(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+def _pull(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(rig, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
+    instruments, psi = instruments_of(rig), planned.commanded_psi
     # Extended first: a head holds with no pressure at all, but it has to snap out for that.
     _pressurise(rig, uno, "head", SNAP_PSI)
-    if planned.pressure_psi < SNAP_PSI:
-        _pressurise(rig, uno, "head", planned.pressure_psi, RELIEF_S)
-    elif planned.pressure_psi > SNAP_PSI:
-        _pressurise(rig, uno, "head", planned.pressure_psi)
+    if psi < SNAP_PSI:
+        _pressurise(rig, uno, "head", psi, RELIEF_S)
+    elif psi > SNAP_PSI:
+        _pressurise(rig, uno, "head", psi)
     with Recording(rig, uno, on_progress) as tape:
         tape.wait(LEAD_S)
-        rig.instruments.move()
-        tape.wait_while(lambda: rig.instruments.moving, PULL_MM / planned.rate_mm_s)
+        instruments.move()
+        tape.wait_while(lambda: instruments.moving, PULL_MM / planned.commanded_mm_s)
         tape.wait(LEAD_S)
-    _refuse_unheld(tape, "head", planned.pressure_psi)
+    _refuse_unheld(tape, "head", psi)
     moved = _moving_span(tape)
     known = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}
     return _machine_columns(tape, "head", moved), noted(tape.clock) | known, tape.lost_samples
 
 
-def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+def _step(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(rig, uno, "step_response", actuator=planned.actuator)
-    chamber = CHAMBER_OF[planned.actuator]
+    chamber = CHAMBER_OF[planned.tested]
     _off(uno)
-    uno.set("pressure_psi", planned.pressure_psi)
+    uno.set("pressure_psi", planned.commanded_psi)
     uno.hold(chamber, "vacuum")
     idle(rig, uno, SETTLE_S)
     with Recording(rig, uno, on_progress) as tape:
@@ -127,12 +130,14 @@ def _step(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
     return columns, noted(tape.clock) | known | camera_rate(tape.instrument_s), tape.lost_samples
 
 
-def _walk(rig, uno: Uno, planned: PlannedTrial, on_progress: Progress):
+def _walk(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
+    if planned.gait is None:
+        raise BifaError(f"{planned.title}: a walk needs a gait")
     walk = record_walk(rig, uno, planned.gait, planned.cycles, on_progress, **planned.settings)
     return walk.columns, walk.extra, walk.lost_samples
 
 
-_RUNS: dict[str, Callable[..., tuple[dict[str, np.ndarray], dict[str, Any], int]]] = {
+_RUNS: dict[str, Callable[[Rig, Uno, PlannedTrial, Progress], Recorded]] = {
     "static_loading": _static,
     "step_response": _step,
     "anchor_pull": _pull,
@@ -149,7 +154,7 @@ def _off(uno: Uno) -> None:
         uno.hold(chamber, "off")
 
 
-def _pressurise(rig, uno: Uno, chamber: str, pressure_psi: float, settle_s: float = SETTLE_S) -> None:
+def _pressurise(rig: Rig, uno: Uno, chamber: str, pressure_psi: float, settle_s: float = SETTLE_S) -> None:
     """Bring a chamber to a positive pressure, 0 (vented) or, for any negative one, full vacuum, and let it settle."""
     _off(uno)
     if pressure_psi > 0.0:

@@ -40,6 +40,8 @@ from bifa.measure.instruments import CHANNELS
 from bifa.measure.locomotion import noted
 from bifa.measure.plan import PlannedTrial
 
+Columns = Mapping[str, np.ndarray]
+
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
@@ -83,7 +85,7 @@ def import_trial(
         name = f"{planned.experiment} from {instrument.name}"
         return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock
     _refuse_copy(recorded, trial, instrument)
-    return read_dataset(add_trial(recorded, trial).path), clock
+    return read_dataset(add_trial(recorded, trial).folder), clock
 
 
 def _added_to(folder: Path, known: Mapping[str, float] | None) -> Dataset:
@@ -97,8 +99,8 @@ def _added_to(folder: Path, known: Mapping[str, float] | None) -> Dataset:
 def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
     """`planned` under the next number of its condition."""
     planned = replace(planned, repeat=1 + recorded.last_repeat(planned.as_trial().condition))
-    if (recorded.path / planned.file).exists():
-        raise InstrumentFileError(f"{recorded.path / planned.file} is in the way: it is not listed in {TABLE_FILE}")
+    if (recorded.folder / planned.file).exists():
+        raise InstrumentFileError(f"{recorded.folder / planned.file} is in the way: it is not listed in {TABLE_FILE}")
     return planned
 
 
@@ -106,7 +108,7 @@ def _refuse_copy(recorded: Dataset, trial: Trial, instrument: Path) -> None:
     """By what the instrument measured: the pressures are the telemetry's, and may be another's."""
     own = {name: values for name, values in trial.columns.items() if name.startswith(("displacement", "force"))}
     for old in recorded.trials:
-        if all(np.array_equal(old.columns.get(name), values) for name, values in own.items()):
+        if all(name in old.columns and np.array_equal(old.columns[name], values) for name, values in own.items()):
             raise InstrumentFileError(f"{instrument} is in {recorded.path} already, as {old.file}")
 
 
@@ -181,7 +183,7 @@ def _commanded(planned: PlannedTrial) -> tuple[str, ...]:
     """The chambers whose commands are columns of the trial."""
     if planned.experiment == "locomotion":
         return CHAMBERS
-    return (CHAMBER_OF[planned.actuator],) if planned.experiment == "step_response" else ()
+    return (CHAMBER_OF[planned.tested],) if planned.experiment == "step_response" else ()
 
 
 def _refuse_gaps(
@@ -262,7 +264,9 @@ def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
     return int(sequence[ends[0] + 1])
 
 
-def _assemble(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+def _assemble(
+    measured: Columns, instrument_s: np.ndarray, uno: Columns, planned: PlannedTrial, instrument: Path
+) -> dict[str, np.ndarray]:
     overlap = (instrument_s >= uno["time_s"][0]) & (instrument_s <= uno["time_s"][-1])
     if overlap.sum() < 3:
         raise InstrumentFileError(f"{instrument} and the telemetry do not overlap in time")
@@ -271,13 +275,20 @@ def _assemble(measured, instrument_s, uno, planned: PlannedTrial, instrument: Pa
     return _camera(measured, instrument_s, uno, planned, instrument)
 
 
-def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+def _machine(
+    measured: Columns,
+    instrument_s: np.ndarray,
+    overlap: np.ndarray,
+    uno: Columns,
+    planned: PlannedTrial,
+    instrument: Path,
+) -> dict[str, np.ndarray]:
     moved = overlap & (np.abs(measured["displacement_mm"] - measured["displacement_mm"][overlap][0]) > _MOVED_MM)
     if not moved.any():
         raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
     first, last = instrument_s[moved][0] - _MARGIN_S, instrument_s[moved][-1] + _MARGIN_S
     keep = overlap & (instrument_s >= first) & (instrument_s <= last)
-    chamber = CHAMBER_OF.get(planned.actuator, "head")  # a pull has no actuator: it is of the head
+    chamber = CHAMBER_OF.get(planned.actuator or "", "head")  # a pull has no actuator: it is of the head
     time_s = instrument_s[keep]
     _refuse_silence(uno["time_s"], time_s)
     return {
@@ -288,7 +299,9 @@ def _machine(measured, instrument_s, overlap, uno, planned: PlannedTrial, instru
     }
 
 
-def _camera(measured, instrument_s, uno, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+def _camera(
+    measured: Columns, instrument_s: np.ndarray, uno: Columns, planned: PlannedTrial, instrument: Path
+) -> dict[str, np.ndarray]:
     step = planned.experiment == "step_response"
     chambers = _commanded(planned)
     commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])

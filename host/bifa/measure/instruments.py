@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
@@ -15,7 +15,7 @@ class Instruments(Protocol):
     anchor_pull(rate_mm_s, travel_mm), locomotion(inclination_deg); actuator is "large" or "small".
     """
 
-    def mount(self, experiment: str, **settings) -> None:
+    def mount(self, experiment: str, **settings: Any) -> None:
         """Put `experiment` on the stand: vented, contracted, at rest, displacement 0."""
 
     def start(self) -> None:
@@ -55,12 +55,12 @@ CHANNELS = {
 }
 
 
-def are_asked(instruments: Instruments) -> bool:
+def are_asked(instruments: Instruments) -> TypeGuard[AskedInstruments]:
     """Whether these are `AskedInstruments`."""
     return hasattr(instruments, "ready")
 
 
-def until_ready(instruments: Instruments, wait: Callable[[], None]) -> None:
+def until_ready(instruments: Instruments, wait: Callable[[], object]) -> None:
     """Call `wait` until what was asked of the instruments has been done; not at all where they do it at once."""
     while are_asked(instruments) and not instruments.ready:
         wait()
@@ -68,5 +68,6 @@ def until_ready(instruments: Instruments, wait: Callable[[], None]) -> None:
 
 def attend(instruments: Instruments | None) -> None:
     """Let instruments that somebody works hear that person out."""
-    if hasattr(instruments, "attend"):
-        instruments.attend()
+    listens = getattr(instruments, "attend", None)
+    if listens is not None:
+        listens()

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
+from bifa.rig import Rig
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError, check_bounds
 
 
@@ -23,6 +24,6 @@ def parse_known(given: Iterable[str]) -> dict[str, float]:
     return known
 
 
-def known_of(rig, given: Mapping[str, float]) -> dict[str, float]:
+def known_of(rig: Rig, given: Mapping[str, float]) -> dict[str, float]:
     """`[known]` of a data set recorded on `rig`: what the rig declares, and before it what the person has `given`."""
     return {**rig.known, **given}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, camera_rate, resampled
 from bifa.measure.recording import LEAD_S, Recording, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
+from bifa.rig import Rig
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
 
@@ -47,7 +49,12 @@ def noted(clock: ClockLine) -> dict[str, float]:
 
 
 def record_walk(
-    rig, uno: Uno, gait: Gait, cycles: int, on_progress: Callable[[float], None] = lambda share: None, **settings
+    rig: Rig,
+    uno: Uno,
+    gait: Gait,
+    cycles: int,
+    on_progress: Callable[[float], None] = lambda share: None,
+    **settings: Any,
 ) -> RecordedWalk:
     """Walk `cycles` cycles of `gait` from rest and record it.
 

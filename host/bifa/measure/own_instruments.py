@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,8 @@ from bifa.measure.desk import ANSWER, ASKS, Desk
 from bifa.measure.instrument_csv import InstrumentFileError, read_instrument, sync_file
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PULL_MM, PlannedTrial
+
+Signature = tuple[Any, ...]
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
 SETTLED_S = 0.5  # a file whose size and time stay for so long has been written to its end
@@ -48,7 +50,11 @@ class Turn:
     def told(self) -> dict[str, Any]:
         """For `next.toml`: the trial, plain values."""
         planned, trial = self.planned, self.planned.as_trial()
-        settings = {"actuator": planned.actuator, "pressure_psi": planned.pressure_psi, "rate_mm_s": planned.rate_mm_s}
+        settings: dict[str, Any] = {
+            "actuator": planned.actuator,
+            "pressure_psi": planned.pressure_psi,
+            "rate_mm_s": planned.rate_mm_s,
+        }
         settings |= {"gait": trial.gait, "cycles": planned.cycles or None, **planned.settings}
         known = {key: value for key, value in settings.items() if value is not None}
         return {
@@ -70,9 +76,9 @@ class OwnInstruments:
     ) -> None:
         self._desk, self._watch, self._exports = desk, watch, exports
         self._declared: Mapping[str, Export] = {}
-        self._before: dict[Path, tuple] = {}
+        self._before: dict[Path, Signature] = {}
         self._wrong = ""
-        self._told: dict[Path, tuple] = {}
+        self._told: dict[Path, Signature] = {}
         self._turn: Turn | None = None
         self._kept: Path | None = None
         self._step = ""
@@ -85,7 +91,7 @@ class OwnInstruments:
         """What is asked from now on is for this trial; `kept`: the folder of the earlier trials' files."""
         self._turn, self._kept = turn, kept
 
-    def mount(self, experiment: str, **settings) -> None:
+    def mount(self, experiment: str, **settings: Any) -> None:
         """See Instruments."""
         self._experiment, self._record = experiment, None
         self._declared = self._exports()
@@ -111,7 +117,7 @@ class OwnInstruments:
 
     def move(self) -> None:
         """See Instruments."""
-        planned = self._turn.planned
+        planned = self._present.planned
         static = self._experiment == "static_loading"
         way = "to the extended state and back" if static else f"by {PULL_MM:g} mm"
         self._ask("move", f"Move the cross-head {way} at {planned.rate_mm_s:g} mm/s. Press Enter once it has stopped.")
@@ -150,7 +156,7 @@ class OwnInstruments:
         where, then = (
             (f"to {self._watch} ", "") if self._watch is not None else ("", ", then type the path of the first")
         )
-        name = Path(self._turn.planned.file).stem
+        name = Path(self._present.planned.file).stem
         export = self._export
         if export is None:
             what = f"{name}.csv ({', '.join(('time_s', *CHANNELS[self._experiment]))})"
@@ -168,10 +174,16 @@ class OwnInstruments:
         if self._record is None:
             return
         folder.mkdir(parents=True, exist_ok=True)
-        target = (folder / self._turn.planned.file).with_suffix(self._record[0].suffix)
+        target = (folder / self._present.planned.file).with_suffix(self._record[0].suffix)
         shutil.copyfile(self._record[0], target)
         if self._needs_sync_file:
             shutil.copyfile(sync_file(self._record[0]), target.with_suffix(".sync.csv"))
+
+    @property
+    def _present(self) -> Turn:
+        if self._turn is None:
+            raise RuntimeError("nothing is asked of the instruments before `begin`")
+        return self._turn
 
     @property
     def _export(self) -> Export | None:
@@ -184,7 +196,7 @@ class OwnInstruments:
 
     def _ask(self, step: str, text: str) -> None:
         self._step = step
-        self._desk.ask(step, text, self._turn.told())
+        self._desk.ask(step, text, self._present.told())
 
     def _files(self) -> list[Path]:
         """What lies in the watched folder and below, without what is bifa's or an operating system's."""
@@ -193,7 +205,7 @@ class OwnInstruments:
         found = (path for path in self._watch.rglob("*") if path.name not in (ASKS, ANSWER))
         return sorted(path for path in found if not is_stray(path.name) and path.is_file())
 
-    def _signatures(self):
+    def _signatures(self) -> Iterator[tuple[Path, Signature]]:
         """Records with all that belongs to them."""
         for path in self._files():
             if not _is_sync(path) and path.suffix.lower() in self._suffixes:
@@ -204,7 +216,7 @@ class OwnInstruments:
                     parts = (path, sync) if self._needs_sync_file else (path,)
                     yield path, tuple(_signature(part) for part in parts)
 
-    def _alone(self):
+    def _alone(self) -> Iterator[tuple[Path, Signature]]:
         """Files of which no record can be made yet, or at all."""
         whole = {path for path, _ in self._signatures()}
         whole |= {sync_file(path) for path in whole}
@@ -299,7 +311,7 @@ class OwnInstruments:
 
     def _refuse_earlier(self, path: Path) -> None:
         """A file that an earlier trial was kept with: somebody saved or named the wrong one."""
-        data, own = path.read_bytes(), Path(self._turn.planned.file).stem
+        data, own = path.read_bytes(), Path(self._present.planned.file).stem
         for old in sorted(self._kept.glob("*")) if self._kept is not None else ():
             if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:
                 raise InstrumentFileError(f"{path} is the record of an earlier trial, {old.name}")

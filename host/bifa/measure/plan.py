@@ -57,6 +57,21 @@ class PlannedTrial:
         """What it is called on the terminal: "static loading, large, 4 psi, 2 mm/s, repeat 1"."""
         return f"{self.as_trial().label}, repeat {self.repeat}"
 
+    @property
+    def commanded_psi(self) -> float:
+        """See Trial."""
+        return self.as_trial().commanded_psi
+
+    @property
+    def commanded_mm_s(self) -> float:
+        """See Trial."""
+        return self.as_trial().commanded_mm_s
+
+    @property
+    def tested(self) -> str:
+        """See Trial."""
+        return self.as_trial().tested
+
     def as_trial(self, columns: Mapping[str, Any] | None = None, **fields: Any) -> Trial:
         """The trial that this becomes once it is recorded."""
         return Trial(

@@ -12,13 +12,14 @@ from bifa.link import Uno
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, align
 from bifa.measure.instruments import are_asked, attend, until_ready
+from bifa.rig import Rig
 
 LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
 _PIECE_S = 0.25
 BEFORE_MARK_S = 0.1  # that the instrument surely sees strobes before the pause
 
 
-def instruments_of(rig):
+def instruments_of(rig: Rig) -> Any:
     """The rig's instruments; BifaError where it has none."""
     if rig.instruments is None:
         raise BifaError(
@@ -28,13 +29,14 @@ def instruments_of(rig):
     return rig.instruments
 
 
-def mount(rig, uno: Uno, experiment: str, **settings) -> None:
+def mount(rig: Rig, uno: Uno, experiment: str, **settings: Any) -> None:
     """Have `experiment` put on the stand, and wait until it is there."""
-    rig.instruments.mount(experiment, **settings)
-    until_ready(rig.instruments, lambda: idle(rig, uno, _PIECE_S))
+    instruments = instruments_of(rig)
+    instruments.mount(experiment, **settings)
+    until_ready(instruments, lambda: idle(rig, uno, _PIECE_S))
 
 
-def idle(rig, uno: Uno, duration_s: float) -> None:
+def idle(rig: Rig, uno: Uno, duration_s: float) -> None:
     """Let time pass without letting the Uno think that the host has gone."""
     until_s = rig.clock.now() + duration_s
     while (left_s := until_s - rig.clock.now()) > 0:
@@ -53,7 +55,7 @@ class Recording:
     AlignmentError where they cannot be.
     """
 
-    def __init__(self, rig, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
+    def __init__(self, rig: Rig, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
         self._instruments = instruments_of(rig)
         self._rig, self._uno, self._on_progress = rig, uno, on_progress
         self.samples: list[Any] = []
@@ -67,7 +69,7 @@ class Recording:
         self._marked = self._uno.mark_strobe()
         return self
 
-    def __exit__(self, kind, *_) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._uno.halt()
         if kind is None and are_asked(self._instruments):
             self._instruments.save()

@@ -20,6 +20,7 @@ from bifa.link import Uno
 from bifa.lock import locked
 from bifa.measure.experiments import record_trial
 from bifa.measure.plan import PlannedTrial
+from bifa.rig import Rig
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Recorder(Protocol):
 
     def __call__(
         self,
-        rig,
+        rig: Rig,
         uno: Uno,
         planned: PlannedTrial,
         on_progress: Callable[[float], None],
@@ -52,18 +53,18 @@ class Recorder(Protocol):
     ) -> Trial: ...
 
 
-def by_itself(rig, uno, planned, on_progress, **_) -> Trial:
+def by_itself(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
     """The `Recorder` of a rig that needs nobody."""
     return record_trial(rig, uno, planned, on_progress)
 
 
-def recorder_of(rig) -> Recorder:
+def recorder_of(rig: Rig) -> Recorder:
     """What records on this rig: its own (`rig.recorder`, a person who works the instruments), or `by_itself`."""
     return getattr(rig, "recorder", None) or by_itself
 
 
 def run_session(
-    rig,
+    rig: Rig,
     folder: Path,
     trials: Sequence[PlannedTrial],
     *,
@@ -106,7 +107,9 @@ def _settings(provenance: Mapping[str, Any]) -> dict[str, Any]:
     return {"virtual": provenance.get("port") == "virtual"} | dict(provenance.get("options", {}))
 
 
-def _recorded(rig, writer: DatasetWriter, trials: Sequence[PlannedTrial], on_event: Callable[[Event], None]) -> Dataset:
+def _recorded(
+    rig: Rig, writer: DatasetWriter, trials: Sequence[PlannedTrial], on_event: Callable[[Event], None]
+) -> Dataset:
     record = recorder_of(rig)
     with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         uno.connect()
@@ -116,15 +119,11 @@ def _recorded(rig, writer: DatasetWriter, trials: Sequence[PlannedTrial], on_eve
                 on_event(Event(planned, number, len(trials), 1.0, skipped=True))
                 continue
             on_event(Event(planned, number, len(trials), 0.0))
-            trial = record(
-                rig,
-                uno,
-                planned,
-                lambda share, p=planned, n=number: on_event(Event(p, n, len(trials), share)),
-                number=number,
-                total=len(trials),
-                writer=writer,
-            )
+
+            def show(share: float, planned: PlannedTrial = planned, number: int = number) -> None:
+                on_event(Event(planned, number, len(trials), share))
+
+            trial = record(rig, uno, planned, show, number=number, total=len(trials), writer=writer)
             writer.add(planned.as_trial(trial.columns, session_order=number, extra=_measured(trial.extra, planned)))
             wrong = misfit_of_last(writer.trials)
             on_event(Event(planned, number, len(trials), 1.0, trial.extra["clock_error_s"], misfit=wrong))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def sketch(trial: Trial, plain: bool = False) -> list[str]:
     return [line for name in names for line in _panel("time_s", name, columns, plain)]
 
 
-def _panel(x_name: str, y_name: str, columns, plain: bool) -> list[str]:
+def _panel(x_name: str, y_name: str, columns: Mapping[str, np.ndarray], plain: bool) -> list[str]:
     return panel(columns[x_name], columns[y_name], _words(x_name), _words(y_name), plain)
 
 

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from bifa.cli import app
 from bifa.link import MismatchError, NoAnswerError, RestartedError, Uno, frames
 from bifa.link.frames import Report
-from bifa.link.session import Hello
-from bifa.link.table import REPORTS, STATES
+from bifa.link.session import Hello, Session
+from bifa.link.table import COMMANDS, REPORTS, STATES
 from bifa.live.monitor import Monitor
 from bifa.live.record import HEADER, _row
 from bifa.printable import printable
@@ -200,3 +200,14 @@ def test_an_answer_of_another_kind_is_none(board, ask):
     uno.session._take = another
     with pytest.raises(NoAnswerError, match=r"[1-9]\d* bad frames"):
         ask(uno)
+
+
+def test_an_uno_that_greets_before_any_session_is_said_to_have_restarted():
+    """Another program has a session with it; this one has not connected yet."""
+    board = Board()
+    Uno(board, board).connect()
+    session = Session(board, board)
+    board.write(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
+    session.poll(0.1)
+    with pytest.raises(RestartedError, match="the Uno restarted"):
+        session.raise_if_restarted()

@@ -65,8 +65,9 @@ def _starts(seen: Found, tried: Sequence[np.ndarray], wraps: np.ndarray, count: 
     of the basins tried; then the best of the others."""
     tops = _tops(seen, wraps)
     first = Found(seen.points[tops], seen.values[tops]).finalists(count, _APART, wraps, avoid=tried)
-    others = seen.finalists(count - len(first), _APART, wraps, avoid=[*tried, *first]) if len(first) < count else []
-    return np.array([*first, *others])
+    if len(first) >= count:
+        return np.array(first)
+    return np.array([*first, *seen.finalists(count - len(first), _APART, wraps, avoid=[*tried, *first])])
 
 
 def _tops(seen: Found, wraps: np.ndarray) -> np.ndarray:

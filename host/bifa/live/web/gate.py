@@ -5,6 +5,7 @@ there longest goes, so that whoever comes is heard: a stop needs no token. All o
 """
 
 import asyncio
+from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.wsproto_impl import WSProtocol
@@ -25,20 +26,20 @@ class Gate:
         self._strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # the oldest first
 
         class Http(H11Protocol):
-            def connection_made(http, transport):  # noqa: N805
+            def connection_made(http, transport: Any) -> None:  # noqa: N805
                 super().connection_made(transport)
                 self._enter(http)
 
-            def connection_lost(http, error):  # noqa: N805
+            def connection_lost(http, error: Exception | None) -> None:  # noqa: N805
                 self._forget(http.transport)
                 super().connection_lost(error)
 
         class Websocket(WSProtocol):
-            def connection_made(websocket, transport):  # noqa: N805
+            def connection_made(websocket, transport: Any) -> None:  # noqa: N805
                 super().connection_made(transport)
                 self._watches(transport)
 
-            def connection_lost(websocket, error):  # noqa: N805
+            def connection_lost(websocket, error: Exception | None) -> None:  # noqa: N805
                 self._forget(websocket.transport)
                 super().connection_lost(error)
 

@@ -66,7 +66,7 @@ class _Asked:
 
     what: Callable[[Uno], Any]
     changes: bool
-    future: Future
+    future: Future[Any]
 
 
 class Pilot:
@@ -74,7 +74,7 @@ class Pilot:
 
     def __init__(self) -> None:
         self._asked: deque[_Asked] = deque()
-        self._stop: Future | None = None  # asked for, and not yet confirmed
+        self._stop: Future[Any] | None = None  # asked for, and not yet confirmed
         self._lock = threading.Lock()
         self._stopper: Stopper | None = None
         self._is_flying = False
@@ -82,10 +82,10 @@ class Pilot:
         self._stopped: dict[str, Any] | None = None
         self.is_watched: Callable[[], bool] = lambda: True  # whether anybody would see that a stop failed
 
-    def ask(self, what: Callable[[Uno], Any], changes: bool = False) -> Future:
+    def ask(self, what: Callable[[Uno], Any], changes: bool = False) -> Future[Any]:
         """Have `what(uno)` called soon; the future has its result, or what it raised. changes: parameters or presets,
         which are then told."""
-        future: Future = Future()
+        future: Future[Any] = Future()
         with self._lock:
             if not self._is_flying:
                 future.set_exception(NobodyThereError(self._ended))
@@ -95,7 +95,7 @@ class Pilot:
                 self._asked.append(_Asked(what, changes, future))
         return future
 
-    def stop(self, by: str = "a page") -> Future:
+    def stop(self, by: str = "a page") -> Future[Any]:
         """All valves off, now; whatever was asked before and has not begun is dropped. The result comes when the Uno
         has said that it is so; StillMovingError if it does not. by: who stops, for everybody to read."""
         if stopper := self._stopper:
@@ -213,7 +213,9 @@ class Pilot:
 class _Flight:
     """One flight: looks at the robot, does what is asked, and tells."""
 
-    def __init__(self, pilot: Pilot, uno: Uno, clock: Clock, tell: Tell, position_mm) -> None:
+    def __init__(
+        self, pilot: Pilot, uno: Uno, clock: Clock, tell: Tell, position_mm: Callable[[], dict[str, float]] | None
+    ) -> None:
         self._pilot, self._uno, self._clock, self._tell = pilot, uno, clock, tell
         self._position_mm = position_mm
         self._latest, self._speed = Latest(), CycleSpeed()

@@ -33,6 +33,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bifa.errors import BifaError
+from bifa.link import Uno
 from bifa.live.web.gate import ACCEPTED_AT_ONCE, LARGEST_HEADERS, LARGEST_MESSAGE, Gate
 from bifa.live.web.pilot import MOVING, BusyError, NobodyThereError, Pilot, wall_clock
 from bifa.live.web.state import LiveState
@@ -77,7 +78,7 @@ class Page:
     number: int
     is_owner: bool
     messages: asyncio.Queue[str] = field(default_factory=lambda: asyncio.Queue(_WAITING))
-    answers: set[asyncio.Task] = field(default_factory=set)
+    answers: set[asyncio.Task[None]] = field(default_factory=set)
 
     def tell(self, message: Mapping[str, Any] | str) -> None:
         """A page that is too slow misses the oldest."""
@@ -98,7 +99,7 @@ class LivePage:
         self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._predictor = ThreadPoolExecutor(1, "predictor")
-        self._prediction: asyncio.Task | None = None
+        self._prediction: asyncio.Task[None] | None = None
         self.state = LiveState(
             robot="connecting",
             gone="",
@@ -191,7 +192,7 @@ class LivePage:
         given = [name for name in socket.scope["subprotocols"] if name != PROTOCOL]
         page = Page(next(self._numbers), any(secrets.compare_digest(one, self.token) for one in given))
         await socket.accept(PROTOCOL if PROTOCOL in socket.scope["subprotocols"] else None)
-        if page.is_owner:
+        if page.is_owner and socket.client is not None:
             self.gate.prove(socket.client)
         you = {"number": page.number, "is_owner": page.is_owner, "is_stale": bool(given) and not page.is_owner}
         page.tell({"you": you} | self.state.whole())
@@ -272,7 +273,7 @@ class LivePage:
         )
 
     def _load(self, preset: str) -> Awaitable[str]:
-        def load(uno) -> dict[str, float]:
+        def load(uno: Uno) -> dict[str, float]:
             uno.load(preset)
             return uno.parameters()
 
@@ -326,13 +327,13 @@ async def _send(socket: WebSocket, page: Page) -> None:
             await socket.send_text(await page.messages.get())
 
 
-async def _waited(future: Future, said: str) -> str:
+async def _waited(future: Future[Any], said: str) -> str:
     """What is said when it is done; if it has not begun in time, it is not done behind the page's back."""
     await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_S)
     return said
 
 
-def _seen(future: Future) -> None:
+def _seen(future: Future[Any]) -> None:
     """Nobody waits for it; the pilot says what went wrong."""
     if not future.cancelled():
         future.exception()

@@ -112,7 +112,7 @@ class Bench:
         spring = self.robot["spring"][plan.chamber != "body"]
         return float(np.round(spring["extended_m"] * 1e3, 1) * 1e-3)
 
-    def _schedule(self, plan: Plan, random: np.random.Generator) -> tuple[np.ndarray, list, dict[str, Any]]:
+    def _schedule(self, plan: Plan, random: np.random.Generator) -> tuple[np.ndarray, list[Any], dict[str, Any]]:
         """Nominal sample times, commands, and what is this trial's own."""
         own: dict[str, Any] = {
             "friction_factor": float(1.0 + self.instruments.friction_wobble * random.standard_normal()),
@@ -176,7 +176,7 @@ class Bench:
         then: np.ndarray,
         true_s: np.ndarray,
         late_marker: str,
-        commands: list,
+        commands: list[Any],
         random: np.random.Generator,
     ) -> dict[str, np.ndarray]:
         if plan.experiment in ("static_loading", "anchor_pull"):
@@ -199,7 +199,7 @@ class Bench:
         slow = coloured(i.wander_mm, 0.997, count, random)
         return noise + (slow - slow[0] if random.uniform() < i.wander_share else 0.0)
 
-    def _ringing(self, true_s: np.ndarray, commands: list) -> np.ndarray:
+    def _ringing(self, true_s: np.ndarray, commands: list[Any]) -> np.ndarray:
         """The camera's mount, kicked by every valve that switches."""
         ring = self.faults.get("camera_ring")
         moved = np.zeros(len(true_s))

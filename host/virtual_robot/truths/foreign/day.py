@@ -118,7 +118,9 @@ def draw_effects(
         names = [effect]
     elif form is not None:
         raise DayError("a form is that of an effect: name the effect, too")
-    label, robot, bench = {}, {}, {}
+    label: dict[str, Any] = {}
+    robot: dict[str, Any] = {}
+    bench: dict[str, Any] = {}
     for name, drawn in zip(names, sizes, strict=False):
         used = drawn if size is None else size
         chosen, change = EFFECTS[name].draw(used, random, form)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from virtual_robot.errors import VirtualRobotError
 
@@ -22,7 +23,7 @@ class NoSpringError(VirtualRobotError):
     """No truss has these peaks and stops."""
 
 
-def spring_force(spring: Spring, x: np.ndarray) -> np.ndarray:
+def spring_force(spring: Spring, x: ArrayLike) -> np.ndarray:
     """Force [N] of the truss at `x` [m] from the contracted state; vectorised, for building and for tests."""
     from_truss = np.asarray(x) + spring["zero_m"]
     w = from_truss - spring["rise_m"]
