@@ -146,13 +146,7 @@ class Sheet:
             raise self._error(f"cannot be read as a CSV: {error}") from None
 
     def _workbook(self) -> tuple[list[list[str]], Any]:
-        import pandas
-
-        try:
-            frame = pandas.read_excel(self._path, sheet_name=self._form.sheet or 0, header=None, engine="openpyxl")
-        except Exception as error:  # openpyxl's own, and zipfile's
-            raise self._error(f"cannot be read as a workbook (.xlsx): {error}") from None
-        rows = [["" if value != value or value is None else str(value) for value in row] for row in frame.values]
+        frame, rows = workbook(self._path, self._form.sheet, self.file)
         begin = self._first_head([self._form.separator.join(row) for row in rows])
         count = self._form.header_rows + self._form.units_rows
         self.first = begin + count + 1
@@ -331,6 +325,17 @@ def _exact() -> dict[str, str]:
 
     old = tuple(int(part) for part in pandas.__version__.split(".")[:2]) < (3, 1)
     return {"float_precision": "round_trip"} if old else {}
+
+
+def workbook(path: Path, sheet: str | None, file: str) -> tuple[Any, list[list[str]]]:
+    """A sheet of a workbook, the first without a name: as pandas has it, and its cells as text. Raises DatasetError."""
+    import pandas
+
+    try:
+        frame = pandas.read_excel(path, sheet_name=sheet or 0, header=None, engine="openpyxl")
+    except Exception as error:  # openpyxl's own, and zipfile's
+        raise DatasetError(f"cannot be read as a workbook (.xlsx): {error}", file=file) from None
+    return frame, [["" if value != value or value is None else str(value) for value in row] for row in frame.values]
 
 
 def listed(names: Iterable[str]) -> str:

@@ -18,7 +18,7 @@ from bifa.data.clocks import DATE, FRAME
 from bifa.data.errors import DatasetError
 from bifa.data.export import ROLES, UNITS, Export, parse_exports, presets, unit_in
 from bifa.data.fields import Fields, Source
-from bifa.data.sheet import SEPARATORS, Form, Sheet
+from bifa.data.sheet import SEPARATORS, Form, Sheet, workbook
 from bifa.measure.instruments import CHANNELS
 from lacuna.decimals import number
 
@@ -73,7 +73,7 @@ def wanted(role: str) -> list[str]:
 
 def look(path: Path) -> Look:
     """Raises DatasetError where the file is no table at all."""
-    how = _workbook() if path.suffix.lower() == ".xlsx" else _text(path)
+    how = _workbook(path) if path.suffix.lower() == ".xlsx" else _text(path)
     form = Form(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
     return Look(how, Sheet(path, form), {role: name for role in ("machine", "camera") if (name := _preset(path, role))})
 
@@ -108,8 +108,11 @@ def _inline(role: str, table: Mapping[str, Any]) -> str:
 # -- how it is written -----------------------------------------------------------------------------------------------
 
 
-def _workbook() -> dict[str, Any]:
-    return {"format": "xlsx"}
+def _workbook(path: Path) -> dict[str, Any]:
+    cells = workbook(path, None, str(path))[1][:_LOOKED_AT]
+    run, first = _numbers(cells, ".")
+    _refuse_short(path, run)
+    return {"format": "xlsx"} | _heads(cells[:first], len(cells[first]))
 
 
 def _text(path: Path) -> dict[str, Any]:
@@ -118,17 +121,20 @@ def _text(path: Path) -> dict[str, Any]:
     for name, mark in SEPARATORS.items():
         for decimal in (".", ","):
             if decimal != mark:
-                run, first = _numbers(lines, mark, decimal)
+                run, first = _numbers([_split(line, mark) for line in lines], decimal)
                 best = max(best, (run, -first, name, decimal), key=lambda one: one[:2])
     run, first, separator, decimal = best[0], -best[1], best[2], best[3]
-    if run < 2:
-        raise DatasetError(
-            "holds no rows of numbers that belong together: is it the export of a table?", file=str(path)
-        )
+    _refuse_short(path, run)
     cells = [_split(line, SEPARATORS[separator]) for line in lines[:first]]
     how: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
     how = {key: value for key, value in how.items() if value not in ("comma", ".", "utf-8")}
     return how | _heads(cells, len(_split(lines[first], SEPARATORS[separator])))
+
+
+def _refuse_short(path: Path, run: int) -> None:
+    if run < 2:
+        problem = "holds no rows of numbers that belong together: is it the export of a table?"
+        raise DatasetError(problem, file=str(path))
 
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
@@ -158,11 +164,10 @@ def _split(line: str, mark: str) -> list[str]:
         return []
 
 
-def _numbers(lines: Sequence[str], mark: str, decimal: str) -> tuple[int, int]:
-    """Length and first line of the longest run of lines with as many cells, numbers most of them."""
+def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
+    """Length and first line of the longest run of rows with as many cells, numbers most of them."""
     longest, first, run, width = 0, 0, 0, 0
-    for place, line in enumerate(lines):
-        cells = _split(line, mark)
+    for place, cells in enumerate(rows):
         here = len(cells) if len(cells) > 1 and _most_are_numbers(cells, decimal) else 0
         run = run + 1 if here and here == width else int(bool(here))
         width = here

@@ -14,7 +14,7 @@ from bifa.campaign.stages import StageError, run_stages
 from bifa.cli.campaign import _kept
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
-from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench
+from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench, read_exports
 from bifa.measure.plan import PlannedTrial
 from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, load_gait
@@ -47,6 +47,14 @@ def test_known_values_are_asked_once_and_kept(tmp_path):
     assert "supply_positive_psi must be a number, not '9 bar'" in "\n".join(desk.said)
     assert known_on(path, Answering()) == known
     assert len(ASKED) == 4
+
+
+def test_a_bench_that_has_only_declared_its_instruments_is_asked_and_keeps_them(tmp_path):
+    path = tmp_path / "bench.toml"
+    path.write_text('[instrument.machine]\npreset = "testxpert"\n')
+    assert known_on(path, Answering("0.182", "", "", "")) == {"head_mass_kg": 0.182}
+    assert read_bench(path) == {"head_mass_kg": 0.182}
+    assert read_exports(path)["machine"].columns["force_N"] == "Standardkraft"
 
 
 @pytest.mark.parametrize(

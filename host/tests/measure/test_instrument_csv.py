@@ -6,7 +6,10 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from bifa.cli import app
+from bifa.data import read_dataset
 from bifa.data.export import parse_exports
 from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
@@ -371,3 +374,16 @@ def test_a_strobe_in_a_column_lines_the_record_up(files):
     _, clock = import_trial(files / "daq.txt", files, PULL, files / "out", export=export)
     assert clock.rms_s < 1e-3
     assert clock.offset_s == pytest.approx(-OFFSET_S, abs=2e-3)
+
+
+def test_the_command_takes_an_export_as_the_bench_declares_it(files):
+    columns, edges = pulled(files)
+    path = files / "pull.TRA"
+    path.write_bytes(EXPORTS["testxpert"].write(columns))
+    write(path.with_suffix(".sync.csv"), {"sync_time_s": edges})
+    (files / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
+    options = ["--instrument", str(path), "--telemetry", str(files), "--bench", str(files / "bench.toml")]
+    options += ["--pressure", "8.5", "--out", str(files / "out")]
+    said = CliRunner().invoke(app, ["experiment", "anchor_pull", *options])
+    assert said.exit_code == 0, said.output
+    assert read_dataset(files / "out").trials[0].columns["displacement_mm"].max() > 39.0

@@ -110,3 +110,14 @@ def test_presets_are_listed():
     said = CliRunner().invoke(app, ["instrument", "--presets"]).output
     assert "bluehill-german" in said
     assert "OptiTrack Motive" in said
+
+
+def test_a_workbook_is_looked_at_as_well(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(dict(zip(("Time [s]", "Extension [mm]", "Load [kN]"), MACHINE.values(), strict=True)))
+    table.to_excel(tmp_path / "a.xlsx", index=False, startrow=3)
+    said = asked(tmp_path / "a.xlsx", tmp_path, "", "", "", "", "n", "", "", "n", "file", "y")
+    assert said.exit_code == 0, said.output
+    export = read_exports(tmp_path / "bench.toml")["machine"]
+    found, _, _ = read_export(tmp_path / "a.xlsx", export, ("time_s", "force_N"))
+    np.testing.assert_allclose(found["force_N"], 1000.0 * MACHINE["force_N"])
