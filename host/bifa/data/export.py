@@ -40,6 +40,7 @@ _SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", 
 _SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
 _FORM_KEYS = ("separator", "decimal", "encoding", "skip_rows", "header", "header_rows", "units_rows", "sheet")
 _KEYS = ("preset", "format", *_FORM_KEYS, "columns", "units", "factor", "sign", "rate_hz", "date_format", "zone")
+_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$")
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
 _THRESHOLD = 2.5  # V, of a strobe of 5 V
@@ -174,8 +175,8 @@ def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
     """Where the file has rows of units, they and the declaration agree."""
-    told = unit_in(sheet.units[place] or sheet.names[place][-1])
-    if told and unit and unit in _sizes(name) and told != unit and told in {u for s in UNITS.values() for u in s}:
+    told = told_unit(sheet, place)
+    if told and unit and unit in _sizes(name) and told != unit:
         raise sheet.error(
             f"the file says {told}, and units.{name} is declared as {unit}: correct the declaration",
             -1,
@@ -183,9 +184,15 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) ->
         )
 
 
+def told_unit(sheet: Sheet, place: int) -> str | None:
+    """The unit that a file itself gives for a column: in a row of units, or in brackets behind its name."""
+    name = sheet.names[place][-1] if sheet.names[place] else ""
+    return unit_in(sheet.units[place]) or (unit_in(name) if _BRACKETS.search(name) else None)
+
+
 def unit_in(text: str) -> str | None:
-    """The unit that a name or a row of units ends with, in brackets or alone; None where there is none."""
-    found = re.search(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$", text)
+    """The unit that a text ends with in brackets, or is; None where there is none."""
+    found = _BRACKETS.search(text)
     word = (found[1] if found else text).strip()
     word = _SPELT.get(word.lower(), word)
     known = {unit for sizes in UNITS.values() for unit in sizes}

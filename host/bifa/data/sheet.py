@@ -87,7 +87,7 @@ class Sheet:
         width = max([len(row) for row in heads], default=0)
         self.names = [_parts(header, place) for place in range(width)]
         self.units = [" ".join(_parts(units, place)) for place in range(width)]
-        self._refuse_twice()
+        self._refuse_other_separator()
 
     # -- reading ---------------------------------------------------------------------------------------------------
 
@@ -203,8 +203,8 @@ class Sheet:
 
     # -- names -----------------------------------------------------------------------------------------------------
 
-    def _refuse_twice(self) -> None:
-        """Only of one row of names: with several, each is found by its own."""
+    def _refuse_other_separator(self) -> None:
+        """One name that holds another program's separator is no name."""
         if self._form.separator != " " and self._form.format == "csv" and len(self.names) == 1 and self.names[0]:
             for mark in set(_NAMES_OF) - {" ", self._form.separator}:
                 if mark in self.names[0][0]:

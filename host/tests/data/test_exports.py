@@ -246,14 +246,18 @@ def test_units_are_recognised_where_they_are_written(text, unit):
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=20), st.sampled_from(["comma", "semicolon", "tab"]))
-def test_any_number_is_read_to_the_last_bit(values, separator):
-    mark = {"comma": ",", "semicolon": ";", "tab": "\t"}[separator]
-    text = f"t{mark}x{mark}F\n" + "".join(f"{v!r}{mark}{v!r}{mark}1\n" for v in values)
+@given(
+    st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=20),
+    st.sampled_from([("comma", ",", "."), ("semicolon", ";", ","), ("tab", "\t", ","), ("space", "  ", ".")]),
+    st.sampled_from(["utf-8", "cp1252", "utf-16"]),
+)
+def test_any_number_is_read_to_the_last_bit(values, how, encoding):
+    name, mark, point = how
+    rows = "".join(f"{mark.join([f'{v!r}'.replace('.', point)] * 2)}{mark}1\n" for v in values)
+    form = f'separator = "{name}"\ndecimal = "{point}"\nencoding = "{encoding}"\n'
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "a.csv").write_text(text)
-        export = declared(SIMPLE + f'separator = "{separator}"\n')
-        found, _, _ = read_export(Path(folder) / "a.csv", export, MACHINE)
+        (Path(folder) / "a.csv").write_text(f"t{mark}x{mark}F\n" + rows, encoding=encoding)
+        found, _, _ = read_export(Path(folder) / "a.csv", declared(SIMPLE + form), MACHINE)
     assert found["displacement_mm"].tolist() == values
 
 
@@ -337,3 +341,16 @@ def test_the_declarations_of_the_pages_are_valid(page):
     for block in blocks:
         source = Source(block, 0, page)
         assert parse_exports(Fields(parse_toml(block)["instrument"], source, table="instrument"), source)
+
+
+def test_a_columns_name_alone_is_no_unit(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,N\n0,1,2\n1,2,3\n")
+    columns = 'columns = { time_s = "t", displacement_mm = "x", force_N = "N" }\n'
+    units = 'units = { time_s = "s", displacement_mm = "mm", force_N = "kN" }\n'
+    found, _, _ = read_export(tmp_path / "a.csv", declared("[instrument.machine]\n" + columns + units), MACHINE)
+    assert found["force_N"].tolist() == [2000.0, 3000.0]
+    (tmp_path / "a.csv").write_text("t,x,N [N]\n0,1,2\n1,2,3\n")
+    with pytest.raises(DatasetError, match=r"the file says N, and units.force_N is declared as kN"):
+        read_export(
+            tmp_path / "a.csv", declared("[instrument.machine]\n" + columns.replace('"N"', '"N [N]"') + units), MACHINE
+        )
