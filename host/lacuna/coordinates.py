@@ -35,12 +35,13 @@ class Coordinate:
         """`p` as it is fitted."""
         lower, upper = sorted(self._end(bound, p.value) for bound in (p.lower, p.upper))
         slope = self.slope(p.value)
+        low, high = sorted(map(self.fitted, p.plausible or (p.value, p.value)))
         return replace(
             p,
             value=self.fitted(p.value),
             lower=lower,
             upper=upper,
-            plausible=None if p.plausible is None else tuple(sorted(map(self.fitted, p.plausible))),
+            plausible=None if p.plausible is None else (low, high),
             scale=p.step_scale * slope,
             prior_sd=None if p.prior_sd is None else p.prior_sd * slope,
             elsewhere=tuple(map(self.fitted, p.elsewhere)),

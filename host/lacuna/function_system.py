@@ -404,7 +404,7 @@ def _check_amounts(what: str, told: Any, by_output: bool) -> None:
             raise DeclarationError(f'{what} is told by output: write {{"OUTPUT": {told!r}}}.')
         told = {"all outputs": told}
     for output, amount in told.items():
-        if not isinstance(amount, Real) or not 0.0 <= amount < math.inf:
+        if not isinstance(amount, Real) or not 0.0 <= float(amount) < math.inf:
             raise DeclarationError(f"{what} of {output} is {amount!r}: give a number that is not negative.")
 
 
@@ -425,7 +425,7 @@ def _all_different(names: Sequence[str], what: str) -> None:
 
 def _regressors(record: Record, prediction: Channels) -> dict[str, np.ndarray]:
     """The outputs, their rates and directions of change, the inputs, and time."""
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for name, column in prediction.items():
         rate = np.gradient(column, record.time_s)
         found |= {name: column, f"rate of {name}": rate, f"direction of {name}": np.sign(rate)}

@@ -16,7 +16,8 @@ _LONG = 3.0  # samples: what remembers itself for less is white for all that mat
 
 def left_over_s(diagnosis: Diagnosis) -> dict[str, float]:
     """By channel without repeats the correlation time of the residual, in seconds, 0 where it is white."""
-    final, found = diagnosis.final, {}
+    final = diagnosis.final
+    found: dict[str, float] = {}
     trials = diagnosis.base.structure.system.trials
     residuals = evaluate_on(final, trials).residuals()
     traces: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)

@@ -129,8 +129,10 @@ def _parts(data: Any) -> list[tuple[str, Any]]:
 
 
 def _table(data: Any, name: str) -> Record | Table:
-    if isinstance(data, Record):
-        return data
+    return data if isinstance(data, Record) else _of_columns(data, name)
+
+
+def _of_columns(data: Any, name: str) -> Table:
     columns, labels, time_s = _columns(data, name)
     for label in _LABELS:
         if label in columns:
@@ -183,7 +185,8 @@ def _own(column: Any, record: str, name: str) -> Any:
 def _samples(column: Any, record: str, name: str) -> np.ndarray:
     """Numbers in an array of the record's own: nobody else's are changed where a model writes into it."""
     if isinstance(column, np.ma.MaskedArray):
-        column = column.astype(float if column.dtype.kind in "fiub" else object).filled(np.nan)
+        masked: Any = column.astype(float if column.dtype.kind in "fiub" else object)
+        column = masked.filled(np.nan)
     column = np.asarray(column)
     if column.dtype.kind in "fiuc":
         return np.array(column)
@@ -300,7 +303,7 @@ def _refuse_settings(tables: Mapping[str, Table]) -> None:
 
 def _csv(file: Path) -> Table:
     columns = _numbers_alone(file) or _cell_by_cell(file)
-    return _table({"condition": _stem(file.stem)[0]} | columns, file.stem)
+    return _of_columns({"condition": _stem(file.stem)[0]} | columns, file.stem)
 
 
 def _numbers_alone(file: Path) -> dict[str, np.ndarray] | None:

@@ -58,7 +58,8 @@ def diagnose(
             def answer(one: System) -> Diagnosis:
                 return engine.diagnose(one, **how, executor=workers)
 
-            found, raised = answer(system), {}
+            found = answer(system)
+            raised: Mapping[tuple[str, str], float] = {}
             if isinstance(system, FunctionSystem):
                 if system.estimates_noise_time and any((left_s := left_over_s(found)).values()):
                     system = system.with_noise_time(left_s)

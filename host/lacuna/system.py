@@ -175,7 +175,7 @@ def middle_conditions(trials: Sequence[Record], fewest: int = 3) -> tuple[tuple[
             samples = np.concatenate([next(iter(t.channels.values())) for t in members])
             means[members[0].experiment][members[0].condition] = float(np.nanmean(samples))
     many = {experiment: each for experiment, each in means.items() if len(each) >= fewest}
-    return tuple((experiment, sorted(each, key=each.get)[len(each) // 2]) for experiment, each in many.items())
+    return tuple((experiment, sorted(each, key=each.__getitem__)[len(each) // 2]) for experiment, each in many.items())
 
 
 @dataclass(frozen=True)
@@ -265,8 +265,8 @@ class System(Protocol):
         """`predict` for each of `thetas`, with its own `corrections` if any. Override it, or `predict_trials`, if
         simulating many at once is cheaper. `alike`: all are near the first and are to be compared with it, as for
         derivatives; so let errors of the integrator be alike, too, if possible."""
-        how = {"coarse": coarse, "corrections": corrections, "alike": alike}
-        return self.predict_trials(thetas, effects, [trial] * len(thetas), **how)
+        trials = [trial] * len(thetas)
+        return self.predict_trials(thetas, effects, trials, coarse=coarse, corrections=corrections, alike=alike)
 
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
     forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 
-class Values(dict):
+class Values(dict[str, Any]):
     """A dict whose entries are attributes as well: `theta["mass_kg"]` is `theta.mass_kg`, `theta["coulomb.force_N"]` is
     `theta.coulomb.force_N`. Entries are in the order in which they were declared."""
 

@@ -154,7 +154,9 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
 
 def _sought(system: System, theta: Theta, effect: str, trial: Record) -> Channels:
     """A prediction far from what is known: where there is none, that is a change."""
-    (found,) = system.predict_trials([theta | {p.name: p.value for p in system.nuisances(trial)}], (effect,), [trial])
+    (found,) = system.predict_trials(
+        [dict(theta) | {p.name: p.value for p in system.nuisances(trial)}], (effect,), [trial]
+    )
     return {name: found[name] for name in trial.channels}
 
 

@@ -211,6 +211,10 @@ def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
 
 def _input_spread(trials: Sequence[Record], name: str) -> float:
     """Over all trials: a measured input may be all noise in one of them."""
-    columns = [np.asarray(t.inputs[name]) for t in trials if np.shape(t.inputs.get(name)) == t.time_s.shape]
+    columns = [np.asarray(t.inputs[name]) for t in trials if _is_sampled(t, name)]
     columns = [column for column in columns if column.dtype.kind in "fiu"]
     return spread(np.concatenate(columns)) if columns else 0.0
+
+
+def _is_sampled(trial: Record, name: str) -> bool:
+    return name in trial.inputs and np.shape(trial.inputs[name]) == trial.time_s.shape

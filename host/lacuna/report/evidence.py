@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lacuna.report.style import figure_style
 
 
-def draw_errors(error: Mapping, path: Path | BytesIO, dark: bool = False) -> None:
+def draw_errors(error: Mapping[str, Any], path: Path | BytesIO, dark: bool = False) -> None:
     """Before against after, against the floor, on a logarithmic axis.
 
     error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
@@ -37,7 +38,7 @@ def draw_errors(error: Mapping, path: Path | BytesIO, dark: bool = False) -> Non
         plt.close(figure)
 
 
-def draw_probabilities(effects: Sequence[Mapping], path: Path | BytesIO, dark: bool = False) -> None:
+def draw_probabilities(effects: Sequence[Mapping[str, Any]], path: Path | BytesIO, dark: bool = False) -> None:
     """The probability of each effect named (`effects` of `bifa diagnose --json`), confusable ones beside it."""
     with figure_style(dark) as palette:
         import matplotlib.pyplot as plt
@@ -57,7 +58,7 @@ def draw_probabilities(effects: Sequence[Mapping], path: Path | BytesIO, dark: b
         plt.close(figure)
 
 
-def draw_learnt(curve: Mapping, path: Path | BytesIO, dark: bool = False) -> None:
+def draw_learnt(curve: Mapping[str, Any], path: Path | BytesIO, dark: bool = False) -> None:
     """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
     with figure_style(dark) as palette:
         import matplotlib.pyplot as plt
@@ -74,7 +75,7 @@ def draw_learnt(curve: Mapping, path: Path | BytesIO, dark: bool = False) -> Non
         plt.close(figure)
 
 
-def _bars(side: Mapping) -> dict[str, float]:
+def _bars(side: Mapping[str, Any]) -> dict[str, float]:
     bars = {"fitted trials": side["fitted"], "trials not fitted": side["held_out"]}
     if side.get("held_out_conditions") is not None:
         bars["conditions not fitted"] = side["held_out_conditions"]

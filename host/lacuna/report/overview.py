@@ -81,12 +81,12 @@ def held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels
     for trial, first, last in zip(trials, before, after, strict=True):
         floor = {c: diagnosis.search.floor.channels[trial.experiment, c].sd for c in trial.channels}
         error = {c: _rms(trial.channels[c] - first[c]) / floor[c] for c in trial.channels}
-        worst = max(error, key=error.get)
+        worst = max(error, key=error.__getitem__)
         found.append((error[worst], (trial, worst, first, last, floor[worst])))
     return [one for _, one in sorted(found, key=lambda pair: -pair[0])]
 
 
-def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple, legend: bool) -> None:
+def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple[Any, ...], legend: bool) -> None:
     trial, channel, before, after, floor = one
     left, right = axes
     left.plot(trial.time_s, trial.channels[channel], color=palette.measured, linewidth=2.0, alpha=0.5, label="measured")

@@ -39,9 +39,9 @@ def verdict_sentence(
         near = "to within the noise" if (remainder["times_floor"] or 0.0) <= 1.0 else "as well as was asked for"
         return f"Nothing that matters is missing from the base model: it predicts these data {near}."
     if verdict == "unexplained":
-        near = next((one for one in nearest if (one["share_of_gap"] or 0.0) > 0.5), None)
-        if near:
-            would = f"{' and '.join(near['effects'])} would close {share_in_words(near['share_of_gap'])}"
+        near_one = next((one for one in nearest if (one["share_of_gap"] or 0.0) > 0.5), None)
+        if near_one:
+            would = f"{' and '.join(near_one['effects'])} would close {share_in_words(near_one['share_of_gap'])}"
             return f"The base model lacks something, and no effect of the library is supported by these data: {would}."
         return "The base model lacks something that no effect of the library explains."
     names = " and ".join(words(effect) for effect in effects)

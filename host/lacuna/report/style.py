@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -57,5 +58,6 @@ def look(dark: bool = False) -> Iterator[Palette]:
     palette = DARK if dark else LIGHT
     ink = dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), palette.ink)
     background = {"figure.facecolor": "#16181c" if dark else "white", "axes.facecolor": "#16181c" if dark else "white"}
-    with matplotlib.rc_context(LOOK | ink | background | {"grid.color": palette.quiet}):
+    settings: dict[Any, Any] = LOOK | ink | background | {"grid.color": palette.quiet}
+    with matplotlib.rc_context(settings):
         yield palette
