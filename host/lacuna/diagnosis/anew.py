@@ -41,11 +41,10 @@ class Anew:
 
     def follow(self, before: Candidate) -> list[tuple[Fit, Profile]]:
         """Sketches of sets with one effect more than `before`: the few that promise most, if they promise to take their
-        share away. Pairs are only begun where it is other trials that may have misled the fits of single effects; where
-        no trial isolates parameters, nothing tells, and every single effect is followed."""
+        share away. Pairs only where there are trials that isolate parameters: elsewhere, nothing tells of so many."""
         size, problem = len(before.effects) + 1, before.fitted.problem
         isolates = isolating(problem)
-        if size > 2 or (size == 2 and len(set(isolates)) < 2):
+        if size > 2 or (size == 2 and not any(isolates)):
             return []
         self._weigh(problem.floor)
         self._begin([()], problem.floor)

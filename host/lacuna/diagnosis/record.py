@@ -91,6 +91,7 @@ def _left(d: Diagnosis) -> dict[str, Any]:
         "experiments": list(dict.fromkeys(experiment for experiment, _ in left.remainder.found)),
         "depends_on": list(left.signature.depends_on),
         "learnt": list(left.learnt),
+        "cannot_tell": list(left.remainder.cannot_tell),
         "text": left.signature.text,
     }
 

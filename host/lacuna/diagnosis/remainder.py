@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import norm
@@ -23,6 +23,7 @@ from lacuna.system import Channels, Record, System
 _DRAWS = 200
 _AT_ONCE = 2_000_000  # samples drawn together
 _TAIL = 0.1
+_SURELY = 1.645  # standard deviations: one-sided, 95 %
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,9 @@ class Remainder:
 
     By (experiment, channel): `shared`, mean square of what repeats share, in units of the floor's variance; `z`, the
     same in standard deviations of what chance makes of it; `chance`, the probability of so much by chance in any of
-    the channels; `good_enough`, what `shared` may be by the accuracy that the person asked for. It matters where an
-    experiment's mean over its channels exceeds `relevance`, and is no chance.
+    the channels; `good_enough`, what `shared` may be by the accuracy that the person asked for; `sd`, the standard
+    deviation that chance gives to `shared`. It matters where an experiment's mean over its channels exceeds
+    `relevance`, and is no chance.
     """
 
     shared: Mapping[tuple[str, str], float]
@@ -40,6 +42,7 @@ class Remainder:
     chance: Mapping[tuple[str, str], float]
     good_enough: Mapping[tuple[str, str], float]
     policy: Policy
+    sd: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     @property
     def found(self) -> list[tuple[str, str]]:
@@ -62,6 +65,20 @@ class Remainder:
         places = [key for key in self.found if self.shared[key] > self.good_enough[key]]
         return max((self._mean(e) / self.policy.relevance for e in {e for e, _ in places}), default=0.0)
 
+    @property
+    def cannot_tell(self) -> dict[str, float]:
+        """Experiments that may lack what matters for all that these trials tell, though nothing was found: by how much
+        at most, RMS in floors. To say that nothing is missing, what may be has to be less than what matters
+        (equivalence), not only what was found."""
+        found = {}
+        for experiment in {e for e, _ in self.shared} if self.sd else ():
+            keys = [key for key in self.shared if key[0] == experiment]
+            most = {key: max(self.shared[key], 0.0) + _SURELY * self.sd[key] for key in keys}
+            mean = sum(v if v > self.good_enough[key] else 0.0 for key, v in most.items()) / len(keys)
+            if mean > self.policy.relevance:
+                found[experiment] = float(np.sqrt(mean))
+        return dict(sorted(found.items(), key=lambda one: -one[1]))
+
     def _mean(self, experiment: str) -> float:
         """What repeats of an experiment share, over all of its channels; what is good enough counts as nothing."""
         each = [
@@ -83,31 +100,32 @@ def find_remainder(
 ) -> Remainder:
     """Test the residuals `scaled` (in standard deviations, one mapping a trial) for structure."""
     draw = np.random.default_rng(seed)
-    shared, z, alone = {}, {}, {}
+    shared, z, alone, spread = {}, {}, {}, {}
     for key, conditions in _by_condition(trials, scaled).items():
         repeated = [rows for rows in conditions if _in_common(rows) > 0]
         single = [rows for rows in conditions if _in_common(rows) == 0]
         tests = [_of_repeats(repeated, draw)] if repeated else []
         if single:
             tests.append(_of_singles(single, repeated, floor.channels[key].samples_per_piece))
-        sizes, zs, chances = zip(*tests, strict=True)
+        sizes, zs, chances, sds = zip(*tests, strict=True)
+        spread[key] = max(sds)
         shared[key] = float(np.average(sizes, weights=[len(part) for part in (repeated, single) if part]))
         z[key], alone[key] = max(zs), min(1.0, len(tests) * min(chances))
     chance = {key: float(-np.expm1(len(z) * np.log1p(-min(p, 0.999)))) for key, p in alone.items()}
     good_enough = {key: (system.accuracy(*key) / floor.channels[key].sd) ** 2 for key in shared}
-    return Remainder(shared, z, chance, good_enough, policy)
+    return Remainder(shared, z, chance, good_enough, policy, spread)
 
 
-def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> tuple[float, float, float]:
-    """What repeats share, in standard deviations of what chance makes of it, and the probability of so much."""
+def _of_repeats(conditions: Sequence[np.ndarray], draw: np.random.Generator) -> tuple[float, float, float, float]:
+    """What repeats share, in standard deviations of what chance makes of it, the probability of so much, and these."""
     shared, by_chance = _shared(conditions), _by_chance(conditions, draw)
     z = (shared - by_chance.mean()) / max(by_chance.std(), 1e-12)
-    return shared, float(z), _exceeded(by_chance, shared)
+    return shared, float(z), _exceeded(by_chance, shared), float(by_chance.std())
 
 
 def _of_singles(
     conditions: Sequence[np.ndarray], repeated: Sequence[np.ndarray], samples_per_piece: float
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float]:
     """The same for what was run once: its mean square above the floor, which itself is only as well known as the
     repeats that it was taken from tell."""
     samples = np.concatenate([rows[np.isfinite(rows)] for rows in conditions])
@@ -115,7 +133,7 @@ def _of_singles(
     of_floor = sum((len(rows) - 1) * _in_common(rows) for rows in repeated)
     variance = 2 * samples_per_piece * (1 / len(samples) + (1 / of_floor if of_floor else 0.0))
     z = above / np.sqrt(variance)
-    return above, float(z), float(norm.sf(z))
+    return above, float(z), float(norm.sf(z)), float(np.sqrt(variance))
 
 
 def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:

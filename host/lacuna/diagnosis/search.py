@@ -237,8 +237,8 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, e
     anew."""
     size = len(before.effects) + 1
     near = sketches([p for k, p in enumerate(ranked) if k < _SKETCHED[size] or p.apart], crew)
-    if not near:
-        return [], None
+    if not near:  # at no size of theirs, the rest hardly refitted, do effects help: that says little of a lost fit
+        return _best_of_each(afar.follow(before)) if before.checked_error > (0, policy.lost) else [], None
     first, finished = judge(near[0][0], split, policy, near=before.checked), None
     fruitful = before.cost - first.cost > policy.promising * before.excess
     if fruitful and first.checked_error <= (0, policy.lost):

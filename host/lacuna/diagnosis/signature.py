@@ -141,10 +141,21 @@ def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
+def _cannot_tell(remainder: Remainder) -> str:
+    """Where that nothing was found does not say that nothing is missing."""
+    if not (most := remainder.cannot_tell):
+        return ""
+    each = ", ".join(f"{size:.1f} x the floor in {experiment}" for experiment, size in list(most.items())[:3])
+    return (
+        f" That does not say that nothing is missing: as much as {each} could not be told from chance."
+        " More repeats would tell."
+    )
+
+
 def _sentence(places, remainder: Remainder, dependences, drifts, besides: str, *, repeated: bool) -> str:
     if not places and not drifts and not besides:
         known = "the differences between repeats" if repeated else "the noise"
-        return f"The residual contains nothing beyond {known}."
+        return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder)}"
     parts = []
     if places:
         listed = ", ".join(

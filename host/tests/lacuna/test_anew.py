@@ -103,6 +103,13 @@ def test_where_no_trial_isolates_parameters_every_single_effect_is_followed_and_
     assert begin(case).follow(lost(case, ("coulomb",))) == []
 
 
+def test_where_every_trial_isolates_parameters_pairs_are_begun_like_all_others():
+    hidden = hide({"delay.delay_s": 0.06, "cubic_spring.stiffness_N_m3": 8000.0}, seed=62)
+    case = Case(hidden, split_trials(hidden.trials, hidden.spare()), POLICY, 0)
+    found = [fitted for fitted, _ in begin(case).follow(lost(case, ("coulomb",)))]
+    assert set(min(found, key=lambda fitted: fitted.cost).structure.effects) == {"delay", "cubic_spring"}
+
+
 @pytest.mark.slow
 def test_either_sign_of_an_effect_is_begun():
     case = bench({"asymmetric_friction.difference_N": -0.8}, 64)

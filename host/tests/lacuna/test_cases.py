@@ -117,3 +117,32 @@ def test_many_repeats_are_dealt_out_in_thirds():
     t = np.linspace(0.0, 1.0, 20)
     split = split_trials([Record(f"{k}", "run", "c", t, {"y": t}) for k in range(12)])
     assert [len(part) for part in (split.fit, split.select, split.final)] == [4, 4, 4]
+
+
+def test_a_limit_beside_a_stronger_effect_is_tried_though_none_of_its_sizes_helps_as_it_is():
+    """A quadratic drain, and an output that is clipped at 11.9: the sizes of `clip` (a declared 10 V, and others) do
+    nothing or harm beside the drain as it was fitted alone."""
+    n = 60
+
+    def simulate(record, theta):
+        x, found = 0.0, np.empty(n)
+        for i, u in enumerate(record["u"]):
+            found[i] = min(x, theta.clip.limit_V)
+            for _ in range(4):
+                x += (theta.gain * u - x - theta.drain.per_V * x * abs(x)) / theta.tau_s
+        return {"y": found}
+
+    parameters = [Parameter("gain", "1", 3.0, 0.1, 30.0), Parameter("tau_s", "s", 10.0, 1.0, 100.0)]
+    effects = [
+        Effect("drain", Parameter("per_V", "1/V", 0.05, 0.0, 1.0)),
+        Effect("clip", Parameter("limit_V", "V", 10.0, 3.0, np.inf), absent=np.inf),
+    ]
+    system, draw, records = lacuna.System(simulate, parameters, effects), np.random.default_rng(0), []
+    truth = system.values({"gain": np.log(6.0), "tau_s": np.log(12.0), "drain.per_V": 0.2, "clip.limit_V": 1 / 11.9})
+    for _ in range(8):
+        u = np.repeat(draw.uniform(0, 8, 10), 6)
+        y = simulate({"u": u}, truth)["y"] + 0.02 * draw.standard_normal(n)
+        records.append({"time_s": np.arange(float(n)), "u": u, "y": y})
+    found = lacuna.diagnose(system, records, progress=False)
+    assert {e.name for e in found.effects} == {"drain", "clip"}
+    assert abs(found.theta.clip.limit_V - 11.9) < 0.1

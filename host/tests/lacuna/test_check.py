@@ -239,7 +239,7 @@ def test_a_factor_that_cannot_be_absent_is_pointed_out():
         return {"y": theta.stretch.factor * theta.gain * record.time_s}
 
     def added(record, theta):
-        return {"y": theta.gain * record.time_s + 0.0 * theta.stretch.factor}
+        return {"y": theta.gain * record.time_s + 1e-6 * theta.stretch.factor}
 
     records = {f"{k}": {"time_s": T, "y": T + 0.01 * DRAW.standard_normal(len(T))} for k in range(4)}
     gain = Parameter("gain", "", 1.5, 0.0, 2.0)

@@ -98,7 +98,7 @@ def test_a_blurred_view_leaves_missing_samples_out_and_weighs_what_is_slow_as_be
     point = problem.start(problem.structure.values(TRUTH | {"shape": 2.5}))
     sharp, blurred = problem.residuals(point)[0], problem.seen(View(1 / 50)).residuals(point)[0]
     assert len(sharp) == 801
-    assert 150 < len(blurred) < 170  # four or five a time constant
+    assert 195 < len(blurred) < 255  # four or five a time constant, of which the gap is some
     assert np.sum(blurred**2) == pytest.approx(np.sum(sharp**2), rel=0.2)  # it begins at 0
     away = problem.start(problem.structure.values(TRUTH | {"jump_s": 4.02}))
     there = problem.start(problem.structure.values(TRUTH))

@@ -44,10 +44,10 @@ class OneChannel(System):
         return self.good_enough
 
 
-def remainder(shared_rms, *, good_enough=0.0, policy=POLICY, repeats=4, seed=0):
+def remainder(shared_rms, *, good_enough=0.0, policy=POLICY, repeats=4, seed=0, length=4000):
     """The test of residuals in which repeats share a sine of `shared_rms` floors."""
     draw = np.random.default_rng(seed)
-    time_s = np.arange(4000) * 0.01
+    time_s = np.arange(length) * 0.01
     shared = shared_rms * np.sqrt(2.0) * np.sin(2 * np.pi * time_s)
     trials = [Record(f"{k}", "steps", 1.0, time_s, {"position_mm": time_s}) for k in range(repeats)]
     scaled = [{"position_mm": shared + draw.standard_normal(len(time_s))} for _ in trials]
@@ -66,6 +66,15 @@ def test_relevance_what_a_prediction_within_a_tenth_of_the_floor_leaves_does_not
 def test_relevance_gives_way_to_the_accuracy_that_the_person_asked_for():
     assert remainder(2.0, good_enough=0.3).matters, "0.4 mm shared where 0.3 mm were asked"
     assert not remainder(2.0, good_enough=0.5).matters, "0.4 mm shared where 0.5 mm are good enough"
+
+
+def test_that_nothing_was_found_does_not_say_that_nothing_is_missing():
+    """Equivalence: what may be missing, not what was found, is less than what matters."""
+    few, many = remainder(0.0, repeats=2, length=12), remainder(0.0, repeats=4)
+    assert not few.matters
+    assert few.cannot_tell["steps"] > np.sqrt(POLICY.relevance)
+    assert not many.cannot_tell
+    assert not remainder(0.0, repeats=2, length=12, good_enough=10.0).cannot_tell, "what is asked is met"
 
 
 def test_chance_decides_what_counts_as_structure():
