@@ -48,6 +48,7 @@ def datasets(draw):
     return Dataset(None, draw(names), known, listed, draw(st.dictionaries(names, names, max_size=3)))
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(dataset=datasets())
 def test_any_data_set_reads_back_to_the_last_bit(tmp_path_factory, dataset):

@@ -16,6 +16,7 @@ def invoke(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
+@pytest.mark.slow
 def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
     model, out = tmp_path / "model.toml", tmp_path / "gait.toml"
     save_model(model, nominal())

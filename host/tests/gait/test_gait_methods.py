@@ -33,6 +33,7 @@ def test_the_papers_method_learns_from_few_evaluations():
     assert len(found.values) == 16
 
 
+@pytest.mark.slow
 def test_the_papers_method_does_not_take_a_cliff_for_noise():
     """With the package's own settings the length scale fell to nothing and the search was random: it found 0."""
     found = METHODS["bo"](hill, WRAPS, 80, 0)

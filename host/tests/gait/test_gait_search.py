@@ -65,6 +65,7 @@ def test_a_robot_that_cannot_walk_is_said_so(runs):
         optimise(slippery, runs, up)
 
 
+@pytest.mark.slow
 def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     """With a spread of 1 % a search on few robots ended at gaits that fail one robot in ten: 10th percentile 0."""
     sloping = nominal().with_effects({"inclination": {"angle_deg": 5.0}})
@@ -80,6 +81,7 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     assert np.quantile(after, 0.1) > 0.95 * speed > 20.0
 
 
+@pytest.mark.slow
 def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
     """Half the robots of a 20 % spread cannot walk at such speeds: no error, and not just any gait."""
     settings, spread = Settings(spread=0.2), spread_of(nominal(), 0.2)

@@ -36,6 +36,7 @@ def test_the_curve_of_an_independent_actuator_comes_back(actuator):
     assert fit.stiffness.unstable_m() == pytest.approx(truth.unstable, abs=2e-5)
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_area_contains_the_truth_as_often_as_it_says():
     hits = 0
     draws = 60

@@ -73,6 +73,7 @@ def fuzz(target: str, seconds: int, folder: Path, *options: str) -> str:
     return done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS)
 def test_twenty_seconds(target, tmp_path):
     assert "DONE" in fuzz(target, 20, tmp_path, "-seed=1")  # about the same inputs every time

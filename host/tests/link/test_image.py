@@ -209,6 +209,7 @@ def test_a_restart_in_the_middle_of_a_session_is_told():
     assert uno.get("period_s") == 5.7
 
 
+@pytest.mark.slow
 def test_clocks_are_related_within_their_bound():
     chip, uno = connected()
     uno.stream(True)

@@ -27,6 +27,7 @@ def test_head_and_tail_exchanged(any_day):
         assert said(mistaken(any_day, trial.file, exchanged(*DISPLACEMENTS))) == [("mirrored", trial.file)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chambers", [("body",), ("tail",), CHAMBERS], ids=str)
 def test_pressures_of_the_wrong_sign(any_day, chambers):
     columns = [f"pressure_{chamber}_psi" for chamber in chambers]
