@@ -41,6 +41,7 @@ assert [e.name for e in lacuna.diagnose(system, tables).effects] == [e.name for 
 PAGE_S = 0.005  # the step of the page's simulate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FOLDERS)
 def test_a_wheel_holds_every_file_of_its_package_and_the_licence(root, built, name):
     folder = FOLDERS[name]
