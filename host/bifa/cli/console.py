@@ -1,6 +1,7 @@
 """`bifa console`: the Uno's text console with history, completion and a status line."""
 
 import sys
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 EPILOG = f"""Examples:  bifa console   |   bifa console --port virtual   |
 echo show | bifa console --port {EXAMPLE_PORT}"""
+
+_LOOK_S = 0.2
 
 
 def register(app: typer.Typer) -> None:
@@ -56,13 +59,33 @@ def console(
             typer.echo("the Uno confirms that all valves are off")
 
 
+def _lines(uno: "Uno") -> Iterator[str]:
+    """What comes through the pipe; in between the Uno is kept from taking this host for dead."""
+    import queue
+    import threading
+
+    from bifa.measure.desk import read_lines
+
+    come: queue.Queue[str | None] = queue.Queue()
+    threading.Thread(target=read_lines, args=(come,), daemon=True).start()
+    while True:
+        try:
+            line = come.get(timeout=_LOOK_S)
+        except queue.Empty:
+            uno.keep_alive()
+            continue
+        if line is None:
+            return
+        yield line.rstrip("\r")
+
+
 def _pipe(uno: "Uno", rig: "Rig") -> bool:
     from bifa.link.terminal import type_line
 
     good = True
     uno.session.lines.clear()  # its greeting: who reads a pipe wants answers
-    for line in sys.stdin:
-        lines = type_line(uno, line.rstrip("\r\n"), rig.clock)
+    for line in _lines(uno):
+        lines = type_line(uno, line, rig.clock)
         typer.echo("\n".join(lines))
         good = good and lines[-1].startswith("ok")
     return good

@@ -1,5 +1,7 @@
 """Console lines over the port of a session: text out, text back, telemetry and clock beside them."""
 
+from contextlib import nullcontext
+
 from bifa.link.clock import Clock
 from bifa.link.errors import NoAnswerError
 from bifa.link.uno import Uno
@@ -7,6 +9,7 @@ from bifa.link.uno import Uno
 SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
 MOVING = ("run", "hold")
+REPLACING = ("load", "defaults")  # the parameters
 
 
 def is_answer(line: str) -> bool:
@@ -38,8 +41,19 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
     """
     if not line.replace("\t", " ").isprintable():
         return [f"error {line!r} holds characters that are no text; not sent"]
+    word = (line.split() or [""])[0]
+    if word in MOVING:
+        uno.guard()
+        uno.may_move = True
+    with uno.unguarded() if word == "save" else nullcontext():
+        lines = _answered(uno, line, clock)
+    if word in REPLACING:
+        uno.guard_again()
+    return lines
+
+
+def _answered(uno: Uno, line: str, clock: Clock) -> list[str]:
     _drop_answers(uno)
-    uno.may_move = uno.may_move or line.split()[:1] in ([word] for word in MOVING)
     uno.session.transport.write(line.encode("ascii", "replace") + b"\n")
     deadline = clock.now() + LONGEST_ANSWER_S
     lines: list[str] = []

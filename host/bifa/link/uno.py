@@ -3,7 +3,8 @@
 import binascii
 import math
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bifa.link import frames, leaving
@@ -18,6 +19,7 @@ from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to
 from bifa.link.words import word
 
 EEPROM_TIMEOUT_S = 10.0
+GUARD_S = 2.0  # of silence, after which the Uno vents what this host has moved: it may have been killed
 CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
@@ -87,6 +89,7 @@ class Uno:
         self.session.on_sample = self._take_sample
         self.session.on_renewed = self._stream_again
         self.may_move = False
+        self._is_guarded = False  # `host_timeout_s` is GUARD_S where it would be 0
         self.clock_relation = ClockRelation()
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
@@ -129,6 +132,7 @@ class Uno:
         self._time_us = None
         self._last_sample = None
         self._streaming = False
+        self._is_guarded = False
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
         self._read_set()
@@ -187,16 +191,51 @@ class Uno:
         """
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
         wanted = {**self._read_set()[0], **wanted}
+        if self._is_guarded and wanted["host_timeout_s"] == 0:
+            wanted["host_timeout_s"] = to_wire("host_timeout_s", GUARD_S)
+        self._replace(wanted)
+        if wait:
+            self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
+        if save is not None:
+            self.save(save)
+
+    def _replace(self, wanted: dict[str, int]) -> None:
         data = pack_set(wanted)
         fields = [("field", (index_of(name), value)) for name, value in wanted.items()]
         check = binascii.crc_hqx(data, 0xFFFF)
         self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
         if self._read_set()[0] != wanted:
             raise LinkError("the parameters read back are not those sent; upload again")
-        if wait:
-            self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
-        if save is not None:
-            self.save(save)
+
+    def guard(self) -> None:
+        """From now on, and until the Uno restarts, it vents by itself GUARD_S after this host has fallen silent (was
+        killed, hangs), unless it has a `host_timeout_s` already. Whatever moves air calls this."""
+        if not self._is_guarded and self._read_set()[0]["host_timeout_s"] == 0:
+            self._is_guarded = True
+            try:
+                self.upload({})
+            except BaseException:
+                self._is_guarded = False
+                raise
+
+    @contextmanager
+    def unguarded(self) -> Iterator[None]:
+        """Inside, the Uno's parameters are those that were meant, to be kept for another day and a bare terminal."""
+        if not self._is_guarded:
+            yield
+            return
+        self._is_guarded = False
+        self.upload({"host_timeout_s": 0.0})
+        try:
+            yield
+        finally:
+            self.guard()
+
+    def guard_again(self) -> None:
+        """After a set was taken over that knows of no guard."""
+        if self._is_guarded:
+            self._is_guarded = False
+            self.guard()
 
     def _wait_for_boundary(self, period_s: float) -> None:
         deadline = self._clock.now() + 2 * max(period_s, 60.0)
@@ -215,12 +254,15 @@ class Uno:
 
     def save(self, preset: str) -> None:
         """Keep the parameters in EEPROM; returns after they were read back."""
-        self.session.call("save", _name_field(preset), timeout_s=EEPROM_TIMEOUT_S)
+        field = _name_field(preset)
+        with self.unguarded():
+            self.session.call("save", field, timeout_s=EEPROM_TIMEOUT_S)
 
     def load(self, preset: str) -> None:
         """Take the parameters of a preset."""
         self.session.call("load", _name_field(preset))
         self._read_set()
+        self.guard_again()
 
     def forget(self, preset: str) -> None:
         """Delete a preset from EEPROM."""
@@ -240,6 +282,7 @@ class Uno:
     def defaults(self) -> None:
         """Erase presets and settings and load the baseline."""
         self.session.call("defaults", timeout_s=EEPROM_TIMEOUT_S)
+        self.guard_again()
 
     def zero(self, factory: bool = False) -> None:
         """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; or undo it (`factory`)."""
@@ -249,6 +292,7 @@ class Uno:
 
     def run(self) -> None:
         """Walk."""
+        self.guard()
         self.may_move = True
         self.session.call("run")
 
@@ -282,7 +326,9 @@ class Uno:
     def hold(self, chamber: str, state: str) -> None:
         """Inflate ("positive"), evacuate ("vacuum") or vent ("off") the body, head or tail."""
         fields = _hold_fields(chamber, state)
-        self.may_move = self.may_move or state != "off"
+        if state != "off":
+            self.guard()
+            self.may_move = True
         self.session.call("hold", *fields)
 
     def schedule(self, holds: Iterable[tuple[float, str, str]]) -> None:
@@ -294,6 +340,7 @@ class Uno:
         additions = [("schedule_add", (_milliseconds(time_s), *_hold_fields(c, s))) for time_s, c, s in holds]
         if len(additions) > SCHEDULE_ENTRIES:
             raise UnoParameterError(f"{len(additions)} timed holds; the Uno has room for {SCHEDULE_ENTRIES}")
+        self.guard()
         self.session.call_all([("schedule_clear", ()), *additions])
         self.may_move = True
         self.session.call("schedule_start")

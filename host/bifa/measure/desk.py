@@ -8,11 +8,12 @@ before a question was asked starts nothing; a stop counts whenever it came.
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import queue
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ class Desk:
     def _listen(self) -> None:
         if not self._is_listening:
             self._is_listening = True
-            threading.Thread(target=_read_lines, args=(self._lines,), daemon=True).start()
+            threading.Thread(target=read_lines, args=(self._lines,), daemon=True).start()
 
 
 def _is_stop(line: str) -> bool:
@@ -131,15 +132,25 @@ def _from_file(path: Path) -> str | None:
     return text
 
 
-def _read_lines(lines: queue.Queue[str | None]) -> None:
+def read_lines(lines: queue.Queue[str | None]) -> None:
     """Unbuffered, so that nothing is locked when the program ends while this waits."""
-    rest = b""
     try:
-        number = sys.stdin.fileno()
-        while block := os.read(number, 4096):
-            *whole, rest = (rest + block).split(b"\n")
-            for line in whole:
-                lines.put(line.decode("utf-8", "replace"))
+        for line in _raw_lines():
+            lines.put(line)
     except (OSError, ValueError, AttributeError):
         pass
     lines.put(_END)
+
+
+def _raw_lines() -> Iterator[str]:
+    rest = b""
+    try:
+        number = sys.stdin.fileno()
+    except io.UnsupportedOperation:  # what stands for it is no file
+        yield from (line.rstrip("\n") for line in sys.stdin)
+        return
+    while block := os.read(number, 4096):
+        *whole, rest = (rest + block).split(b"\n")
+        yield from (line.decode("utf-8", "replace") for line in whole)
+    if rest:
+        yield rest.decode("utf-8", "replace")
