@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lacuna.check.numbers import listed
 from lacuna.cores import usable_cores
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -135,7 +136,7 @@ def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     if len(columns) == 1:
         return columns
     raise MisuseError(
-        f"trial {record.name}: which of its columns ({', '.join(columns)}) does the model predict? Say System(...,"
+        f"trial {record.name}: which of its columns ({listed(columns)}) does the model predict? Say System(...,"
         " outputs=...), or return them by name, as a dict of arrays."
     )
 

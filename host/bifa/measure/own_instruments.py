@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from bifa.data.export import ROLES, Export
+from bifa.data.export import MACHINE, ROLES, Export
 from bifa.errors import BifaError
 from bifa.files import is_stray
 from bifa.measure.desk import ANSWER, ASKS, Desk
@@ -36,7 +36,6 @@ _STAND = {
     "anchor_pull": "the robot's head in the pipe on the load cell, contracted",
     "locomotion": "the robot in the pipe, contracted, before the camera",
 }
-_MACHINE = ("static_loading", "anchor_pull")
 
 
 @dataclass(frozen=True)
@@ -329,4 +328,4 @@ def _signature(path: Path) -> tuple[int, int]:
 
 def on_machine(experiment: str) -> bool:
     """Whether a testing machine moves and measures, and not a camera."""
-    return experiment in _MACHINE
+    return ROLES[experiment] == MACHINE
