@@ -39,7 +39,8 @@ UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": SECONDS}  # by wh
 _SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", "inch": "in", "lb": "lbf", "volts": "v"}
 _SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
 _FORM_KEYS = ("separator", "decimal", "encoding", "skip_rows", "header", "header_rows", "units_rows", "sheet")
-_KEYS = ("preset", "format", *_FORM_KEYS, "columns", "units", "factor", "sign", "rate_hz", "date_format", "zone")
+_TABLES = ("columns", "units", "factor", "sign", "offset")  # by the data set's columns
+_KEYS = ("preset", "format", *_FORM_KEYS, *_TABLES, "rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$")
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
@@ -50,8 +51,9 @@ SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 @dataclass(frozen=True)
 class Export:
     """What is declared of an instrument's files. `columns`: the export's own names, by the data set's; `units`,
-    `factor` and `sign` likewise; `where`: values of other columns in the rows that count; `sync`: "file" (beside it),
-    "frames" (every row was exposed at a strobe), or the name of the column in which the strobe was sampled."""
+    `factor`, `sign` and `offset` (added last) likewise; `where`: values of other columns in the rows that count;
+    `sync`: "file" (beside it), "frames" (every row was exposed at a strobe), or the name of the column in which the
+    strobe was sampled."""
 
     name: str
     form: Form
@@ -59,6 +61,7 @@ class Export:
     units: Mapping[str, str] = field(default_factory=dict)
     factor: Mapping[str, float] = field(default_factory=dict)
     sign: Mapping[str, int] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
     where: Mapping[str, Any] = field(default_factory=dict)
     rate_hz: float | None = None
     date_format: str | None = None
@@ -143,7 +146,7 @@ def _column(sheet: Sheet, export: Export, name: str) -> np.ndarray:
     place = sheet.find(source)
     _refuse_other_unit(sheet, place, name, unit)
     values = sheet.numbers(place, source)
-    return values * _scale(export, name)
+    return values * _scale(export, name) + export.offset.get(name, 0.0)
 
 
 def _scale(export: Export, name: str) -> float:
@@ -211,7 +214,7 @@ def parse_export(fields: Fields, name: str) -> Export:
     given = dict(_preset(fields)) if "preset" in fields else {}
     own = {key: fields.take(key) for key in (*_KEYS[1:], "where", "sync") if key in fields}
     fields.finish(also=(*_KEYS, "where", "sync"))
-    for key in ("columns", "units", "factor", "sign", "where"):
+    for key in (*_TABLES, "where"):
         if not isinstance(own.get(key, {}), dict):
             raise fields.error(key, "must be a table")
         merged = given.get(key, {}) | own.get(key, {})
@@ -242,7 +245,7 @@ def _export(fields: Fields, name: str, given: dict[str, Any]) -> Export:
             zone_of(given["zone"])
     except ValueError as error:
         raise fields.error("zone", str(error)) from None
-    tables = {key: given[key] for key in ("columns", "units", "factor", "sign", "where")}
+    tables = {key: given[key] for key in (*_TABLES, "where")}
     rest: dict[str, Any] = {key: given.get(key) for key in ("date_format", "zone")}
     return Export(name, form, **tables, **rest, rate_hz=rate_hz, sync=sync, threshold=float(threshold))
 
@@ -275,7 +278,7 @@ def _form(fields: Fields, given: Mapping[str, Any]) -> Form:
 
 
 def _check_columns(fields: Fields, export: Export) -> None:
-    for key in ("columns", "units", "factor", "sign"):
+    for key in _TABLES:
         for name, value in getattr(export, key).items():
             if name not in _OWN:
                 raise fields.error(key, f"{name} is no column of the data set; there are {listed(sorted(_OWN))}")
@@ -289,8 +292,10 @@ def _check_columns(fields: Fields, export: Export) -> None:
 def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any) -> None:
     if key == "columns" and not (isinstance(value, str) and value.strip()):
         raise fields.error(key, f"{name} must be the export's own name of the column, a string")
-    if key == "factor" and (isinstance(value, bool) or not isinstance(value, int | float) or not value):
-        raise fields.error(key, f"{name} must be a number other than 0")
+    if key in ("factor", "offset") and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise fields.error(key, f"{name} must be a number")
+    if key == "factor" and not value:
+        raise fields.error(key, f"{name} must not be 0")
     if key == "sign" and (value not in (1, -1) or isinstance(value, bool)):
         raise fields.error(key, f"{name} must be 1 or -1")
     if key == "units":

@@ -100,6 +100,13 @@ def test_units_factors_and_signs_of_the_file_are_converted(tmp_path, units, fact
     np.testing.assert_allclose(found["force_N"], np.array([-3.0, -6.0]) * force, rtol=1e-7)
 
 
+def test_a_camera_with_another_origin_has_an_offset(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,F\n0,0.3124,0\n1,0.3134,0\n")
+    text = SIMPLE.replace('"mm"', '"m"') + "sign = { displacement_mm = -1 }\noffset = { displacement_mm = 312.4 }\n"
+    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    np.testing.assert_allclose(found["displacement_mm"], [0.0, -1.0], atol=1e-9)
+
+
 @pytest.mark.parametrize("zone", ["Europe/Berlin", "America/New_York", "UTC"])
 @pytest.mark.parametrize("form", [None, "%d.%m.%Y %H:%M:%S.%f"])
 def test_dates_are_read_as_the_moments_that_they_are(tmp_path, zone, form):
