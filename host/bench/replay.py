@@ -66,17 +66,22 @@ def replayed(found: Sequence[dict[str, Any]], rules: dict[str, Rule]) -> str:
 
 
 def reliable(found: Sequence[dict[str, Any]], picture: Path | None) -> str:
-    """How often effects of each probability are there."""
+    """How often effects of each probability are there; and the same where what is there is on offer at all."""
+    offered = [s for s in found if s["kind"] != "outside"]
+    if picture:
+        draw(bins(*foretold(found)), picture)
+    cases = {"": found, ", without those whose effect is withheld": offered if len(offered) < len(found) else []}
+    return "\n\n".join(_reliable(sets, of) for of, sets in cases.items() if sets)
+
+
+def _reliable(found: Sequence[dict[str, Any]], of: str) -> str:
     probability, there = foretold(found)
     if not len(probability):
-        return "no explanation was weighed: there are no probabilities"
-    told = bins(probability, there)
-    if picture:
-        draw(told, picture)
-    rows = [f"{len(probability)} probabilities, Brier score {brier(probability, there):.4f}", "said    is there"]
-    return "\n".join(
-        [*rows, *(f"{b.mean:<8.3f}{share_text([True] * b.there + [False] * (b.count - b.there))}" for b in told)]
-    )
+        return f"no explanation was weighed{of}: there are no probabilities"
+    rows = [f"{len(probability)} probabilities{of}; Brier score {brier(probability, there):.4f}", "said    is there"]
+    for one in bins(probability, there):
+        rows.append(f"{one.mean:<8.3f}{share_text([True] * one.there + [False] * (one.count - one.there))}")
+    return "\n".join(rows)
 
 
 def own(spec: str) -> Rule:

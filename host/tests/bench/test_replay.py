@@ -78,6 +78,8 @@ def test_a_replay_counts_what_each_rule_would_have_named(tmp_path, capsys):
     assert "2 sets" in said
     assert "the verdict                   1/1         1/1         0/2 = 0.00" in said
     assert "BIC                           1/1         0/1         1/2 = 0.50" in said
+    assert "2 probabilities; Brier" in said
+    assert "1 probabilities, without those whose effect is withheld; Brier score 0.0025" in said
     assert (tmp_path / "picture.png").stat().st_size > 1000
 
 
