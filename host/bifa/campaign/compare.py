@@ -13,7 +13,7 @@ import bifa
 from bifa.campaign.again import read_rounds
 from bifa.campaign.page import campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
-from bifa.campaign.walks import predict, predicted_speed, speeds
+from bifa.campaign.walks import foretold, predict, predicted_speed, speed_of, speeds
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.data.dataset import labels_of
 from bifa.gait import simulations
@@ -34,13 +34,14 @@ TITLES = {
     "completed": "gait found with the completed model",
 }
 _ROBOTS = 256
-PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3}
+PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3, "edge": 23.3}
 
 
 @dataclass(frozen=True)
 class GaitResult:
-    """Speeds in mm/s over the settled cycles; `spread` is that of the repeats. `stand_in`: the baseline, since no gait
-    walks on the model."""
+    """Speeds in mm/s over the settled cycles, of which `settled_cycles` were measured in all; `spread` is that of the
+    repeats. `interval_90_mm_s`, `walks_probability`: what the model foretold with which the gait was found (of the
+    baseline, the completed model). `stand_in`: the baseline, since no gait walks on the model."""
 
     gait: str
     base_model: float
@@ -49,6 +50,9 @@ class GaitResult:
     spread: float
     paper: float
     stand_in: bool = False
+    settled_cycles: int = 0
+    interval_90_mm_s: tuple[float, float] = (0.0, 0.0)
+    walks_probability: float = 0.0
 
 
 def compare(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
@@ -56,6 +60,7 @@ def compare(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
 
     robot: in words; made: how the campaign was made, for the report."""
     needs = ["bench", "model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
+    needs += ["rounds", "model-last.toml"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "walk.svg", "report.html")
 
@@ -71,20 +76,9 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
     trials = [trial for dataset in datasets for trial in dataset.trials]
     results = []
     for dataset in datasets:
-        for gait, repeats in speeds(dataset).items():
-            means = [speed.mean_mm_s for speed in repeats]
-            trial = next(t for t in dataset.trials if t.file.startswith(f"{gait}_"))
-            results.append(
-                GaitResult(
-                    gait,
-                    predicted_speed(base, trial),
-                    predicted_speed(completed, trial),
-                    float(np.mean(means)),
-                    float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
-                    PAPER_MM_S[gait],
-                    gait != "baseline" and trial.gait == BASELINE.as_dict(),
-                )
-            )
+        results += [_result(gait, _named(dataset, gait), base, completed) for gait in speeds(dataset)]
+    if edge := _edge(inputs):
+        results.append(_result("edge", edge, base, load_model(inputs / "model-last.toml")))
     diagnosis = json.loads((inputs / "diagnosis.json").read_text())
     traces = json.loads((inputs / "residuals.json").read_text())
     truth = json.loads((inputs / "truth.json").read_text()) if (inputs / "truth.json").exists() else None
@@ -117,6 +111,35 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
         summary, diagnosis, traces, walks, labels_of(measured), robot, [*_when(measured, datasets), *made, _versions()]
     )
     write_page(page, outputs / "report.html")
+
+
+def _named(dataset: Dataset, gait: str) -> Sequence[Trial]:
+    return [t for t in dataset.trials if _gait(t) == gait]
+
+
+def _edge(inputs: Path) -> Sequence[Trial]:
+    """The walks of the last round, if its gait was sought at the edge of what is known."""
+    rounds = read_rounds(inputs / "rounds.json")
+    last = inputs / "rounds" / f"walks-{len(rounds)}"
+    return read_dataset(last).trials if rounds[-1]["at_edge"] and last.exists() else []
+
+
+def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> GaitResult:
+    measured, trial = [speed_of(one) for one in trials], trials[0]
+    means = [speed.mean_mm_s for speed in measured]
+    prediction = foretold(base if gait == "base" else completed, trial)
+    return GaitResult(
+        gait,
+        predicted_speed(base, trial),
+        predicted_speed(completed, trial),
+        float(np.mean(means)),
+        float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
+        PAPER_MM_S[gait],
+        gait != "baseline" and trial.gait == BASELINE.as_dict(),
+        sum(speed.settled_cycles for speed in measured),
+        prediction.interval_90_mm_s,
+        prediction.walks_probability,
+    )
 
 
 def _with_stand_in(walked: Dataset) -> Dataset:

@@ -7,9 +7,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bifa.campaign.stages import Stage
 from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
+from bifa.gait.prediction import Prediction, predict_speed
+from bifa.gait.settling import LEAST, MOST_CYCLES, PROBE_CYCLES, STANDING_MM_S, Walking
+from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
 from bifa.measure.experiments import record_columns
 from bifa.measure.plan import PlannedTrial
@@ -30,10 +35,15 @@ def measure_walks(
     cycles: int,
     repeats: int = 1,
     on_progress: Progress = lambda what, share: None,
+    probe: bool = False,
 ) -> Dataset:
     """Walk every gait `repeats` times on the rig, into the data set `folder` of trials named after the gaits; walks
-    that an interrupted run has left there are not walked again."""
-    record = getattr(rig, "recorder", None) or _walk
+    that an interrupted run has left there are not walked again.
+
+    On a rig that needs nobody a walk of `cycles` that has not settled is walked again for twice as long, up to
+    `MOST_CYCLES`; with `probe` every walk is tried for two cycles first, and that is all where it stands still.
+    """
+    record = getattr(rig, "recorder", None) or (_probed if probe else _settled)
     total = len(gaits) * repeats
     with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         hello = uno.connect()
@@ -58,12 +68,47 @@ def _walk(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[floa
     return planned.as_trial(columns, extra=extra)
 
 
+def _probed(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
+    """The same of gaits with which the robot may stand still: two cycles tell."""
+    trial = _walk(rig, uno, replace(planned, cycles=PROBE_CYCLES), on_progress)
+    return trial if stands_still(trial) else _settled(rig, uno, planned, on_progress)
+
+
+def _settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
+    """The same until the walk has settled, or has had time enough for that."""
+    while True:
+        trial = _walk(rig, uno, planned, on_progress)
+        short = planned.cycles < LEAST
+        if short or planned.cycles >= MOST_CYCLES or speed_of(trial).walking is not Walking.UNSETTLED:
+            return trial
+        planned = replace(planned, cycles=min(2 * planned.cycles, MOST_CYCLES))
+
+
+def stands_still(trial: Trial) -> bool:
+    """Whether the second of two cycles advanced no further."""
+    period_s = trial.walked["period_s"]
+    at_mm = np.interp([period_s, 2.0 * period_s], trial.time_s, trial.columns["displacement_head_mm"])
+    return bool(abs(at_mm[1] - at_mm[0]) < STANDING_MM_S * period_s)
+
+
+def speed_of(trial: Trial) -> MeasuredSpeed:
+    """What was measured in one walk."""
+    return measured_speed(trial.time_s, trial.columns["displacement_head_mm"], trial.walked["period_s"])
+
+
+def foretold(model: Model, trial: Trial, naive: bool = False) -> Prediction:
+    """What the model says of the walk in `trial`, of which only the clock's rate is used; naive: by its covariance
+    alone."""
+    known = spread_of(model)
+    rate = seconds_per_uno_s(trial)
+    return predict_speed(model, known.naive if naive else known, Gait(**trial.walked), clock_rate=rate)
+
+
 def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:
     """The measured speeds of each gait's repeats, by the name that `measure_walks` gave."""
     measured: dict[str, list[MeasuredSpeed]] = {}
     for trial in dataset.trials:
-        speed = measured_speed(trial.time_s, trial.columns["displacement_head_mm"], trial.walked["period_s"])
-        measured.setdefault(trial.file.rsplit("_", 1)[0], []).append(speed)
+        measured.setdefault(trial.file.rsplit("_", 1)[0], []).append(speed_of(trial))
     return measured
 
 
@@ -77,6 +122,8 @@ def predict(model: Model, trial: Trial) -> dict[str, Any]:
 
 def predicted_speed(model: Model, trial: Trial) -> float:
     """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
+    if trial.time_s[-1] - trial.time_s[0] < LEAST * trial.walked["period_s"]:  # stopped: the robot stood still
+        return foretold(model, trial).speed_mm_s
     columns = predict(model, trial)
     return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.walked["period_s"], 0.0).mean_mm_s
 

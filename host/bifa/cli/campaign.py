@@ -113,8 +113,10 @@ def run_campaign(
         print_table(console, table)
     for number, one in enumerate(summary["rounds"], 1):
         console.print(
-            f"round {number}, a gait that was not fitted: {one['predicted_mm_s']:.2f} mm/s predicted,"
-            f" {one['measured_mm_s']:.2f} ± {one['spread_mm_s']:.2f} measured",
+            f"round {number}, a gait that was not fitted{', at the edge' if one['at_edge'] else ''}: "
+            f"{one['predicted_mm_s']:.2f} mm/s predicted ({one['interval_90_mm_s'][0]:.2f} to "
+            f"{one['interval_90_mm_s'][1]:.2f}, walks with probability {one['walks_probability']:.2f}), "
+            f"{one['measured_mm_s']:.2f} ± {one['spread_mm_s']:.2f} measured",
             highlight=False,
         )
     console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)

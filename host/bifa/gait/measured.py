@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.errors import BifaError
-from bifa.gait.settling import CAMERA_MM, LEAST, Walking, settling, walking
+from bifa.gait.settling import CAMERA_MM, LEAST, PROBE_CYCLES, STANDING_MM_S, Walking, settling, walking
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,19 @@ def measured_speed(
     The displacement at a cycle's boundary is read off the record by linear interpolation; `noise_mm`, the standard
     deviation of a displacement (0 of a simulated one), enters a cycle's speed as sqrt(2) `noise_mm` / period.
 
-    Raises BifaError where the record does not hold the `LEAST` cycles that it takes to see whether it has settled.
+    A walk that was stopped after two cycles because it stood still has that speed. Raises BifaError where the record
+    does not hold the `LEAST` cycles that it takes to see whether it has settled.
     """
     start_s = time_s[0]
     complete = int(np.floor((time_s[-1] - start_s) / period_s + 1e-6))
-    if complete < LEAST:
+    boundaries_s = start_s + period_s * np.arange(complete + 1)
+    advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
+    stood = complete == PROBE_CYCLES and abs(advance_mm[-1]) < STANDING_MM_S * period_s
+    if complete < LEAST and not stood:
         raise BifaError(
             f"the walk holds {complete} complete cycle(s) of {period_s:g} s, and whether it has settled takes {LEAST}: "
             "record a longer walk"
         )
-    boundaries_s = start_s + period_s * np.arange(complete + 1)
-    advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
     found = settling(advance_mm, noise_mm)
     cycles_mm_s = advance_mm[found.begins :] / period_s
     mean_mm_s = float(cycles_mm_s.mean())

@@ -37,6 +37,7 @@ class Metric:
     cycles: simulated, from rest. judged: the last so many must agree within `periodic` (of the advance, which counts
     as at least 1 mm) and slip less than `slip_m` each. Slip is travel while both ends slide. tolerance_m: of the
     integrator, a step. direction: -1 to count backward walking. inclination_deg: of the pipe, uphill positive.
+    clock: seconds that pass in one of the Uno's, by which gaits and speeds are meant.
     """
 
     cycles: int = 10
@@ -46,6 +47,7 @@ class Metric:
     tolerance_m: float = 1e-5
     direction: int = 1
     inclination_deg: float = 0.0
+    clock: float = 1.0
 
     @property
     def is_plain(self) -> bool:
@@ -83,6 +85,7 @@ class Passage:
     cycles: int = 16
     tolerance_m: float = 1e-5
     inclination_deg: float = 0.0
+    clock: float = 1.0
 
     @property
     def terrain(self) -> np.ndarray:

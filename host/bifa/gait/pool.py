@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,9 @@ class Simulations:
 
 def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Progress:
     place: dict[str, Any] = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
-    return speeds(plants, gaits, metric.cycles, metric.tolerance_m, **place, workers=1)
+    real = gaits * np.array([metric.clock, 1.0, 1.0, 1.0, 1.0, 1.0])
+    progress = speeds(plants, real, metric.cycles, metric.tolerance_m, **place, workers=1)
+    return replace(progress, period_s=gaits[:, 0])
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from bifa.simulate import gait_rows, speeds
 DRAWS = 256
 FINE_M = 1e-6  # a gait at the edge is judged with the fine step
 CYCLES = 16
-_FELL = 0.5  # of the median speed: what is slower does not walk as foretold
+FELL = 0.8  # of the median speed: what is slower does not walk as foretold
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Prediction:
     @property
     def walks(self) -> np.ndarray:
         """(n,) which of the robots walk."""
-        return self.speeds_mm_s >= max(_FELL * float(np.median(self.speeds_mm_s)), STANDING_MM_S)
+        return self.speeds_mm_s >= max(FELL * float(np.median(self.speeds_mm_s)), STANDING_MM_S)
 
     @property
     def walks_probability(self) -> float:
@@ -88,16 +88,16 @@ def predict_speed(
     draws: int = DRAWS,
     cycles: int = CYCLES,
     seed: int = 0,
-    clock_rate: float = 1.0,
+    clock_rate: float | None = None,
     workers: int | None = None,
 ) -> Prediction:
     """Walk `gait` on robots drawn from what is `known` of `model`, by the rule that measured walks are judged by.
 
-    clock_rate: seconds per second of the Uno, whose cycles are longer by it; speeds are those on the Uno's clock.
+    clock_rate: seconds per second of the Uno, if not what is known of it; speeds are those on the Uno's clock.
     """
     robots = known.plants(model, draws, seed + 4_000_037)
     row = gait_rows([gait])
-    row[:, 0] *= clock_rate
+    row[:, 0] *= known.scatter.clock if clock_rate is None else clock_rate
     progress = speeds(robots, np.repeat(row, draws, axis=0), cycles, FINE_M, workers=workers)
     advance_mm = 1e3 * progress.advance_m
     found = [settling(one) for one in advance_mm]

@@ -1,7 +1,7 @@
 """From a model to a gait: explore, refine, verify the finalists, say how sure it is."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -133,6 +133,7 @@ def optimise(
     say = on_progress or (lambda stage, share, best: None)
     started = runs.count
     flat, spread = plant(model), settings.knowledge(model)
+    settings = replace(settings, metric=replace(settings.metric, clock=spread.scatter.clock))
     objective: Objective
     if settings.robust:
         objective = _on_robots(model, runs, spread, settings, _EXPLORE, 0)

@@ -42,14 +42,14 @@ class Knowledge:
     @property
     def naive(self) -> Knowledge:
         """The covariance alone, as if the model were true and every run the same."""
-        return replace(self, scatter=Scatter(), text=f"{self.text.split(';')[0]} alone")
+        return replace(self, scatter=Scatter(clock=self.scatter.clock), text=f"{self.text.split(';')[0]} alone")
 
     def plants(self, model: Model, count: int, seed: int) -> list[Plant]:
         """`count` robots, flat. A draw beyond a parameter's bounds is put on the bound.
 
         Drawn as a scrambled Sobol sequence, so that few draws already cover the spread; numbers differ by seed.
         """
-        own, moves = _own_values(model), _MOVES if self.scatter != Scatter() else ()
+        own, moves = _own_values(model), _MOVES if self.scatter != Scatter(clock=self.scatter.clock) else ()
         size = len(self.names) + len(moves) + len(own)
         power = max(0, int(np.ceil(np.log2(count))))
         unit = qmc.Sobol(size, scramble=True, rng=np.random.default_rng([seed, 4])).random_base2(power)[:count]

@@ -39,18 +39,22 @@ class Scatter:
     """What walks differ from the model by beyond the covariance of its values.
 
     friction: relative standard deviation of the friction from run to run. pressure_psi, force_N: RMS of what the model
-    leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative.
+    leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative. clock:
+    seconds that pass in one of the Uno's, whose cycles are shorter or longer by that.
     """
 
     friction: float = 0.0
     pressure_psi: float = 0.0
     force_N: float = 0.0
     speed: float = 0.0
+    clock: float = 1.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not (math.isfinite(value) and value >= 0.0):
                 raise ModelParameterError(f"scatter.{name} = {value:g} must be a number not below 0")
+        if not 0.9 <= self.clock <= 1.1:
+            raise ModelParameterError(f"scatter.clock = {self.clock:g} must be a clock's, within 0.9 to 1.1")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged, r
 from bifa.campaign.stages import StageError
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.robot import nominal, save_model
-from bifa.robot.gait import BASELINE, Gait, save_gait
+from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from bifa.simulate import walk
 
 ROBOT = nominal()
@@ -73,11 +73,17 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
     return json.loads((outputs / "rounds.json").read_text()), seen
 
 
-def test_a_gait_that_is_predicted_ends_it(folders):
+def test_a_robust_gait_that_is_predicted_is_followed_by_the_one_at_the_edge(folders):
     rounds, seen = go_round(folders, ROBOT, [])
-    assert len(rounds) == 1
-    assert seen == []
-    assert (rounds[0]["gait"], rounds[0]["ended"]) == (FAST.as_dict(), "predicted")
+    assert [(Gait(**r["gait"]), r["at_edge"]) for r in rounds] == [(FAST, False), (FASTER, True)]
+    assert seen == [], "nothing is diagnosed anew"
+    assert [r["ended"] for r in rounds] == [None, "predicted"]
+    for one in rounds:
+        low, high = one["interval_90_mm_s"]
+        assert low < one["predicted_mm_s"] < high
+        assert one["inside"] == (low <= one["measured_mm_s"] <= high)
+        assert 0.0 < one["walks_probability"] < 1.0
+    assert load_gait(folders[1] / "gait-last.toml") == FASTER
     assert rounds[0]["floor_mm"] == pytest.approx(0.1, rel=0.1)
     assert rounds[0]["error_mm"] <= 1.1 * rounds[0]["floor_mm"]
     assert rounds[0]["predicted_mm_s"] == pytest.approx(rounds[0]["measured_mm_s"], rel=0.01)
@@ -100,6 +106,40 @@ def test_it_ends_where_nothing_changes_any_more(folders):
     assert len(rounds) == ROUNDS, "the second round names something else"
     assert [tuple(r["effects"]) for r in rounds] == [(), ("hysteresis",), ("hysteresis",)]
     assert [r["ended"] for r in rounds] == [None, None, "unchanged"]
+
+
+def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
+    """The robot stands still with the gait at the edge: two cycles of it are recorded, fed back, and the next tried."""
+    inputs, outputs = folders
+    save_model(inputs / "model-completed.toml", ROBOT)
+    seen = []
+
+    def complete(dataset):
+        seen.append(sorted({trial.file.split("/")[0] for trial in dataset.trials}))
+        return ROBOT, ()
+
+    def fall(number, gait, folder):
+        write_dataset(folder, stood(gait, number))
+        return read_dataset(folder)
+
+    again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, lambda model: FASTER, fall))
+    rounds = json.loads((outputs / "rounds.json").read_text())
+    assert len(rounds) == ROUNDS
+    assert seen == [["walks-1", "walks-2"]]
+    assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
+    assert load_gait(outputs / "gait-last.toml") == FAST, "the robust gait is what is kept"
+
+
+def stood(gait, seed):
+    """Two cycles of a robot that does not walk."""
+    walks = walked({f"round-{seed}": gait}, seed)
+    short = []
+    for trial in walks.trials:
+        keep = trial.time_s <= 2 * gait.period_s + 0.01
+        columns = {key: values[keep] for key, values in trial.columns.items()}
+        columns["displacement_head_mm"] = 5.0 * np.sin(2 * np.pi * columns["time_s"] / gait.period_s)
+        short.append(replace(trial, columns=columns))
+    return replace(walks, trials=tuple(short))
 
 
 def test_it_ends_with_as_many_rounds_as_there_may_be():

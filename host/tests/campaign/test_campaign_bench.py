@@ -153,7 +153,7 @@ def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
     def nothing_walks(*_):
         raise SearchError("none walks")
 
-    monkeypatch.setattr(loop, "_robust_gait", nothing_walks)
+    monkeypatch.setattr(loop, "found_gait", nothing_walks)
     stages = {stage.name: stage for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None)}
     save_model(tmp_path / f"model-{model}.toml", nominal())
     stages[f"optimise-{model}"].run(tmp_path, tmp_path)

@@ -46,6 +46,13 @@ def test_what_never_settles_says_so_and_has_the_speed_of_its_second_half():
     assert 20.0 < speed.mean_mm_s < 30.0
 
 
+def test_two_cycles_tell_that_a_robot_stands_still():
+    speed = measured_speed(*walk([14.0, 0.5]), 2.0)
+    assert (speed.walking, speed.mean_mm_s) == (Walking.STANDING, pytest.approx(0.25, abs=0.01))
+    with pytest.raises(BifaError, match="record a longer walk"):
+        measured_speed(*walk([14.0, 40.0]), 2.0)
+
+
 def test_too_short_a_walk_is_refused():
     time_s = np.arange(0, 5.0, 0.01)
     with pytest.raises(BifaError, match="record a longer walk"):
