@@ -52,7 +52,7 @@ def diagnose(
     if records is not None:
         system = with_records(system, records)
     told = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
-    how = {"seed": seed, "starts": starts, "policy": policy, "progress": told}
+    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "progress": told}
     try:
         with _workers(n_jobs, executor) as workers:
 

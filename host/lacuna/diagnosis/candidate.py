@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
-from lacuna.system import Effect, Parameter, Record
+from lacuna.system import Effect, Record
 
 _PROFILE_STEPS = 4
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
@@ -31,7 +32,7 @@ LOWER = 0.9  # a floor that falls below this share of the old one changes the we
 NEAR = 1.3  # times the cost of a finished refit
 _AFRESH = 3  # starts
 _ELSEWHERE = 2  # further sizes that a refit is begun at
-_REFIT = {"max_iterations": 40, "relative": 1e-4}
+_REFIT: dict[str, Any] = {"max_iterations": 40, "relative": 1e-4}
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,13 +133,13 @@ def implausibility(fitted: Fit, policy: Policy) -> float:
     total = 0.0
     for parameter in fitted.structure.parameters:
         if parameter.plausible is not None:
-            total += policy.implausible * _outside(parameter, fitted.theta[parameter.name]) ** 2
+            total += policy.implausible * _outside(parameter.plausible, fitted.theta[parameter.name]) ** 2
     return total
 
 
-def _outside(parameter: Parameter, value: float) -> float:
+def _outside(plausible: tuple[float, float], value: float) -> float:
     """How far beyond the plausible range, in half ranges."""
-    lower, upper = parameter.plausible
+    lower, upper = plausible
     return max(lower - value, value - upper, 0.0) / (0.5 * (upper - lower))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
-from typing import Any
+from typing import Any, TypeVar
 
 from lacuna.diagnosis.candidate import (
     LOWER,
@@ -35,15 +35,19 @@ _DOUBTFUL = 1.5  # and no last digits of it so much
 _ASTRAY = 1.1  # times the error on conditions never fitted
 
 
-def _once(ask: Callable) -> Callable:
+Answer = TypeVar("Answer")
+
+
+def _once(ask: Callable[[Case, Candidate], Answer]) -> Callable[[Case, Candidate], Answer]:
     """A question about a candidate, which is answered once."""
 
     @wraps(ask)
-    def answered(self, candidate: Candidate):
+    def answered(self: Case, candidate: Candidate) -> Answer:
         asked = (ask.__name__, candidate)
         if asked not in self._answers:
             self._answers[asked] = ask(self, candidate)
-        return self._answers[asked]
+        answer: Answer = self._answers[asked]
+        return answer
 
     return answered
 
@@ -178,8 +182,8 @@ class Case:
         any number that each condition happens to have."""
         library = self.system.effects
         extra = sum(len(library[name].parameters) for name in after.effects if name not in before.effects)
-        runs = (by_condition(self._on_all(one)) for one in (before, after))
-        return met_by_chance(*runs, self.followed(before), extra)
+        first, then = (by_condition(self._on_all(one)) for one in (before, after))
+        return met_by_chance(first, then, self.followed(before), extra)
 
     def _on_all(self, candidate: Candidate) -> list[Fit]:
         """An explanation on all trials that may inform a choice."""
@@ -203,9 +207,8 @@ class Case:
         """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
         would have left so if a run's factors had to be foreseen, which a few runs of one pair may be by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
-        ahead = (
-            excess_over(*([foreseen(fit) for fit in fits] for fits in pair), self.system.accuracy) for pair in both
-        )
+        foretold = (tuple([foreseen(fit) for fit in fits] for fits in pair) for pair in both)
+        ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in foretold)
         return max(known) > self.policy.relevance or min(ahead) > self.policy.relevance
 
     @_once

@@ -26,11 +26,12 @@ def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split)
 def led_back(base: Candidate, larger: Sequence[Candidate], split: Split) -> Candidate:
     """The better of `base` and its refits from where the fits with an effect ended: with one, whichever, the base's
     parameters may have left a wrong minimum that they were in without it."""
-    problem, costs = base.fitted.problem, {}
+    problem = base.fitted.problem
+    costs: dict[Candidate, float] = {}
     for one in larger:
         start = problem.start(starting_point(one.fitted, base.fitted.structure), one.fitted.solution.point.nuisances)
         costs[one] = cost_of(problem, start)
-    nearest = min(costs, key=costs.get, default=None)
+    nearest = min(costs, key=costs.__getitem__, default=None)
     if nearest is None or costs[nearest] > NEAR * base.fitted.cost:
         return base
     return min(base, refitted_without(nearest, (), split), key=lambda c: c.cost)

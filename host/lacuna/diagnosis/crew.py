@@ -28,7 +28,7 @@ class Crew:
         self.say, self._executor = progress, executor
         self._forks = forks and sys.platform == "linux" and not current_process().daemon
 
-    def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable, jobs: Jobs) -> list:
+    def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable[..., Any], jobs: Jobs) -> list[Any]:
         """`function(*job)` for each of `jobs`, in their order; `names` are the effects that each is about."""
         found = []
         with self._working(function, jobs) as results:
@@ -38,7 +38,7 @@ class Crew:
         return found
 
     @contextmanager
-    def _working(self, function: Callable, jobs: Jobs) -> Iterator[Iterator]:
+    def _working(self, function: Callable[..., Any], jobs: Jobs) -> Iterator[Iterator[Any]]:
         if self._executor:
             futures = [self._executor.submit(function, *job) for job in jobs]
             yield (future.result() for future in futures)
@@ -50,7 +50,7 @@ class Crew:
 
 
 @contextmanager
-def _children(function: Callable, jobs: Jobs) -> Iterator[Iterator]:
+def _children(function: Callable[..., Any], jobs: Jobs) -> Iterator[Iterator[Any]]:
     """Results in the jobs' order. A fork has everything that this process has, so that nothing but results is shipped
     and a system may hold what cannot be. What is interrupted ends at once."""
     before = set(active_children())
@@ -65,10 +65,10 @@ def _children(function: Callable, jobs: Jobs) -> Iterator[Iterator]:
         pool.shutdown(cancel_futures=True)
 
 
-_work: tuple[Callable, Jobs]
+_work: tuple[Callable[..., Any], Jobs]
 
 
-def _begin(function: Callable, jobs: Jobs) -> None:
+def _begin(function: Callable[..., Any], jobs: Jobs) -> None:
     global _work
     _work = function, jobs
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
@@ -20,7 +21,10 @@ from lacuna.system import Record, groups_of_repeats
 
 _FOLDS = 5
 _COMPARED = 10  # explanations, the best first
-_REFIT = {"max_iterations": 12, "relative": 1e-5}  # fine: a fit that stays where it was knows what it is to predict
+_REFIT: dict[str, Any] = {
+    "max_iterations": 12,
+    "relative": 1e-5,
+}  # fine: a fit that stays where it was knows what it is to predict
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ Lunde and Nason 2011), and what may stand in the place of an effect of it is sai
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -179,7 +179,7 @@ def _by_condition(candidates: Sequence[Candidate], which: str, *, mean: bool = F
     conditions."""
     costs = [getattr(c, which) for c in candidates]
     trials = [t for t in candidates[0].trials if t.name in costs[0]]
-    keys = [(t.experiment, t.condition) for t in trials]
+    keys: list[Hashable] = [(t.experiment, t.condition) for t in trials]
     if len(set(keys)) < _FEWEST:
         keys = [t.name for t in trials]
     places = {key: k for k, key in enumerate(dict.fromkeys(keys))}

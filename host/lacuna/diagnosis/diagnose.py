@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from typing import cast
 
 from lacuna.check import check
 from lacuna.diagnosis.candidate import Candidate, finished_afresh
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.crew import Crew, Progress
-from lacuna.diagnosis.cross_fit import cross_fitted, is_due
+from lacuna.diagnosis.cross_fit import CrossFitted, cross_fitted, is_due
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of, weigh
 from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing, not_foreseen
 from lacuna.diagnosis.drift import Drift, find_drift
@@ -165,7 +166,8 @@ def _chosen(case: Case, found: Search, crew: Crew | None) -> Choice:
     if crew is None or len(found.tried) == 1 or not is_due(case):
         return choose(found, case.policy, case.exceeds)
     choice = choose(cross_fitted(case, found, crew), case.policy, case.exceeds)
-    return replace(choice, candidate=choice.candidate.of, freed=choice.freed and choice.freed.of)
+    candidate, freed = cast(CrossFitted, choice.candidate), cast(CrossFitted | None, choice.freed)
+    return replace(choice, candidate=candidate.of, freed=freed and freed.of)
 
 
 @dataclass(frozen=True)
@@ -210,7 +212,7 @@ def _without_harm(case: Case, found: Search, choice: Choice, judged: _Judged) ->
     if judged.tested is None or len(choice.candidate.effects) < 2:
         return None
     lost = lost_without(case, found, choice)
-    worst = min(lost, key=lost.get)
+    worst = min(lost, key=lost.__getitem__)
     if lost[worst] >= -case.policy.relevance * error_of(judged.explained, case.split).held_out ** 2:
         return None
     rest = [e for e in choice.candidate.effects if e != worst]
@@ -235,7 +237,9 @@ def _taken_up(case: Case, choice: Choice, found: Search) -> list[Followed]:
     return [one for one in case.followed(found.base) if one.nuisance not in still]
 
 
-def _doubts(case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, ...], errors: tuple[Error, Error]):
+def _doubts(
+    case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, ...], errors: tuple[Error, Error]
+) -> list[str]:
     """What speaks against a verdict that names `effects`, or none; `errors` before and with them."""
     if judged.verdict == "none":
         return not_foreseen(judged.base, case.split, errors[0], judged.floor, case.policy)

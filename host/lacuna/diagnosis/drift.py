@@ -34,10 +34,11 @@ def find_drift(fitted: Fit, *, policy: Policy = POLICY, seed: int = 0) -> tuple[
     with the order is held against shuffled orders, all parameters at once.
     """
     trials = fitted.problem.trials
-    ordered = [k for k, t in enumerate(trials) if t.session_order is not None]
+    places = {k: t.session_order for k, t in enumerate(trials) if t.session_order is not None}
+    ordered = list(places)
     if len(ordered) < _FEWEST or not fitted.solution.sensitivities:
         return ()
-    order = np.array([float(trials[k].session_order) for k in ordered])
+    order = np.array([float(place) for place in places.values()])
     columns, asked, weights = _asked(fitted, ordered)
     if not columns:
         return ()
@@ -61,7 +62,8 @@ def _moved(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndar
 
 def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> float:
     """What such shifts add to the mean square of the residual in the experiment where they add most."""
-    squares, pieces = defaultdict(float), defaultdict(float)
+    squares: dict[str, float] = defaultdict(float)
+    pieces: dict[str, float] = defaultdict(float)
     jacobians = fitted.solution.jacobians
     for k, shift in zip(ordered, moved, strict=True):
         trial, derivative = fitted.problem.trials[k], jacobians[k][0][:, column]

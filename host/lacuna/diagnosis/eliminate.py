@@ -19,7 +19,7 @@ def eliminate(case: Case, found: Search, choice: Choice) -> tuple[Search, Choice
         smaller = _without_absent(case, found, choice, effect)
         if smaller is None and (curve_alone := _replacing(case, found, choice, effect)):
             smaller = found.with_effects(curve_alone.effects)
-            if not smaller.effects:
+            if smaller is not None and not smaller.effects:
                 found = replace(found, freed=tuple(curve_alone if c is choice.freed else c for c in found.freed))
         if smaller is not None:
             return eliminate(case, found, weigh(found, smaller, case.policy))

@@ -8,7 +8,7 @@ most of them yet (`lacuna.estimation.graduated`); only the few that promise most
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from lacuna.estimation.graduated import Isolated, fit_isolated, fit_together, gl
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import Solution
 
-SKETCH = {"max_iterations": 12, "relative": 3e-3}
+SKETCH: dict[str, Any] = {"max_iterations": 12, "relative": 3e-3}
 
 
 class Begun(NamedTuple):

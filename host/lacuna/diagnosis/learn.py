@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +26,8 @@ _FOLLOWED = 2  # of those begun anew, to the end
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
 _SOUGHT = 8  # sites where further curves are sought
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
-_SKETCH = {"max_iterations": 8, "relative": 3e-3}
-_REFINED = {"max_iterations": 20, "relative": 3e-4}
+_SKETCH: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
+_REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def free_form(candidate: Candidate, split: Split, *, policy: Policy, crew: Crew)
 
 
 def learn_correction(
-    candidates: Sequence[Candidate], split: Split, *, enough, policy: Policy, crew: Crew
+    candidates: Sequence[Candidate], split: Split, *, enough: Callable[[Candidate], bool], policy: Policy, crew: Crew
 ) -> Candidate | None:
     """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
     `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
@@ -65,7 +66,8 @@ def learn_correction(
             return begun
         anew = [begun]
     while best is None or len(best.fitted.structure.sites) < _MOST:
-        parents, promises = [best] if best else candidates, []
+        parents = [best] if best else candidates
+        promises: list[_Promise] = []
         for parent in parents:
             promises = sorted([*promises, *_promises(parent, sites, split, crew)], key=lambda p: p.cost)
             sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]

@@ -8,9 +8,10 @@ truth) or "convention" (a choice that others may make differently; pass another 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 
-def _rule(value: float, unit: str, reason: str, origin: str):
+def _rule(value: float, unit: str, reason: str, origin: str) -> Any:
     return field(default=value, metadata={"unit": unit, "reason": reason, "origin": origin})
 
 

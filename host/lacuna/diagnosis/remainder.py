@@ -136,7 +136,7 @@ def _of_singles(
     return above, float(z), float(norm.sf(z)), float(np.sqrt(variance))
 
 
-def _by_condition(trials, scaled) -> dict[tuple[str, str], list[np.ndarray]]:
+def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[tuple[str, str], list[np.ndarray]]:
     """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base; NaN where
     nothing was measured."""
     groups: dict[object, list[tuple[Record, Channels]]] = defaultdict(list)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,14 +100,15 @@ def repeat_differences(
     """What repeats differ by, over the root of 2 (as large as the noise of one of them): of the pairs among the known
     trials, and of those with a held-out one. `residuals` by trial."""
     names = {t.name for t in held_out}
-    known_pairs, unseen_pairs = [], []
+    known_pairs: list[Channels] = []
+    unseen_pairs: list[Channels] = []
     for first, second in repeat_pairs((*known, *held_out)):
         pairs = unseen_pairs if {first.name, second.name} & names else known_pairs
         pairs.append(_difference(first, second, residuals))
     return known_pairs, unseen_pairs
 
 
-def rms(members) -> float:
+def rms(members: Iterable[Channels]) -> float:
     """Root mean square over trials and channels, each trial's channel counting the same; NaN without any."""
     squares = [np.nanmean(z**2) for channels in members for z in channels.values() if np.isfinite(z).any()]
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,8 @@ from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
+
+Enough = Callable[[Candidate], bool]
 
 LARGEST_SET = 3
 _BEAM = {1: 3, 2: 3, 3: 1}  # sets that are grown further, by their size
@@ -77,7 +79,7 @@ class Search:
     screened: tuple[Screened, ...]
     freed: tuple[Candidate, ...] = ()
 
-    def with_effects(self, effects: Sequence[str]) -> Candidate | None:
+    def with_effects(self, effects: Iterable[str]) -> Candidate | None:
         wanted = frozenset(effects)
         return next((c for c in self.tried if frozenset(c.effects) == wanted), None)
 
@@ -117,7 +119,7 @@ def screen(parent: Fit, split: Split, floor: NoiseFloor) -> list[Screened]:
     return found
 
 
-def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
+def search(case: Case, first: Candidate, *, enough: Enough, crew: Crew) -> Search:
     """Grow sets from the base model, `first`, until one is `enough(candidate)`, or a further effect takes too little
     away for it to be named, or nothing promises to take its share away, or there are three effects.
 
@@ -140,7 +142,7 @@ def search(case: Case, first: Candidate, *, enough, crew: Crew) -> Search:
             screened, tried[frozenset()] = screen(better.fitted, split, floor), better
             if enough(better):
                 break
-            found = {frozenset(): better}
+            found: dict[frozenset[str], Candidate] = {frozenset(): better}
             _grow([better], afar, split, floor, found, enough, policy, crew)
             tried |= {s: min(c, tried.get(s, c), key=lambda c: c.cost) for s, c in found.items()}
         lower = sharpened_floor(_ranked(tried, size)[0], split, floor)
@@ -186,7 +188,9 @@ def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate
     return sorted((c for s, c in tried.items() if len(s) == size), key=lambda c: c.cost)
 
 
-def _best_to_grow(tried: dict[frozenset[str], Candidate], size: int, split: Split, floor: NoiseFloor):
+def _best_to_grow(
+    tried: dict[frozenset[str], Candidate], size: int, split: Split, floor: NoiseFloor
+) -> list[Candidate]:
     """The beam, each with the derivatives that growing it takes: some may have come up as they were weighed again."""
     for candidate in _ranked(tried, size)[: _BEAM[size]]:
         if not candidate.fitted.solution.sensitivities:
@@ -203,7 +207,14 @@ def reweighed(candidate: Candidate, split: Split, floor: NoiseFloor, *, thorough
 
 
 def _grow(
-    beam: Sequence[Candidate], afar: Anew, split, floor, tried, enough, policy: Policy, crew: Crew
+    beam: Sequence[Candidate],
+    afar: Anew,
+    split: Split,
+    floor: NoiseFloor,
+    tried: dict[frozenset[str], Candidate],
+    enough: Enough,
+    policy: Policy,
+    crew: Crew,
 ) -> list[Candidate]:
     """Every parent of the beam with one effect more: the most promising of all, with equal effort."""
     size = len(beam[0].effects) + 1
@@ -230,7 +241,15 @@ def _grow(
     return _finish(before, sketched, finished, _FINISHED[size], split, tried, enough, policy, crew)
 
 
-def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, enough, policy: Policy, crew: Crew):
+def _sketched(
+    before: Candidate,
+    ranked: Sequence[Profile],
+    afar: Anew,
+    split: Split,
+    enough: Enough,
+    policy: Policy,
+    crew: Crew,
+) -> tuple[list[tuple[Fit, Profile]], Candidate | None]:
     """A quick refit of the most promising, the best first; and the best one finished, if it leaves little. Where that
     explains enough, those that could reach it are refitted from the initial guess as well; where it does not, the most
     promising of all, and where the set before leaves so much that it may be in the wrong minimum, effects are begun
@@ -239,7 +258,8 @@ def _sketched(before: Candidate, ranked: Sequence[Profile], afar: Anew, split, e
     near = sketches([p for k, p in enumerate(ranked) if k < _SKETCHED[size] or p.apart], crew)
     if not near:  # at no size of theirs, the rest hardly refitted, do effects help: that says little of a lost fit
         return _best_of_each(afar.follow(before)) if before.checked_error > (0, policy.lost) else [], None
-    first, finished = judge(near[0][0], split, policy, near=before.checked), None
+    first = judge(near[0][0], split, policy, near=before.checked)
+    finished: Candidate | None = None
     fruitful = before.cost - first.cost > policy.promising * before.excess
     if fruitful and first.checked_error <= (0, policy.lost):
         first = finished = _finished(first, split, policy, crew)
@@ -283,7 +303,15 @@ def _finished(candidate: Candidate, split: Split, policy: Policy, crew: Crew) ->
 
 
 def _finish(
-    before: Candidate, sketched, finished: Candidate | None, count, split, tried, enough, policy: Policy, crew: Crew
+    before: Candidate,
+    sketched: Sequence[tuple[Fit, Profile]],
+    finished: Candidate | None,
+    count: int,
+    split: Split,
+    tried: dict[frozenset[str], Candidate],
+    enough: Enough,
+    policy: Policy,
+    crew: Crew,
 ) -> list[Candidate]:
     """Refit to the end the best `count` of those that explain more than the best set so far, `before`, but for the one
     that is `finished` already; once one of them explains enough, only those that are not out of its reach. What does

@@ -100,12 +100,14 @@ def _dependence(key: tuple[str, str], rows: _Rows) -> Dependence | None:
     names = [n for n in rows[0][1] if all(n in quantities for _, quantities in rows)]
     if not names:  # the system offers nothing that a residual may depend on
         return None
-    singles = {(n,): _predicted_share(make, check, (n,)) for n in names}
-    best = max(singles, key=singles.get)
+    singles: dict[tuple[str, ...], float] = {(n,): _predicted_share(make, check, (n,)) for n in names}
+    best = max(singles, key=singles.__getitem__)
     found, share = best, singles[best]
-    pairs = {(*best, n): _predicted_share(make, check, (*best, n)) for n in names if n not in best}
+    pairs: dict[tuple[str, ...], float] = {
+        (*best, n): _predicted_share(make, check, (*best, n)) for n in names if n not in best
+    }
     if pairs:
-        pair = max(pairs, key=pairs.get)
+        pair = max(pairs, key=pairs.__getitem__)
         if pairs[pair] > share + _WORTH_NAMING:
             found, share = pair, pairs[pair]
     return Dependence(*key, found, share) if share > _WORTH_NAMING else None
@@ -137,7 +139,9 @@ def _edges(samples: np.ndarray) -> np.ndarray:
     return np.unique(np.quantile(samples, np.linspace(0, 1, _BINS + 1)[1:-1]))
 
 
-def _cells(quantities, names, edges, known) -> tuple[np.ndarray, ...]:
+def _cells(
+    quantities: Mapping[str, np.ndarray], names: Sequence[str], edges: Sequence[np.ndarray], known: np.ndarray
+) -> tuple[np.ndarray, ...]:
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
@@ -152,7 +156,15 @@ def _cannot_tell(remainder: Remainder) -> str:
     )
 
 
-def _sentence(places, remainder: Remainder, dependences, drifts, besides: str, *, repeated: bool) -> str:
+def _sentence(
+    places: Sequence[tuple[str, str]],
+    remainder: Remainder,
+    dependences: Sequence[Dependence],
+    drifts: Sequence[Drift],
+    besides: str,
+    *,
+    repeated: bool,
+) -> str:
     if not places and not drifts and not besides:
         known = "the differences between repeats" if repeated else "the noise"
         return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder)}"

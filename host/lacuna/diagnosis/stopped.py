@@ -15,7 +15,8 @@ class Finished:
     """Keeps each set of effects that the search has fitted to the end, whenever it asks whether that is enough."""
 
     def __init__(self, enough: Callable[[Candidate], bool]):
-        self._enough, self.candidates = enough, []
+        self._enough = enough
+        self.candidates: list[Candidate] = []
 
     def __call__(self, candidate: Candidate) -> bool:
         if not candidate.fitted.structure.sites:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -99,7 +100,7 @@ def fit(
     see `solve_graduated`."""
     problem = Problem(structure, trials, floor)
     vectors = list(starts) or [structure.start()]
-    options = {"max_iterations": max_iterations, "relative": relative}
+    options: dict[str, Any] = {"max_iterations": max_iterations, "relative": relative}
     if graduated:
         solutions = [solve_graduated(problem, v, **options) for v in vectors]
     else:
@@ -136,14 +137,14 @@ def converged(fitted: Fit) -> Fit:
     """The fit at the end of plain least squares, from where it stands: what an RMS error is stated for. Searches
     follow one another, each with fresh derivatives, until one gains less than `_CONVERGED` of the cost."""
     problem = fitted.problem.seen(PLAIN)
-    options = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _FRUITFUL}
+    options: dict[str, Any] = {"max_iterations": _CONVERGED_ITERATIONS, "relative": 0.3 * _FRUITFUL}
     solution = solve(problem, fitted.solution.point, **options)
     if not fitted.structure.sites:  # curves are many parameters, and their fit is not compared with another's
         solution = renewed(problem, solution, fruitful=_CONVERGED, **options)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 
-def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL, **options) -> Solution:
+def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL, **options: Any) -> Solution:
     """Searches that follow `solution`, for as long as one gains the share `fruitful` of the cost: with nuisances as
     they are and, while that leads further, begun anew at their means. A nuisance and a parameter of like effect (a
     run's friction and the friction) hold one another where the model predicts a jump a little early or late; a search

@@ -10,7 +10,7 @@ time. What they cannot tell apart (`Parameter.elsewhere`), all trials together d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ _FAR, _NEARER, _CLOSE = View(1 / 20, 30.0, 30.0), View(1 / 60, 10.0, 30.0), View
 _ISOLATED = (_FAR, _NEARER, _CLOSE)
 _TOGETHER = (_FAR, _NEARER)
 _PLACES = View(raised=10.0)
-_NEAR = {"max_iterations": 40, "relative": 1e-3}
+_NEAR: dict[str, Any] = {"max_iterations": 40, "relative": 1e-3}
 _SAME = 0.2  # scales: places that end within this of one another are one
 _BETTER = 0.9  # of the cost that the start leads to, what one from elsewhere must come down to, to be preferred
 _ENOUGH, _HOPEFUL = 0.02, 3.0  # log-likelihood, and times the least cost: what leaves more is not followed any closer
@@ -98,7 +98,8 @@ def _followed(problem: Problem, values: np.ndarray, views: Sequence[View], free:
 def _elsewhere(isolated: Problem, values: np.ndarray, free: Sequence[int]) -> list[np.ndarray]:
     """Where else the isolated trials lead, from each of the places that parameters offer: those of `free` that only
     the same trials show are fitted to these, the others stay."""
-    structure, found = isolated.structure, []
+    structure = isolated.structure
+    found: list[np.ndarray] = []
     shown = {j: frozenset(t.name for t in isolated.trials if structure.moves(j, t)) for j in free}
     for index in free:
         parameter = structure.parameters[index]

@@ -201,15 +201,23 @@ def _moves(trial: Record, channel: str) -> np.ndarray:
     return np.abs(later - sooner) > _MOVING_SIGMAS * max(_fast_noise(time_s, samples), 1e-12)
 
 
-def _jitter(records, differences, moving, sd) -> float:
+def _jitter(
+    records: Sequence[tuple[np.ndarray, np.ndarray]],
+    differences: Sequence[np.ndarray],
+    moving: Sequence[np.ndarray],
+    sd: float,
+) -> float:
     """The shift in time whose mean square effect explains what fast-moving samples differ by beyond `sd`."""
     excess = float(np.nansum([np.nansum(d[m] ** 2 - sd**2) for d, m in zip(differences, moving, strict=True)]))
     if excess <= 0 or not any(m.any() for m in moving):
         return 0.0
 
     def lacking(jitter_s: float) -> float:
-        variances = (_shift_variance(*record, jitter_s, sd, m) for record, m in zip(records, moving, strict=True))
-        return excess - sum(np.nansum(variance) for variance in variances)
+        variances = (
+            _shift_variance(time_s, samples, jitter_s, sd, m)
+            for (time_s, samples), m in zip(records, moving, strict=True)
+        )
+        return float(excess - sum(np.nansum(variance) for variance in variances))
 
     if lacking(_LONGEST_JITTER_S) > 0:
         return _LONGEST_JITTER_S

@@ -52,7 +52,7 @@ def use_threads(count: int | None) -> None:
     _pool.cache_clear()
 
 
-def in_parallel(function: Callable, items: Iterable, work: Sequence[float] = ()) -> list:
+def in_parallel(function: Callable[..., Any], items: Iterable[Any], work: Sequence[float] = ()) -> list[Any]:
     """`[function(x) for x in items]` on all cores, by threads: simulations release the GIL. What is most `work` begins
     first, so that no core waits for another's last."""
     if cores() == 1:
@@ -116,11 +116,13 @@ class Problem:
         self._grids = [[even_grid(t.time_s[np.isfinite(v)]) for v in t.channels.values()] for t in trials]
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
-        self._recent: dict[tuple, list[np.ndarray]] = {}  # residuals: a search begins where the one before ended
+        self._recent: dict[
+            tuple[Any, ...], list[np.ndarray]
+        ] = {}  # residuals: a search begins where the one before ended
         self.sizes = [len(keep) for *_, keep in self._weighing]  # samples of all channels of each trial
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
-    def __getstate__(self) -> dict:
+    def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: all but what is remembered."""
         return vars(self) | {"_recent": {}}
 
@@ -223,7 +225,7 @@ class Problem:
         norms of its derivatives, by the free parameters and by its nuisances."""
         scales, p = self.structure.scales(), len(free)
         structure = steps.structure.copy()
-        structure[list(free)] = _tuned(sum(s[:p] for s in squares), scales[list(free)])
+        structure[list(free)] = _tuned(sum((s[:p] for s in squares), start=np.zeros(p)), scales[list(free)])
         nuisances = tuple(
             _tuned(s[p:], np.array([parameter.step_scale for parameter in ps]))
             for s, ps in zip(squares, self.nuisances, strict=True)
@@ -232,7 +234,7 @@ class Problem:
 
     def jacobians(
         self, point: Point, free: Sequence[int], steps: Steps, then: Callable[..., Any] = lambda *blocks: blocks
-    ) -> list:
+    ) -> list[Any]:
         """For each trial the derivatives of its residuals, shapes (n, len(free)) and (n, q), by absolute steps; or what
         `then` makes of the two."""
 
@@ -269,7 +271,7 @@ class Problem:
         }
 
     def changes(
-        self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple], *, coarse: bool = False
+        self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple[Any, ...]], *, coarse: bool = False
     ) -> np.ndarray:
         """By what the residuals of a trial change, shape (n, len(moved)), from `here` to each of `moved` nearby:
         values and the trial's nuisances."""
@@ -297,9 +299,9 @@ class Problem:
         """What a unit of each prediction changes its residual by, one vector a trial, shapes as `residuals`."""
         return self._of_each(point, self._slope)
 
-    def _of_each(self, point: Point, finish: Callable[[Channels, int], Any], *, coarse: bool = False) -> list:
+    def _of_each(self, point: Point, finish: Callable[[Channels, int], Any], *, coarse: bool = False) -> list[Any]:
         """`finish(prediction, index)` of each trial."""
-        found: list = [None] * len(self.trials)
+        found: list[Any] = [None] * len(self.trials)
 
         def together(members: Sequence[int]) -> None:
             for i, prediction in zip(members, self._simulate_trials(point, members, coarse=coarse), strict=True):
@@ -313,8 +315,9 @@ class Problem:
         corrections = [self.structure.corrections(theta)] * len(members)
         thetas = [theta | self.named(i, point.nuisances[i]) for i in members]
         trials = [self.trials[i] for i in members]
-        how = {"coarse": coarse, "corrections": corrections}
-        return self.structure.system.predict_trials(thetas, self.structure.effects, trials, **how)
+        return self.structure.system.predict_trials(
+            thetas, self.structure.effects, trials, coarse=coarse, corrections=corrections
+        )
 
     def named(self, index: int, nuisances: np.ndarray) -> dict[str, float]:
         """The nuisances of a trial by their names."""
@@ -328,8 +331,9 @@ class Problem:
         corrections = [self.structure.corrections(theta) for theta in thetas]
         for theta, (_, nuisances) in zip(thetas, places, strict=True):
             theta |= self.named(index, nuisances)
-        how = {"coarse": coarse, "corrections": corrections, "alike": alike}
-        return self.structure.system.predict_many(thetas, self.structure.effects, self.trials[index], **how)
+        return self.structure.system.predict_many(
+            thetas, self.structure.effects, self.trials[index], coarse=coarse, corrections=corrections, alike=alike
+        )
 
     def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of each prediction of a trial, a row each."""

@@ -10,6 +10,7 @@ residuals change by as much in the least certain direction as in the surest.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def settle(fitted: Fit) -> Fit:
         solution = fitted.solution
         along = _directions(problem, solution)
         taken = _derivatives(problem, solution.point, solution.free, along)
-        options = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
+        options: dict[str, Any] = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
         here = solve(problem, solution.point, max_iterations=0, **options)
         ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
         trusted = _as_foretold(along, solution.normal, here.normal)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -13,7 +13,16 @@ from lacuna.estimation.problem import Point, Problem, Steps, in_parallel
 from lacuna.estimation.sensitivity import Sensitivity
 from lacuna.system import Parameter
 
-one_thread = ThreadpoolController().wrap(limits=1, user_api="blas")  # of linear algebra: trials share the cores
+_controller = ThreadpoolController()
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def one_thread(function: _Function) -> _Function:
+    """Decorates what leaves the cores to trials: linear algebra has one thread in it."""
+    alone: _Function = _controller.wrap(limits=1, user_api="blas")(function)
+    return alone
+
+
 ENOUGH = 0.02  # log-likelihood: a step that promises less is not worth taking
 RELATIVE = 2e-5  # of the cost: far from the floor no more is needed
 _STRAY_SDS = 10.0  # that a nuisance may: nearer its prior holds it, and a bound would hold the parameters, too,
@@ -83,7 +92,7 @@ def solve(
     while iteration < max_iterations:
         iteration += 1
         taken, damping, little = _descended(
-            problem, here, free, sensitivities, damping, relative, once=age and not keep
+            problem, here, free, sensitivities, damping, relative, once=age > 0 and not keep
         )
         if taken:
             enough = here.cost - taken.there.cost < max(ENOUGH, relative * taken.there.cost)
@@ -138,7 +147,14 @@ def _begun(problem: Problem, start: Point, free: tuple[int, ...]) -> _Place:
 
 
 def _descended(
-    problem: Problem, here: _Place, free, sensitivities, damping: float, relative: float, *, once: bool
+    problem: Problem,
+    here: _Place,
+    free: tuple[int, ...],
+    sensitivities: Sequence[Sensitivity],
+    damping: float,
+    relative: float,
+    *,
+    once: bool,
 ) -> tuple[_Taken | None, float, bool]:
     """A step from `here` that leads down, damped the more the oftener it did not (one try where derivatives are old,
     `once`); the damping for the next; and whether the last step tried promised too little to be worth it."""
@@ -163,17 +179,24 @@ def _descended(
     return None, damping, promise < least
 
 
-def _sensitivities(problem: Problem, point: Point, free, steps: Steps) -> tuple[Sensitivity, ...]:
+def _sensitivities(problem: Problem, point: Point, free: tuple[int, ...], steps: Steps) -> tuple[Sensitivity, ...]:
     return tuple(problem.jacobians(point, free, steps, Sensitivity.of))
 
 
-def _corrected(sensitivities, step, scale, before, after, p: int) -> tuple[Sensitivity, ...]:
+def _corrected(
+    sensitivities: Sequence[Sensitivity],
+    step: np.ndarray,
+    scale: np.ndarray,
+    before: Sequence[np.ndarray],
+    after: Sequence[np.ndarray],
+    p: int,
+) -> tuple[Sensitivity, ...]:
     found, at = [], p
     for one, old, new in zip(sensitivities, before, after, strict=True):
         q = one.gram.shape[0] - p
         own = slice(at, at + q)
-        both = [np.concatenate([v[:p], v[own]]) for v in (step, scale)]
-        found.append(one.corrected(*both, new - old))
+        moved, sizes = (np.concatenate([v[:p], v[own]]) for v in (step, scale))
+        found.append(one.corrected(moved, sizes, new - old))
         at += q
     return tuple(found)
 
@@ -217,7 +240,13 @@ def _unpack(point: Point, free: tuple[int, ...], x: np.ndarray) -> Point:
     return Point(values, tuple(nuisances))
 
 
-def _linearise(problem, point, free, residuals, sensitivities) -> _Linearised:
+def _linearise(
+    problem: Problem,
+    point: Point,
+    free: tuple[int, ...],
+    residuals: Sequence[np.ndarray],
+    sensitivities: Sequence[Sensitivity],
+) -> _Linearised:
     p = len(free)
     size = p + sum(len(n) for n in point.nuisances)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
@@ -244,7 +273,9 @@ def _linearise(problem, point, free, residuals, sensitivities) -> _Linearised:
     return _Linearised(normal, gradient)
 
 
-def _step(system, x, lower, upper, scale, damping) -> tuple[np.ndarray, float]:
+def _step(
+    system: _Linearised, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, scale: np.ndarray, damping: float
+) -> tuple[np.ndarray, float]:
     """A damped step within the bounds and the decrease of the quadratic model that it promises."""
     diagonal = np.diag(system.normal)
     ridge = damping * np.maximum(diagonal, 1e-6 / scale**2) + 1e-9 / scale**2

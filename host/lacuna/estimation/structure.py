@@ -127,7 +127,7 @@ class Structure:
                 precision[at : at + site.knots, at : at + site.knots] = block
         return precision
 
-    def moves(self, index: int, trial) -> bool:
+    def moves(self, index: int, trial: Record) -> bool:
         """Whether parameter `index` can change a trial at all."""
         if index < self.base_size:
             return self.system.matters(self.names[index], trial)

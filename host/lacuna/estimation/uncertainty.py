@@ -120,7 +120,15 @@ def profile_interval(
     return ends[0], ends[1]
 
 
-def _walk_out(fitted, index, others, stride, bound, limit, max_iterations) -> float:
+def _walk_out(
+    fitted: Fit,
+    index: int,
+    others: tuple[int, ...],
+    stride: float,
+    bound: float,
+    limit: float,
+    max_iterations: int,
+) -> float:
     """Step outwards until the cost has risen by `limit`, then interpolate the square root of the rise,
     which is straight where the cost is a parabola."""
     here, rise, point = float(fitted.solution.point.values[index]), 0.0, fitted.solution.point
