@@ -19,6 +19,7 @@ help:
 	echo "make test     every test: native, sanitized, in the simulated ATmega328P, Python (ARGS=--quick: two minutes of them)"
 	echo "make bench    every figure, beside its peer or limit, and bench.json (ARGS='--only NAME' for one)"
 	echo "make soak     the long proofs and fuzzers"
+	echo "make mutation  does a test miss each line of the safety code? (ARGS='--help')"
 	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
 	echo "make blind    diagnosis of sealed data sets: rates against what is required and baselines (ARGS='--help', ARGS='systems --help')"
 	echo "make lint     formatters and static checks; make format applies the formatters"
@@ -27,7 +28,7 @@ help:
 	echo "make lock     resolve host/requirements.in anew"
 	echo "make clean    remove what was built; make distclean removes .venv and .platformio as well"
 
-.PHONY: demo test bench soak portability blind
+.PHONY: demo test bench soak mutation portability blind
 demo: setup
 	@$(bin)/bifa demo $(ARGS)
 
@@ -47,7 +48,12 @@ soak: setup $(stamps)/fuzz
 	@failed=
 	(cd host && ../$(bin)/pytest -n 2 -m soak $(ARGS)) || failed="$$failed pytest"
 	$(bin)/python tools/portability.py || failed="$$failed portability"
+	$(MAKE) mutation ARGS="--sample 100" || failed="$$failed mutation"
 	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
+
+mutation: setup
+	@test -e .pio/libdeps/native/Unity || $(bin)/pio pkg install --silent --environment native
+	PYTHONPATH=tools nice -n 10 $(bin)/python -m mutation $(ARGS)
 
 portability: setup
 	@$(bin)/python tools/portability.py $(ARGS)

@@ -56,7 +56,7 @@ void FrameDecoder::feed(uint8_t byte) {
 
 bool FrameDecoder::finish(uint32_t session) {
   uint8_t size;
-  if (bad_ || run_ != 0 || length_ < kHeadBytes + kCheckBytes) return false;
+  if (bad_ || run_ != 0) return false;
   if (!inward_size(frame_.message, size) || length_ != kHeadBytes + size + kCheckBytes) return false;
   uint32_t stored;
   memcpy(&stored, frame_.fields + size, sizeof stored);

@@ -9,10 +9,7 @@ namespace {
 /// A preset's name as it travels, with an end.
 struct Name {
   char text[kNameSize + 1];
-  __attribute__((noinline)) explicit Name(const char* bytes) {
-    memcpy(text, bytes, kNameSize);
-    text[kNameSize] = '\0';
-  }
+  __attribute__((noinline)) explicit Name(const char* bytes) : text() { memcpy(text, bytes, kNameSize); }
 };
 
 void count(uint16_t& counter) {

@@ -35,7 +35,7 @@ void test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it() 
 void test_pressures_are_the_nearest_thousandths_of_a_psi() {
   for (uint16_t sum = 0; sum <= 1023 * 8; ++sum) {
     const double exact = (sum / 8.0 + 0.5) * 37500 / 1024 - 18750;
-    TEST_ASSERT_TRUE(sensor_mpsi(sum) - exact <= 0.5 && exact - sensor_mpsi(sum) < 0.51);
+    TEST_ASSERT_TRUE(sensor_mpsi(sum) - exact <= 0.5 && exact - sensor_mpsi(sum) < 0.5);
   }
   for (uint16_t conversion = 0; conversion < 410; ++conversion) {
     const double exact = (5 * (conversion + 0.5) / 1024 - 1) * 130000 / 4;
@@ -67,6 +67,8 @@ void test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets() {
   TEST_ASSERT_TRUE(bifa::is_valid(good));
   TEST_ASSERT_FALSE(bifa::is_valid(high));
   TEST_ASSERT_FALSE(bifa::is_valid(low));
+  const bifa::Calibration first = {{901, 0, 0}};
+  TEST_ASSERT_FALSE(bifa::is_valid(first));
 }
 
 void add(LastSecond& last, int16_t pressure, uint16_t samples) {
@@ -107,6 +109,31 @@ void test_pressures_rest_once_their_means_have_stayed_for_four_seconds() {
   TEST_ASSERT_FALSE(rest.is_long());
 }
 
+void test_a_mean_that_moves_by_more_than_a_count_begins_its_rest_anew() {
+  bifa::Rest rest;
+  add(rest, 41, 400);
+  TEST_ASSERT_FALSE(rest.is_long());
+  // The slow mean, and when it passes 40.
+  int32_t sum = 0;
+  uint16_t samples = 0;
+  for (; sum / 32 <= 40; ++samples) sum += 50 - sum / 32;
+  bifa::Rest moved;
+  const int16_t pressures[] = {50, 0, 0};
+  for (uint16_t n = 0; n < samples + 400; ++n) moved.add(pressures);
+  TEST_ASSERT_FALSE(moved.is_long());
+  moved.add(pressures);
+  TEST_ASSERT_TRUE(moved.is_long());
+}
+
+void test_a_mean_is_rounded() {
+  bifa::Rest rest;
+  const int16_t pressures[] = {16, 15, -17};
+  rest.add(pressures);
+  TEST_ASSERT_EQUAL_INT16(1, rest.mean_mpsi(0));
+  TEST_ASSERT_EQUAL_INT16(0, rest.mean_mpsi(1));
+  TEST_ASSERT_EQUAL_INT16(-1, rest.mean_mpsi(2));
+}
+
 // 16 bits do not hold what lies between: on the chip the mean went the wrong way.
 void test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went() {
   const int32_t rail = 18731;
@@ -125,26 +152,17 @@ void test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went() {
 
 // Against all that it was ever told: the samples of the last three parts and of the one under way.
 void test_last_second_holds_the_last_three_thirds_and_the_one_under_way() {
-  const uint16_t kPart = 34, kSamples = 5 * 34 + 7;
-  int16_t told[kSamples];
   LastSecond last;
-  uint32_t random = 1;
-  for (uint16_t n = 0; n < kSamples; ++n) {
-    random = random * 1664525UL + 1013904223UL;
-    told[n] = static_cast<int16_t>(random >> 18) - 8192;
-    const int16_t pressures[] = {told[n], static_cast<int16_t>(-told[n]), static_cast<int16_t>(told[n] / 2)};
+  for (int16_t n = 0; n < 9 * 34 + 7; ++n) {
+    const int16_t pressures[] = {static_cast<int16_t>(100 + n), static_cast<int16_t>(-100 - n), 7};
     last.add(pressures);
-    const uint16_t part = n / kPart, first = part > 3 ? (part - 3) * kPart : 0;
-    int16_t lowest = told[first], highest = told[first];
-    for (uint16_t i = first; i <= n; ++i) {
-      if (told[i] < lowest) lowest = told[i];
-      if (told[i] > highest) highest = told[i];
-    }
-    TEST_ASSERT_EQUAL_INT16(lowest, last.lowest_mpsi(0));
-    TEST_ASSERT_EQUAL_INT16(highest, last.highest_mpsi(0));
-    TEST_ASSERT_EQUAL_INT16(-lowest, last.highest_mpsi(1));
-    TEST_ASSERT_EQUAL_INT16(-highest, last.lowest_mpsi(1));
-    TEST_ASSERT_EQUAL_INT16(lowest / 2, last.lowest_mpsi(2));
+    const int16_t part = n / 34, first = part > 3 ? (part - 3) * 34 : 0;
+    TEST_ASSERT_EQUAL_INT16(100 + first, last.lowest_mpsi(0));
+    TEST_ASSERT_EQUAL_INT16(100 + n, last.highest_mpsi(0));
+    TEST_ASSERT_EQUAL_INT16(-100 - n, last.lowest_mpsi(1));
+    TEST_ASSERT_EQUAL_INT16(-100 - first, last.highest_mpsi(1));
+    TEST_ASSERT_EQUAL_INT16(7, last.lowest_mpsi(2));
+    TEST_ASSERT_EQUAL_INT16(7, last.highest_mpsi(2));
   }
 }
 
@@ -163,6 +181,8 @@ void run() {
   RUN_TEST(test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets);
   RUN_TEST(test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon_after);
   RUN_TEST(test_pressures_rest_once_their_means_have_stayed_for_four_seconds);
+  RUN_TEST(test_a_mean_that_moves_by_more_than_a_count_begins_its_rest_anew);
+  RUN_TEST(test_a_mean_is_rounded);
   RUN_TEST(test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went);
   RUN_TEST(test_last_second_holds_the_last_three_thirds_and_the_one_under_way);
   RUN_TEST(test_last_second_knows_nothing_before_the_first_sample);

@@ -112,6 +112,7 @@ void test_a_fault_keeps_its_first_cause_with_channel_value_limit_time_and_extrem
 void test_every_stop_and_every_new_fault_outdates_what_came_before_it() {
   Supervisor supervisor;
   LastSecond last_second;
+  TEST_ASSERT_FALSE(supervisor.outdated());
   supervisor.stop();
   supervisor.stop();
   TEST_ASSERT_EQUAL_UINT8(2, outdated);

@@ -25,6 +25,7 @@ bool finds(RegulatorWatch& watch, uint16_t samples, uint16_t conversion, uint16_
 
 void test_two_failures_of_the_dac_are_borne_and_the_third_in_a_row_is_not() {
   bifa::DacWatch dac;
+  TEST_ASSERT_FALSE(dac.failed());
   dac.told(false);
   dac.told(false);
   TEST_ASSERT_FALSE(dac.failed());
@@ -40,6 +41,7 @@ void test_two_failures_of_the_dac_are_borne_and_the_third_in_a_row_is_not() {
 
 void test_a_monitor_that_is_not_connected_is_not_believed() {
   RegulatorWatch watch;
+  TEST_ASSERT_FALSE(watch.deviates());
   TEST_ASSERT_FALSE(finds(watch, 2000, 0, 8500));
   TEST_ASSERT_FALSE(finds(watch, 2000, 149, 8500));
   TEST_ASSERT_FALSE(watch.deviates());

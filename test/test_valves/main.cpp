@@ -158,6 +158,12 @@ void test_no_number_makes_a_set_point_above_14_psi() {
   TEST_ASSERT_EQUAL_UINT16(0, bifa::SupplyCode().counts());
 }
 
+void test_every_set_point_is_its_count_of_the_dac_rounded_down() {
+  for (uint32_t pressure_mpsi = 0; pressure_mpsi <= 14000; ++pressure_mpsi) {
+    TEST_ASSERT_EQUAL_UINT16(pressure_mpsi * 4096UL / 130000UL, bifa::SupplyCode::of(pressure_mpsi).counts());
+  }
+}
+
 void test_the_paper_s_pressure_is_count_268_less_rounding() {
   TEST_ASSERT_UINT16_WITHIN(1, 268, bifa::SupplyCode::of(8500).counts());
 }
@@ -175,6 +181,7 @@ void run() {
   RUN_TEST(test_after_a_vent_between_two_ticks_the_dead_time_is_still_whole);
   RUN_TEST(test_random_commands_never_break_dead_time_or_dwell);
   RUN_TEST(test_no_number_makes_a_set_point_above_14_psi);
+  RUN_TEST(test_every_set_point_is_its_count_of_the_dac_rounded_down);
   RUN_TEST(test_the_paper_s_pressure_is_count_268_less_rounding);
 }
 

@@ -41,11 +41,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = everything(options.files or [Path("lib") / folder for folder in FOLDERS])
     stale = [] if options.files else equivalent.keys() - {mutant.key for mutant in chosen}
     if options.sample is not None:
-        chosen = sorted(chosen, key=lambda mutant: hashlib.sha256("\0".join(mutant.key).encode()).digest())[
-            : options.sample
-        ]
+        chosen = sorted(chosen, key=_by_chance)[: options.sample]
     verdicts = tried(chosen, options.jobs, equivalent)
     return report(verdicts, equivalent, stale)
+
+
+def _by_chance(mutant: Mutant) -> bytes:
+    return hashlib.sha256("\0".join(map(str, mutant.key)).encode()).digest()
 
 
 def everything(places: Sequence[Path]) -> list[Mutant]:
@@ -57,10 +59,10 @@ def everything(places: Sequence[Path]) -> list[Mutant]:
     return [mutant for name, text in sources.items() if GENERATED not in text for mutant in mutants(name, text)]
 
 
-def listed() -> dict[tuple[str, str, str, str], str]:
+def listed() -> dict[tuple, str]:
     """Those that change nothing that anybody could see, with the reason."""
     entries = tomllib.loads(EQUIVALENT.read_text()).get("equivalent", [])
-    return {(e["file"], e.get("function", ""), e["before"], e["after"]): e["reason"] for e in entries}
+    return {(e["file"], e.get("function", ""), e["before"], e["after"], e.get("turn", 0)): e["reason"] for e in entries}
 
 
 def tried(chosen: Sequence[Mutant], jobs: int, expected: Container) -> dict[Mutant, str]:

@@ -5,8 +5,9 @@ templates' brackets are left alone. That relies on the project's formatting, whi
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 TOKEN = re.compile(
     r"""
@@ -74,7 +75,8 @@ class Token:
 class Mutant:
     """`source[begin:end]` of `file` replaced by `to`; line: its number; before, after: the line without and with it.
 
-    function: in which it is, if any. With file, before and after it names the mutant, wherever its line may move to.
+    function: in which it is, if any; turn: how many alike come before it there. With file, before and after these name
+    the mutant, wherever its line may move to.
     """
 
     file: str
@@ -85,10 +87,11 @@ class Mutant:
     line: int
     before: str
     after: str
+    turn: int = 0
 
     @property
-    def key(self) -> tuple[str, str, str, str]:
-        return self.file, self.function, self.before, self.after
+    def key(self) -> tuple[str, str, str, str, int]:
+        return self.file, self.function, self.before, self.after, self.turn
 
     def applied(self, source: str) -> str:
         return source[: self.begin] + self.to + source[self.end :]
@@ -107,7 +110,13 @@ def mutants(file: str, source: str) -> list[Mutant]:
         if match.lastgroup != "skip"
     ]
     edits = sorted({*_of_tokens(source, tokens), *_statements(tokens)})
-    return [_mutant(file, source, *edit) for edit in edits]
+    found = []
+    alike: Counter[tuple] = Counter()
+    for edit in edits:
+        mutant = _mutant(file, source, *edit)
+        found.append(replace(mutant, turn=alike[mutant.key]))
+        alike[mutant.key] += 1
+    return found
 
 
 def _of_tokens(source: str, tokens: list[Token]) -> Iterator[tuple[int, int, str]]:
@@ -221,11 +230,13 @@ def _mutant(file: str, source: str, begin: int, end: int, to: str) -> Mutant:
 
 
 def _function(until: str) -> str:
-    """The function that was begun last, by the indentation that the formatter gives it."""
-    found = re.findall(
-        r"^(?:  |    )?[A-Za-z][\w:<>&*, ]*?([\w~]+|operator\S+)\([^;{}]*\)[^;{}]*\{", until, re.MULTILINE
-    )
-    return next((name for name in reversed(found) if name not in ("if", "for", "while", "switch")), "")
+    """The function whose body is open at the end of this text, by the indentation that the formatter gives it."""
+    head = r"^(?:  |    )?[A-Za-z][\w:<>&*, ]*?([\w~]+|operator\S+)\([^;{}]*\)[^;{}]*\{"
+    for found in reversed(list(re.finditer(head, until, re.MULTILINE))):
+        inside = until[found.end() :]
+        if found[1] not in ("if", "for", "while", "switch") and inside.count("{") >= inside.count("}"):
+            return found[1]
+    return ""
 
 
 def _flat(text: str) -> str:

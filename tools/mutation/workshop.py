@@ -20,7 +20,7 @@ COMPILER = os.environ.get("CXX", "g++")
 # As in platformio.ini; the sanitizer finds what would only be undefined.
 FLAGS = (
     *("-std=gnu++11", "-O0", "-w", "-DUNITY_SUPPORT_64", "-DUNITY_INCLUDE_DOUBLE", "-DDECIMAL_DIG=__DECIMAL_DIG__"),
-    *("-Werror=return-type", "-fsanitize=undefined", "-fno-sanitize-recover=all"),
+    *("-Werror=return-type", "-fsanitize=undefined,bounds-strict", "-fno-sanitize-recover=all"),
 )
 # What the suites on this computer cannot see of the guard, they leave to this one, which reads the chip's instructions.
 ON_THE_CHIP = Path("host/tests/firmware/test_critical.py")

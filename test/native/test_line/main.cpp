@@ -147,6 +147,16 @@ void test_a_frame_longer_than_any_is_refused_and_the_next_one_is_not() {
   TEST_ASSERT_TRUE(accepts(decoder, masked(cobs(longest))));
 }
 
+void test_nothing_is_written_beyond_a_frame_however_long_it_is() {
+  struct {
+    FrameDecoder decoder;
+    uint8_t beyond[8];
+  } memory;
+  memset(memory.beyond, 0xA5, sizeof memory.beyond);
+  TEST_ASSERT_FALSE(accepts(memory.decoder, masked(cobs(std::string(40, 'y')))));
+  for (uint8_t byte : memory.beyond) TEST_ASSERT_EQUAL_HEX8(0xA5, byte);
+}
+
 // ---- sending ----
 
 void test_what_is_sent_is_cobs_between_delimiters_and_as_long_as_was_said() {
@@ -276,6 +286,13 @@ void test_lost_bytes_are_counted_up_to_65535() {
   TEST_ASSERT_EQUAL_UINT16(65535, receiver.lost());
 }
 
+void test_what_arrives_before_any_stop_is_not_outdated() {
+  Receiver receiver;
+  TEST_ASSERT_FALSE(receiver.outdated());
+  receiver.push('a');
+  TEST_ASSERT_FALSE(receiver.outdated());
+}
+
 void test_what_waited_is_outdated_until_its_last_byte_is_taken() {
   for (uint8_t begin : {0, 100, 126}) {
     for (uint8_t waiting : {0, 1, 5, 127}) {
@@ -335,6 +352,7 @@ static void run() {
   RUN_TEST(test_what_is_no_cobs_is_refused_though_its_checks_are_right);
   RUN_TEST(test_no_frame_at_all_is_no_message);
   RUN_TEST(test_a_frame_longer_than_any_is_refused_and_the_next_one_is_not);
+  RUN_TEST(test_nothing_is_written_beyond_a_frame_however_long_it_is);
   RUN_TEST(test_what_is_sent_is_cobs_between_delimiters_and_as_long_as_was_said);
   RUN_TEST(test_seeds_are_those_of_the_protocol);
   RUN_TEST(test_a_frame_ends_after_more_than_twenty_milliseconds_of_silence);
@@ -343,6 +361,7 @@ static void run() {
   RUN_TEST(test_the_queue_holds_127_bytes_wherever_it_begins);
   RUN_TEST(test_after_an_overrun_nothing_is_queued_until_it_is_recovered_from);
   RUN_TEST(test_lost_bytes_are_counted_up_to_65535);
+  RUN_TEST(test_what_arrives_before_any_stop_is_not_outdated);
   RUN_TEST(test_what_waited_is_outdated_until_its_last_byte_is_taken);
   RUN_TEST(test_the_stop_frame_is_told_from_all_that_begin_like_it);
   RUN_TEST(test_everything_but_stops_reaches_the_queue);

@@ -140,6 +140,12 @@ void equal(State expected, const Bench& bench) {
   TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(bench.controller.state()));
 }
 
+/// Leaves letters where the next call puts its variables.
+__attribute__((noinline)) void litter_the_stack() {
+  volatile char letters[1024];
+  for (volatile char& letter : letters) letter = 'z';
+}
+
 // ---- opening ----
 
 void is_hello(const HelloMessage& hello, uint16_t key, StartCause cause) {
@@ -154,6 +160,8 @@ void is_hello(const HelloMessage& hello, uint16_t key, StartCause cause) {
 void test_hello_says_which_versions_which_start_and_which_session() {
   Bench bench(StartCause::kExternal);
   bench.take(MessageId::kVersion, 9);
+  is_hello(report<HelloMessage>(MessageId::kHello, 0, kOpenSeed), 0, StartCause::kExternal);
+  bench.take(MessageId::kVersion, 9, ConnectMessage{kNonce, kKey});  // as an earlier frame may have left them
   is_hello(report<HelloMessage>(MessageId::kHello, 0, kOpenSeed), 0, StartCause::kExternal);
   bench.connect();
   is_hello(report<HelloMessage>(MessageId::kHello, 0, kOpenSeed), kKey, StartCause::kExternal);
@@ -171,6 +179,8 @@ void test_connect_with_the_nonce_of_another_start_opens_nothing() {
 
 void test_without_a_session_no_command_is_carried_out_or_answered() {
   Bench bench;
+  bench.session.poll();
+  TEST_ASSERT_EQUAL_UINT8(0, frames_sent());
   bench.take(MessageId::kRun, 0);
   TEST_ASSERT_EQUAL_UINT8(0, frames_sent());
   equal(State::kIdle, bench);
@@ -312,14 +322,17 @@ void test_a_command_that_saves_is_answered_when_that_is_done_and_others_wait() {
 void test_a_save_that_fails_is_answered_so() {
   Bench bench;
   bench.connect();
-  bench.take(MessageId::kSave, 0, SaveMessage{{'a'}});
+  equal(Result::kOk, bench.call(MessageId::kMark));
+  bench.take(MessageId::kSave, 1, SaveMessage{{'a'}});
   for (uint16_t ms = 0; ms < 60000 && frames_sent() == 0; ++ms) {
     memset(cells, 0x55, sizeof cells);  // no cell keeps what is written
     bench.wait(1);
   }
-  equal(Result::kEeprom, done(0));
-  bench.take(MessageId::kSave, 0, SaveMessage{{'a'}});
-  equal(Result::kEeprom, done(0));
+  equal(Result::kEeprom, done(1));
+  bench.take(MessageId::kSave, 1, SaveMessage{{'a'}});
+  equal(Result::kEeprom, done(1));
+  bench.take(MessageId::kMark, 0);
+  equal(Result::kOk, done(0));
 }
 
 // ---- what each command does ----
@@ -373,6 +386,7 @@ void test_presets_are_saved_loaded_listed_and_forgotten_by_names_of_full_length(
   bench.connect();
   SaveMessage save;
   memcpy(save.preset, name, sizeof save.preset);
+  litter_the_stack();
   bench.take(MessageId::kSave, bench.sequence, save);
   bench.wait(2000);
   equal(Result::kOk, done(bench.sequence++));
@@ -392,6 +406,7 @@ void test_presets_are_saved_loaded_listed_and_forgotten_by_names_of_full_length(
 
   LoadMessage load;
   memcpy(load.preset, name, sizeof load.preset);
+  litter_the_stack();
   equal(Result::kOk, bench.call(MessageId::kLoad, load));
   load.preset[0] = 'x';
   equal(Result::kNoPreset, bench.call(MessageId::kLoad, load));
