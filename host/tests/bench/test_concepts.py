@@ -2,11 +2,14 @@
 
 import re
 
+import pytest
+
 from bench import concepts
 
 PAGE = concepts.IMAGES.parent / "concepts.md"
 
 
+@pytest.mark.slow
 def test_every_picture_of_the_page_is_drawn_and_shows_its_idea(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(concepts, "IMAGES", tmp_path)
     assert concepts.main() == 0

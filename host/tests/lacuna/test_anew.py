@@ -74,6 +74,7 @@ def test_of_single_effects_the_right_one_is_followed_whatever_the_base_fit_was()
     assert best.theta["delay.delay_s"] == pytest.approx(0.05, rel=0.1)
 
 
+@pytest.mark.slow
 def test_an_effect_that_isolated_trials_cannot_show_is_followed_where_all_together_do():
     drag = {"quadratic_drag.drag_Ns2_m2": 8.0}
     quiet, dragged = (hide(effects, seed=34) for effects in ({}, drag))
@@ -95,6 +96,7 @@ def test_a_pair_is_begun_from_its_better_half_and_not_from_a_lost_fit():
     assert judge(best, case.split, POLICY).checked_error < (0, 1.1)
 
 
+@pytest.mark.slow
 def test_where_no_trial_isolates_parameters_every_single_effect_is_followed_and_no_pair():
     hidden = hide({"delay.delay_s": 0.05}, seed=63)
     system = Tangled(hidden.trials, hidden.effects)
@@ -175,6 +177,7 @@ def learnt(case: Case, parent: Candidate) -> Candidate | None:
     return learn_correction([parent], case.split, enough=case.suffices, policy=POLICY, crew=NOBODY)
 
 
+@pytest.mark.slow
 def test_a_curve_is_begun_anew_where_the_fit_below_it_is_lost(monkeypatch):
     case = without(bench({"cubic_spring.stiffness_N_m3": 8000.0}, 66), "cubic_spring")
     parent = lost(case)

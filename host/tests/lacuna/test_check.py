@@ -325,6 +325,7 @@ def test_warns_of_trials_that_the_model_cannot_predict():
     assert "cannot predict run 3, run 4, run 5" in said
 
 
+@pytest.mark.slow
 def test_warns_of_a_parameter_at_its_bound():
     tight = (Parameter("gain_K_W", "K/W", 0.5, 0.1, 0.7), heater.PARAMETERS[1])
     said = warned(lacuna.System(heater.simulate, tight, _all()), heater.records(repeats=2, seed=3))
@@ -353,6 +354,7 @@ def test_warns_of_a_nuisance_at_its_limit():
     assert "drift_K is more than 3.5 standard deviations from what is expected in steps_4W_1" in said
 
 
+@pytest.mark.slow
 def test_warns_of_an_effect_that_would_need_the_opposite_sign():
     """What is hidden is a loss of power, where only a gain of it is on offer."""
     only_positive = Effect("offset", Parameter("power_W", "W", 0.5, 0.0, 5.0))

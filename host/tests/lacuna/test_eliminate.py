@@ -36,6 +36,7 @@ def test_an_effect_with_an_open_interval_stays_only_where_much_is_worse_without_
     assert eliminate(case, found, weigh(found, delayed, POLICY))[1].candidate is delayed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "stays"),
     [({"ripple.force_N": 0.3}, False), ({"cubic_spring.stiffness_N_m3": 8000.0, "ripple.force_N": 0.1}, True)],

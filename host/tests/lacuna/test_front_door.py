@@ -133,6 +133,7 @@ def test_a_verdict_is_short_in_a_line_and_one_screen_in_print(verdict):
     assert "pairs of repeats" in str(verdict)
 
 
+@pytest.mark.slow
 def test_report_and_plot_show_what_was_not_fitted(verdict, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     page = verdict.report(tmp_path / "report.html").read_text()
@@ -242,6 +243,7 @@ def test_ctrl_c_gives_the_best_so_far():
     assert found.error["after"] < 0.9 * found.error["before"]
 
 
+@pytest.mark.slow
 def test_the_engine_imports_neither_bifa_nor_what_is_optional():
     code = (
         "import sys, lacuna; lacuna.diagnose; lacuna.System; lacuna.Verdict;"

@@ -62,6 +62,7 @@ def test_what_nuisances_follow_is_named():
     assert np.std([values["zero_mm"] for values in found.nuisances.values()]) < 1.5 * SPREAD_MM
 
 
+@pytest.mark.slow
 def test_nuisances_of_their_own_follow_nothing():
     for seed in range(3):
         found = lacuna.diagnose(system(), records(seed, np.zeros(6)), progress=False)

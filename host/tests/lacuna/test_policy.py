@@ -85,6 +85,7 @@ def test_chance_decides_what_counts_as_structure():
     assert not with_chance(1.1 * POLICY.chance).matters
 
 
+@pytest.mark.slow
 def test_noise_alone_is_structure_as_seldom_as_the_rule_says():
     found = sum(bool(remainder(0.0, seed=seed, policy=replace(POLICY, chance=0.05)).found) for seed in range(100))
     assert found <= 11, "binomial, 100 draws at 0.05: more than 11 happen once in 200"

@@ -96,6 +96,7 @@ def test_what_the_simulation_gets_wrong_does_not_pass_for_information():
     assert np.array(after) == pytest.approx(1.0, rel=0.15)
 
 
+@pytest.mark.slow
 def test_settled_estimates_scatter_as_they_say():
     """About 1.1: for three runs whose factors are estimated too, a parabola is not quite the truth."""
     before, after = [], []

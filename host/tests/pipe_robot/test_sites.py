@@ -59,6 +59,7 @@ def test_a_curve_outside_the_equations_acts_somewhere():
         assert len(own) == (0 if module.SITE.equation else 1), name
 
 
+@pytest.mark.slow
 def test_a_damper_learnt_as_a_straight_line_is_more_damping(system, theta):
     body = next(t for t in system.trials if t.experiment == "step_response")
     learnt = curve(system, "body_damper", lambda v: 20.0 * v)
