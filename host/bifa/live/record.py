@@ -56,6 +56,8 @@ def record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repea
 def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
     from bifa.data import DatasetWriter, Trial
     from bifa.data.lag import misfit_of_last
+    from bifa.gait.measured import measured_speed
+    from bifa.gait.settling import LEAST, Walking
     from bifa.measure.experiments import record_columns
     from bifa.measure.plan import PlannedTrial
     from bifa.measure.session import provenance
@@ -86,6 +88,10 @@ def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repe
                 progress.console.print(warning(wrong), highlight=False)
             progress.update(task, completed=1.0)
             progress.console.print(f"walk {repeat}: {uno.counters.since(before).text()}")
+            if cycles >= LEAST:
+                speed = measured_speed(columns["time_s"], columns["displacement_head_mm"], gait.period_s)
+                more = f"; walk it with --cycles {2 * cycles}" if speed.walking is Walking.UNSETTLED else ""
+                progress.console.print(f"walk {repeat}: {speed.text}{more}", highlight=False)
     writer.finish()
     console.print(
         f"{out}: {repeats} walk{'' if repeats == 1 else 's'} of {cycles} cycles, firmware {hello.firmware}; "

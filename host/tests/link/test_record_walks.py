@@ -1,5 +1,7 @@
 """`bifa record` on a rig with motion capture: resumed on another day, and by one program at a time."""
 
+import re
+
 import pytest
 
 from bifa.data import read_dataset
@@ -31,3 +33,10 @@ def test_two_recordings_do_not_go_into_one_data_set(tmp_path):
         pytest.raises(LockedError, match="is being written by"),
     ):
         record_walks(rig, tmp_path / "walks", None, 1, 1, Console(quiet=True))
+
+
+def test_a_recording_says_the_speed_of_the_settled_cycles(tmp_path, capsys):
+    with open_rig("virtual", profile="ideal", seed=3) as rig:
+        record_walks(rig, tmp_path / "walks", None, 5, 1, Console())
+    said = capsys.readouterr().out
+    assert re.search(r"walk 1: 10\.8\d mm/s over [3-5] settled cycles", said)
