@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bifa.link import Uno
-    from bifa.rig import Rig
+    from bifa.rig import SameBoard
     from bifa.robot import Model
     from bifa.screen import Console
 
@@ -55,7 +55,7 @@ def monitor(
     from bifa.link import Uno
     from bifa.live.monitor import watch
     from bifa.live.output import writable
-    from bifa.rig import open_rig
+    from bifa.rig import SameBoard, open_rig
     from bifa.robot import load_model, nominal
     from bifa.robot.gait import read_gait_file
     from bifa.screen import Console
@@ -63,32 +63,37 @@ def monitor(
     parameters = read_gait_file(gait).parameters if gait else {}
     robot = load_model(model) if model else nominal()
 
-    def begin(uno: Uno) -> None:
+    def adjust(uno: Uno) -> None:
         if parameters:
             uno.upload(parameters)
+
+    def begin(uno: Uno) -> None:
+        adjust(uno)
         if run:
             uno.run()
 
-    with writable(), open_rig(port) as rig:
+    with writable():
         try:
             if web:
-                _fly(rig, Console(), web_port, robot, seconds, begin)
+                _fly(SameBoard(port), Console(), web_port, robot, seconds, begin, adjust)
             else:
-                watch(Uno(rig.transport, rig.clock), rig.clock, Console(), seconds, begin)
+                with open_rig(port) as rig:
+                    watch(Uno(rig.transport, rig.clock), rig.clock, Console(), seconds, begin)
         except KeyboardInterrupt:
             typer.echo("valves off")
 
 
 def _fly(
-    rig: "Rig",
+    board: "SameBoard",
     console: "Console",
     port: int,
     model: "Model",
     seconds: float | None,
     begin: "Callable[[Uno], None]",
+    later: "Callable[[Uno], None]",
 ) -> None:
     """Serve the page and fly until Ctrl-C or for `seconds`."""
-    from bifa.link import Uno
+    from bifa.live.web.flights import fly
     from bifa.live.web.pilot import Pilot
     from bifa.live.web.server import LivePage, served
     from bifa.report.live_page import live_page
@@ -96,7 +101,10 @@ def _fly(
     pilot = Pilot()
     page = LivePage(pilot, live_page(), model)
     pilot.is_watched = page.is_watched
-    position_mm = getattr(rig.instruments, "position_mm", None)
+
+    def say(text: str) -> None:
+        console.print(text, highlight=False, soft_wrap=True)
+
     with served(page, port) as address:
-        console.print(f"page: {address.url}   (Ctrl-C ends it, and the robot stops)", highlight=False, soft_wrap=True)
-        pilot.fly(Uno(rig.transport, rig.clock), rig.clock, page.tell, seconds, begin, position_mm)
+        say(f"page: {address.url}   (Ctrl-C ends it, and the robot stops)")
+        fly(pilot, board, page.tell, say, seconds, begin, later)

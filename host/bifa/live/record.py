@@ -20,7 +20,7 @@ from bifa.link.table import CHAMBERS
 from bifa.link.uno import MARK_PAUSE
 from bifa.lock import locked
 from bifa.measure.desk import Desk
-from bifa.rig import Rig, RigError, port_of, serial_number_at
+from bifa.rig import Rig, RigError, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
 
@@ -164,23 +164,16 @@ class _Recorder:
         end_s: float,
         console: Console,
     ) -> None:
-        self._open_rig, self._port, self._parameters, self._end_s = open_rig, port, parameters, end_s
+        self._board, self._parameters, self._end_s = SameBoard(port, open_rig), parameters, end_s
         self._console = console
-        self._serial_number: str | None = None
         self._nonce: int | None = None  # of the start that was seen last; None before the first
         self._desk = Desk(lambda text: console.print(text, highlight=False))
-
-    def _open(self) -> Any:
-        if self._nonce is None:
-            self._serial_number = serial_number_at(self._port)
-            return self._open_rig(self._port)
-        return self._open_rig(port_of(self._serial_number) if self._serial_number else self._port)
 
     def record_until_gone(self, path: Path) -> None:
         """Into the new file `path`; raises one of GONE when the Uno is."""
         uno: Uno | None = None
         try:
-            with self._open() as rig, self._console.status("waiting for the Uno") as status:
+            with self._board.open() as rig, self._console.status("waiting for the Uno") as status:
                 uno = Uno(rig.transport, rig.clock)
                 with uno:
                     is_back, known = self._nonce is not None, self._greet(uno)
@@ -203,7 +196,7 @@ class _Recorder:
         nonce = uno.connect().boot_nonce
         followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= RESTARTS
         self._nonce = nonce
-        if self._serial_number or followed:
+        if self._board.serial_number or followed:
             return "The Uno is back, and has started anew"
         return "An Uno is there, and nothing says that it is the same one"
 

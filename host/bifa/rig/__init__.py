@@ -9,21 +9,19 @@ from bifa.rig.rig import (
     find_port,
     is_offered,
     open_rig,
-    port_of,
-    serial_number_at,
 )
+from bifa.rig.same_board import SameBoard
 
 __all__ = [
     "Rig",
     "RigError",
+    "SameBoard",
     "SerialPort",
     "SerialRig",
     "check_port",
     "find_port",
     "is_offered",
     "open_rig",
-    "port_of",
-    "serial_number_at",
     "serial_ports",
     "uno_ports",
 ]

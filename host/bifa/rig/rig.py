@@ -81,21 +81,6 @@ def find_port() -> str:
     )
 
 
-def serial_number_at(port: str | None) -> str | None:
-    """The USB serial number of the board behind `port`, or of the one Uno there is; None where it has none."""
-    unos = [one for one in serial_ports() if (one.device == port if port is not None else one.board)]
-    return unos[0].serial_number if len(unos) == 1 else None
-
-
-def port_of(serial_number: str) -> str:
-    """Where the board with this USB serial number is now; RigError where it is not plugged in."""
-    for port in serial_ports():
-        if port.serial_number == serial_number:
-            return port.device
-    others = ", ".join(f"{port.device} ({port.description})" for port in serial_ports()) or "none"
-    raise RigError(f"the Uno with serial number {serial_number} is not plugged in (USB serial ports: {others})")
-
-
 def is_offered(port: str | None) -> bool:
     """Whether `port` is the name of a rig that a package offers, and not a serial port."""
     return port in entry_points(group=ENTRY_POINTS).names

@@ -18,7 +18,7 @@ from bifa.link import PortGoneError, Sample, Uno
 from bifa.link.uno import MARK_PAUSE
 from bifa.live.monitor import Monitor, watch
 from bifa.live.record import record_telemetry
-from bifa.rig import RigError, SerialRig, port_of, serial_number_at
+from bifa.rig import RigError, SameBoard, SerialRig
 from harness.board import Board
 from harness.pty_uno import PtyUno
 from harness.terminal import Terminal
@@ -167,14 +167,16 @@ def test_another_uno_is_not_taken_for_the_one_that_was_recorded(monkeypatch):
     """By the serial number of its USB chip, wherever it is plugged in; the other one is not even opened."""
     plugged = [usb("/dev/ttyACM0", "A1")]
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: plugged)
-    assert serial_number_at(None) == serial_number_at("/dev/ttyACM0") == "A1"
+    board = SameBoard(None, lambda port: port)
+    assert (board.open(), board.serial_number) == (None, "A1")
     plugged[:] = [usb("/dev/ttyACM0", "B2")]
     with pytest.raises(RigError, match=r"A1 is not plugged in .*ttyACM0"):
-        port_of("A1")
+        board.open()
     plugged.append(usb("/dev/ttyACM1", "A1"))
-    assert port_of("A1") == "/dev/ttyACM1"
+    assert board.open() == "/dev/ttyACM1"
     plugged[:] = [usb("/dev/ttyACM0", None)]
-    assert serial_number_at(None) is None
+    nameless = SameBoard("/dev/ttyACM0", lambda port: port)
+    assert (nameless.open(), nameless.serial_number, nameless.open()) == ("/dev/ttyACM0", None, "/dev/ttyACM0")
 
 
 def test_a_recorder_opens_only_the_board_that_it_began_with(tmp_path, monkeypatch):

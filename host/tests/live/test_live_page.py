@@ -86,15 +86,40 @@ def test_a_slider_predicts_apply_changes_the_robot_and_stop_says_when_it_has(mon
     assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
 
 
-def test_the_page_says_that_the_robot_is_gone(monitor, tab):
-    bifa = monitor("--run")
+def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(monitor, tab, tmp_path):
+    port = tmp_path / "port"
+    first, second = PtyUno(), PtyUno()
+    port.symlink_to(first.device)
+    bifa = monitor("--run", port=str(port), uno=first)
     page = tab(bifa.url)
-    bifa.uno.unplug()
+    first.unplug()
     page.locator("#state", has_text="the robot is gone").wait_for()
-    assert bifa.process.wait(20) == 2
-    assert "is gone" in bifa.process.stdout.read()
+    assert page.locator("#alarm").evaluate("box => box.classList.contains('loud')")
     page.get_by_role("button", name="Stop", exact=True).click()
     expect(page.locator("#said")).to_contain_text("NOT CONFIRMED")
+    assert page.get_by_role("button", name="Walk").is_disabled()
+    port.unlink()
+    port.symlink_to(second.device)
+    expect(page.locator("#alarm")).to_contain_text("does not walk by itself", timeout=30_000)
+    page.wait_for_timeout(1_000)
+    assert second.driven_s == 0
+    page.get_by_role("button", name="Walk").click()
+    bifa.uno = second
+    assert bifa.until("running") == "running"
+    assert bifa.process.poll() is None
+    bifa.process.send_signal(signal.SIGINT)
+    bifa.process.wait(15)
+    assert second.board.valves == 0
+
+
+def test_a_robot_that_is_gone_while_nobody_watches_ends_the_command(monitor):
+    bifa = monitor("--run")
+    assert bifa.until("running") == "running"
+    bifa.uno.unplug()
+    assert bifa.process.wait(30) == 2
+    said = bifa.process.stdout.read()
+    assert "is gone" in said
+    assert "MAY STILL BE MOVING" in said
 
 
 def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):

@@ -121,18 +121,20 @@ class Pilot:
         duration_s: float | None = None,
         begin: Callable[[Uno], None] = lambda uno: None,
         position_mm: Callable[[], dict[str, float]] | None = None,
+        came_back: str = "",
     ) -> None:
         """Connect, `begin(uno)`, and tell what happens until Ctrl-C or for `duration_s`; then the robot stands.
 
         tell(changes, samples): called every REPORT_S with what is so now and the samples since, as plain types.
-        position_mm: where an instrument sees the ends, if it can be read at any moment. Raises LinkError or a
+        position_mm: where an instrument sees the ends, if it can be read at any moment. came_back: why the robot
+        stands, where it was gone and is back. Raises LinkError or a
         ConnectionError when the robot is gone, or a stop was not confirmed and nobody watches; and tells that first.
         """
         self._stopper = Stopper(uno.send_stop)
         try:
             with uno:
                 uno.connect()
-                self._take_off()
+                self._take_off(came_back)
                 try:
                     begin(uno)
                     uno.stream(True)
@@ -152,10 +154,10 @@ class Pilot:
         self._ended = f"the robot is gone: {error}"
         tell({"gone": self._ended, "robot": "gone"}, [])
 
-    def _take_off(self) -> None:
+    def _take_off(self, came_back: str) -> None:
         with self._lock:
             self._is_flying = True
-            self._stopped = None
+            self._stopped = _by_itself(came_back) if came_back else None
             self._ended = "bifa monitor has ended; the robot was stopped"
 
     def _land(self) -> None:
@@ -201,7 +203,7 @@ class Pilot:
         """The robot stopped, and nobody here had asked it to."""
         with self._lock:
             if self._stop is None:
-                self._stopped = {"by": "", "at": wall_clock(), "is_confirmed": True, "why": why}
+                self._stopped = _by_itself(why)
 
     def moves(self) -> None:
         """The robot moves: what had stopped it is over."""
@@ -297,6 +299,10 @@ class _Flight:
                 if shown:
                     shown[-1]["mm"] = position_mm["head"]
         return report, shown
+
+
+def _by_itself(why: str) -> dict[str, Any]:
+    return {"by": "", "at": wall_clock(), "is_confirmed": True, "why": why}
 
 
 def _why(uno: Uno) -> str:

@@ -1,0 +1,50 @@
+"""One flight after another: where somebody watches the page, a robot that is gone is waited for, as `bifa record` does.
+
+It never walks by itself when it is back: who watches decides.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from bifa.link import NoAnswerError, PortGoneError, RestartedError, StillMovingError, Uno
+from bifa.live.web.pilot import Pilot, Tell
+from bifa.rig import RigError, SameBoard
+
+RETRY_S = 1.0
+GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
+
+
+def fly(
+    pilot: Pilot,
+    board: SameBoard,
+    tell: Tell,
+    say: Callable[[str], None],
+    duration_s: float | None,
+    first: Callable[[Uno], None],
+    later: Callable[[Uno], None],
+) -> None:
+    """Fly until Ctrl-C or for `duration_s`; `first(uno)` begins the first flight, `later(uno)` each that follows.
+
+    say: what has gone wrong, for the terminal. Raises what ended a flight where nobody watches the pages.
+    """
+    end_s = math.inf if duration_s is None else time.monotonic() + duration_s
+    begin, came_back, told = first, "", ""
+    while (left_s := end_s - time.monotonic()) > 0:
+        try:
+            with board.open() as rig:
+                position_mm = getattr(rig.instruments, "position_mm", None)
+                length_s = None if left_s == math.inf else left_s
+                uno = Uno(rig.transport, rig.clock)
+                pilot.fly(uno, rig.clock, tell, length_s, begin, position_mm, came_back)
+            return
+        except GONE as error:
+            if isinstance(error.__cause__, KeyboardInterrupt) or not pilot.is_watched():
+                raise
+            if str(error) != told:
+                told = str(error)
+                say(f"{error}\nwaiting for the Uno, since a page is open; when it is back, it stands (Ctrl-C ends)")
+            begin, came_back = later, "the Uno was gone, and is back; it does not walk by itself"
+            time.sleep(RETRY_S)

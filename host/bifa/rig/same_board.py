@@ -1,0 +1,40 @@
+"""A port that is opened again and again, and each time only for the board that was there at first."""
+
+from collections.abc import Callable
+from typing import Any
+
+from bifa.rig.ports import serial_ports
+from bifa.rig.rig import RigError, open_rig
+
+
+class SameBoard:
+    """`open()` gives the rig at `port`; later only that of the same board, by the serial number of its USB chip,
+    wherever it is plugged in then. `serial_number` is None where the board has none: many copies do not."""
+
+    def __init__(self, port: str | None, open_port: Callable[..., Any] = open_rig) -> None:
+        self._port, self._open_port = port, open_port
+        self._was_there = False
+        self.serial_number: str | None = None
+
+    def open(self) -> Any:
+        """A Rig. Raises RigError or PortGoneError where that board is not plugged in; another is not even opened."""
+        if self._was_there:
+            return self._open_port(_port_of(self.serial_number) if self.serial_number else self._port)
+        self.serial_number = _serial_number_at(self._port)
+        rig = self._open_port(self._port)
+        self._was_there = True
+        return rig
+
+
+def _serial_number_at(port: str | None) -> str | None:
+    """Of the board behind `port`, or of the one Uno there is; None where it has none."""
+    unos = [one for one in serial_ports() if (one.device == port if port is not None else one.board)]
+    return unos[0].serial_number if len(unos) == 1 else None
+
+
+def _port_of(serial_number: str) -> str:
+    for port in serial_ports():
+        if port.serial_number == serial_number:
+            return port.device
+    others = ", ".join(f"{port.device} ({port.description})" for port in serial_ports()) or "none"
+    raise RigError(f"the Uno with serial number {serial_number} is not plugged in (USB serial ports: {others})")
