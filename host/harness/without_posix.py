@@ -41,8 +41,13 @@ def _fsync(number: int) -> None:
     os.fsync(number)
 
 
+def _locking(number: int, mode: int, size: int) -> None:
+    fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
 _signals = {name for name in vars(signal) if name.startswith("SIG") and name[3] != "_"}
 SEEN = {
+    "msvcrt": _Seen(ModuleType("msvcrt"), set(), LK_NBLCK=2, locking=_locking),
     "os": _Seen(os, set(_OF_OS.split()), name="nt", fsync=_fsync),
     "select": _Seen(select, {"poll", "epoll"}),
     "signal": _Seen(signal, _signals - _SIGNALS, SIGBREAK=signal.SIGUSR1),

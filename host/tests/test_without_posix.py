@@ -13,7 +13,16 @@ from bifa.data import Dataset, write_dataset
 from bifa.rig import check_port
 
 HOST = Path(__file__).resolve().parent.parent
-ROOMS = ["test_files.py", "data/test_data_read.py", "data/test_data_write.py", "robot", "measure", "live", "campaign"]
+ROOMS = [
+    "test_files.py",
+    "test_lock.py",
+    "data/test_data_read.py",
+    "data/test_data_write.py",
+    "robot",
+    "measure",
+    "live",
+    "campaign",
+]
 
 
 @pytest.fixture
