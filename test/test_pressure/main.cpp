@@ -31,6 +31,7 @@ void test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it() 
   TEST_ASSERT_INT16_WITHIN(1, 18731, last);
 }
 
+#ifndef __AVR__  // whose double has 24 bits
 // Against the formulas in the datasheets, in floating point.
 void test_pressures_are_the_nearest_thousandths_of_a_psi() {
   for (uint16_t sum = 0; sum <= 1023 * 8; ++sum) {
@@ -43,6 +44,7 @@ void test_pressures_are_the_nearest_thousandths_of_a_psi() {
   }
   TEST_ASSERT_EQUAL_INT16(INT16_MAX, bifa::monitor_mpsi(412));
 }
+#endif
 
 void test_range_of_a_sensor_that_works_is_its_diagnostic_band() {
   TEST_ASSERT_FALSE(bifa::is_in_range(0));
@@ -175,7 +177,9 @@ void test_last_second_knows_nothing_before_the_first_sample() {
 void run() {
   RUN_TEST(test_sensor_spans_15_psi_either_way_from_10_to_90_percent_of_the_supply);
   RUN_TEST(test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it);
+#ifndef __AVR__
   RUN_TEST(test_pressures_are_the_nearest_thousandths_of_a_psi);
+#endif
   RUN_TEST(test_range_of_a_sensor_that_works_is_its_diagnostic_band);
   RUN_TEST(test_monitor_of_the_regulator_is_0_to_130_psi_at_1_to_5_volts);
   RUN_TEST(test_zero_offsets_beyond_the_sensor_s_error_band_are_no_offsets);
