@@ -18,6 +18,7 @@ _WHERE = {  # imported when first asked for: who wants one class need not wait f
     "CandidateExperiment": ("lacuna.system", "CandidateExperiment"),
     "diagnose": ("lacuna.run", "diagnose"),
     "Verdict": ("lacuna.verdict", "Verdict"),
+    "load": ("lacuna.verdict", "load"),
     "windows": ("lacuna.records", "windows"),
     "segments": ("lacuna.records", "segments"),
     "Policy": ("lacuna.diagnosis.policy", "Policy"),

@@ -134,6 +134,7 @@ class FunctionSystem(System):
         self._sensor_noise, self._accuracy = dict(sensor_noise or {}), dict(accuracy or {})
         self.estimates_noise_time = noise_time_s == ESTIMATED
         self._noise_time_s = 0.0 if self.estimates_noise_time else noise_time_s
+        self._test: tuple[str, ...] = ()
         self._raised: dict[tuple[str, str], float] = {}
         self._sites = {site.name: site for site in sites}
         if isinstance(spare, str):
@@ -165,6 +166,12 @@ class FunctionSystem(System):
         """The same system, with lower bounds on its noise floors, by experiment and output."""
         other = copy(self)
         other._raised = dict(least)
+        return other
+
+    def with_test(self, names: Iterable[str]) -> FunctionSystem:
+        """The same system, the records of these names as the test."""
+        other = copy(self)
+        other._test = tuple(names)
         return other
 
     def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
@@ -320,6 +327,9 @@ class FunctionSystem(System):
         if self._spare is None:
             return middle_conditions(self.trials)
         return tuple({(t.experiment, t.condition) for t in self.trials if t.condition in self._spare})
+
+    def test(self) -> tuple[str, ...]:
+        return self._test
 
     @property
     def correction_sites(self) -> Mapping[str, CorrectionSite]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -25,12 +26,16 @@ from lacuna.records import Table, read, stretched
 from lacuna.system import Record, System
 from lacuna.verdict import Verdict
 
+_log = logging.getLogger("lacuna")
+
 
 def diagnose(
     system: System,
     records: Any = None,
     *,
     seed: int = 0,
+    random_state: int | np.random.Generator | None = None,
+    test: Iterable[str] = (),
     starts: int = 1,
     n_jobs: int | None = None,
     executor: Executor | None = None,
@@ -40,19 +45,30 @@ def diagnose(
     """What the model of `system` lacks, judged by `records`.
 
     `records`: arrays, pandas, xarray, a folder of CSV (see `lacuna.records.read`), or None for a system that already
-    has trials. `seed`: the same seed gives the same verdict. `starts`: number of initial points of the base model's
-    fit. `n_jobs`: number of processes that try explanations, -1 for one per core; by default one process with a thread
-    per core, which suits a `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any
-    from `concurrent.futures`, or dask's. `progress`: a function called with a description of each step, or False for
-    silence.
+    has trials. `seed`: the same seed gives the same verdict; `random_state`: the same under the name that scikit-learn
+    has for it, or a generator that draws one. `test`: names of records that are to choose nothing and to be the test;
+    by default some of each condition. `starts`: number of initial points of the base model's fit. `n_jobs`: number of
+    processes that try explanations, -1 for one per core; by default one process with a thread per core, which suits a
+    `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any from `concurrent.futures`,
+    or dask's. `progress`: a function called with a description of each step, or False for silence; the steps are
+    logged, too (`logging`, "lacuna").
 
     Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
     before the search, naming trial and channel.
     """
     if records is not None:
         system = with_records(system, records)
+    if names := tuple(test):
+        system = _tested_on(system, names)
+    if random_state is not None:
+        seed = random_state if isinstance(random_state, int) else int(random_state.integers(2**32))
     told = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
-    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "progress": told}
+
+    def say(what: str) -> None:
+        _log.info("%s: %s", system.name, what)
+        told(what)
+
+    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "progress": say}
     try:
         with _workers(n_jobs, executor) as workers:
 
@@ -70,7 +86,20 @@ def diagnose(
     finally:
         if isinstance(told, Progress):
             told.end()
-    return Verdict(system, found)
+    verdict = Verdict(system, found)
+    _log.info("%s: %r", system.name, verdict)
+    return verdict
+
+
+def _tested_on(system: System, names: tuple[str, ...]) -> System:
+    """`system` with these of its trials as the test."""
+    known = {trial.name for trial in system.trials}
+    for name in names:
+        if name not in known:
+            raise MisuseError(f"test names {name!r}, which no record is called; there are {', '.join(sorted(known))}.")
+    if not isinstance(system, FunctionSystem):
+        raise MisuseError(f"test: of {type(system).__name__} the split is its own.")
+    return system.with_test(names)
 
 
 def _cautioned(

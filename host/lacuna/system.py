@@ -317,6 +317,10 @@ class System(Protocol):
         them. Choose conditions between others, so that the fitted ones still determine every parameter."""
         return ()
 
+    def test(self) -> Collection[str]:
+        """Names of the trials that inform no choice and are the test. Empty: some of each condition."""
+        return ()
+
     def accuracy(self, experiment: str, channel: str) -> float:
         """RMS error, in the channel's unit, up to which a prediction is good enough whatever the noise is. 0: only the
         noise counts."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -68,8 +70,8 @@ class Verdict:
     `nuisances`: by record, what was fitted to each. For a system of a function these three are fitted to every record,
     once the errors are known.
 
-    `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws. `record` is all of it in plain types
-    for JSON, `diagnosis` the engine's complete result.
+    `print(verdict)` shows a screen of text, `report` writes a page, `plot` draws, `to_frame` makes tables of it, `save`
+    keeps it (`lacuna.load`). `record` is all of it in plain types for JSON, `diagnosis` the engine's complete result.
     """
 
     def __init__(self, system: System, diagnosis: Diagnosis):
@@ -106,11 +108,76 @@ class Verdict:
         unfinished.replace(path)
         return path
 
+    def to_frame(self, what: str = "parameters") -> Any:
+        """A pandas DataFrame: the `parameters` of the completed model with their 90 % intervals, or the explanations
+        `compared`: by how much log-likelihood each is worse than the chosen one where nothing was fitted, the standard
+        error of that, and its weight. Raises MisuseError for another word."""
+        return _frame(self.record, self.theta, what)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the verdict as JSON, to be read again with `lacuna.load`; return its path. The completed model is a
+        function of yours with the values in `theta`."""
+        path = Path(path)
+        kept = {"system": self.system.name, "record": self.record, "theta": dict(self.theta), "text": str(self)}
+        unfinished = path.with_name(path.name + ".unfinished")
+        unfinished.write_text(json.dumps(kept, indent=1), encoding="utf-8")
+        unfinished.replace(path)
+        return path
+
     def plot(self) -> Any:
         """A Matplotlib figure: error before and after, what was tried, and the worst predicted held-out records."""
         from lacuna.report.overview import overview
 
         return overview(self.record, self.diagnosis)
+
+
+class SavedVerdict:
+    """What `Verdict.save` kept: `verdict`, `record`, `theta`, `warnings`, `error`, and the screen of text."""
+
+    def __init__(self, kept: Mapping[str, Any]):
+        self.record, self.theta, self._text = kept["record"], Values(kept["theta"]), kept["text"]
+        self.verdict, self.warnings = self.record["verdict"], tuple(self.record["warnings"])
+        error = self.record["error"]
+        sides = (("before", "before"), ("after", "after"), ("floor", "noise_floor"))
+        self.error = {name: error[side]["held_out"] for name, side in sides}
+
+    def __str__(self) -> str:
+        return str(self._text)
+
+    def __repr__(self) -> str:
+        return f"<{', '.join([self.verdict, *(e['name'] for e in self.record['effects'])])}>"
+
+    def to_frame(self, what: str = "parameters") -> Any:
+        """As `Verdict.to_frame`."""
+        return _frame(self.record, self.theta, what)
+
+
+def load(path: str | Path) -> SavedVerdict:
+    """A verdict as `Verdict.save` wrote it. Raises MisuseError where the file is none."""
+    try:
+        kept = json.loads(Path(path).read_text(encoding="utf-8"))
+        return SavedVerdict(kept)
+    except (ValueError, KeyError, TypeError) as error:
+        raise MisuseError(f"{path} is no verdict that `Verdict.save` wrote.") from error
+
+
+def _frame(record: Mapping[str, Any], theta: Mapping[str, float], what: str) -> Any:
+    import pandas
+
+    if what == "compared":
+        rows = [one | {"effects": " + ".join(one["effects"]) or "base model"} for one in record["compared"]]
+        return pandas.DataFrame(rows, columns=["effects", "worse_by", "standard_error", "weight"])
+    if what != "parameters":
+        raise MisuseError(f'to_frame makes "parameters" or "compared", not {what!r}.')
+    known = {name: one["interval_90"] for name, one in record["base_parameters"].items()}
+    for effect in record["effects"]:
+        known |= {f"{effect['name']}.{name}": ends for name, ends in effect["interval_90"].items()}
+    rows = [
+        {"parameter": name, "value": value, "lower_90": ends[0], "upper_90": ends[1]}
+        for name, value in theta.items()
+        for ends in [known.get(name, (math.nan, math.nan))]
+    ]
+    return pandas.DataFrame(rows, columns=["parameter", "value", "lower_90", "upper_90"]).set_index("parameter")
 
 
 def _nuisances(fitted: Fit) -> dict[str, dict[str, float]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,13 +26,23 @@ _FEWEST = 3  # conditions that tell what differs between conditions; of fewer th
 Judgement = Callable[[Candidate, Candidate], bool]
 
 
+class Compared(NamedTuple):
+    """An explanation beside the chosen one. `worse_by`: log-likelihood in all of the trials that neither was fitted to,
+    and `standard_error` of that, by how it differs from condition to condition."""
+
+    effects: tuple[str, ...]
+    worse_by: float
+    standard_error: float
+    weight: float
+
+
 @dataclass(frozen=True)
 class Choice:
     """The chosen explanation, the base if nothing is worth adding.
 
     `freed`: the same effects in a form of their own, if that explains more; `confusable_with`: by effect, those that it
     could be exchanged for; `probability`: of each effect or what it could be exchanged for, against every set that is
-    no larger; `weights`: of every explanation compared, by its effects.
+    no larger; `weights`: of every explanation compared, by its effects; `compared`: these, the best first.
     """
 
     candidate: Candidate
@@ -39,6 +50,7 @@ class Choice:
     probability: dict[str, float]
     confusable_with: dict[str, tuple[str, ...]]
     weights: dict[tuple[str, ...], float]
+    compared: tuple[Compared, ...] = ()
 
     @property
     def explanation(self) -> Candidate:
@@ -201,7 +213,19 @@ def weigh(search: Search, chosen: Candidate, policy: Policy) -> Choice:
         e: tuple(dict.fromkeys(f for effects in rivals if e not in effects for f in effects if f not in chosen.effects))
         for e in chosen.effects
     }
-    return Choice(chosen, search.freed_form(chosen), probability, confusable, weights)
+    return Choice(chosen, search.freed_form(chosen), probability, confusable, weights, _beside(compared, weights))
+
+
+def _beside(compared: Sequence[Candidate], weights: dict[tuple[str, ...], float]) -> tuple[Compared, ...]:
+    """Every explanation beside the first."""
+    costs = _by_condition(compared, "unseen_by_trial")
+    apart, count = costs - costs[0], costs.shape[1]
+    errors = np.sqrt(count) * apart.std(axis=1, ddof=1) if count > 1 else np.full(len(apart), np.nan)
+    found = (
+        Compared(c.effects, float(one.sum()), float(error), weights[c.effects])
+        for c, one, error in zip(compared, apart, errors, strict=True)
+    )
+    return tuple(sorted(found, key=lambda one: one.worse_by))
 
 
 def _compared(search: Search, chosen: Candidate) -> list[Candidate]:

@@ -107,7 +107,7 @@ def diagnose(
     with the best so far. Raises MisuseError before the search where the system or its trials would mislead it."""
     began = time.monotonic()
     cautions = check(system)
-    split = split_trials(system.trials, system.spare())
+    split = split_trials(system.trials, system.spare(), system.test())
     if not split.fit or not split.judging:
         raise TooLittleDataError(
             "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."

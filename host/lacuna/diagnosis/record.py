@@ -54,6 +54,15 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
             "text": d.signature.text,
         },
         "learnt": [_curve(site, learnt) for site, learnt in d.learnt],
+        "compared": [
+            {
+                "effects": list(c.effects),
+                "worse_by": _number(c.worse_by),
+                "standard_error": _number(c.standard_error),
+                "weight": _number(c.weight),
+            }
+            for c in d.choice.compared
+        ],
         "tried": [
             {"effects": list(c.effects), "error": _number(c.rms)}
             for c in sorted(d.search.tried, key=lambda c: c.cost)[:_TRIED]

@@ -48,8 +48,11 @@ class Split:
         return tuple(t for t in self.final if t.name not in names)
 
 
-def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = ()) -> Split:
-    """Split by whole trials; deterministic.
+def split_trials(
+    trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = (), test: Collection[str] = ()
+) -> Split:
+    """Split by whole trials; deterministic. `test`: names of the trials that are `final`, if the person says which;
+    what would be otherwise selects then.
 
     `spare`: (experiment, condition) of those that are never fitted: the last repeat of each is `final`, the others are
     `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, which
@@ -58,7 +61,7 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
     `final` if nothing else could judge, or if it alone has a channel.
     """
     groups: dict[tuple[str, Hashable], list[Record]] = defaultdict(list)
-    for trial in trials:
+    for trial in (t for t in trials if t.name not in test):
         groups[trial.experiment, trial.condition].append(trial)
     left_out = set(spare)
     parts: dict[str, list[Record]] = {"fit": [], "select": [], "unseen": [], "final": []}
@@ -83,6 +86,9 @@ def split_trials(trials: Sequence[Record], spare: Collection[tuple[str, Hashable
     for place, trial in enumerate(singles):
         role = "final" if place % 5 == 4 else "select" if place % 5 == 2 else "fit"
         parts[role].append(trial)
+    if test:
+        parts["select"] += parts["final"]
+        parts["final"] = [t for t in trials if t.name in test]
     known = {key for role in ("fit", "select", "unseen") for trial in parts[role] for key in _channels(trial)}
     alone = [trial for trial in parts["final"] if not _channels(trial) <= known]
     if not (parts["select"] or parts["unseen"] or alone):

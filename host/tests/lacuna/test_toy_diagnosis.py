@@ -136,8 +136,10 @@ def test_record_has_the_agreed_form():
         "experiments",
         "depends_on",
         "learnt",
+        "cannot_tell",
         "text",
     }
+    assert {"effects", "worse_by", "standard_error", "weight"} == set(record["compared"][0])
 
 
 def test_too_little_data_is_refused():

@@ -1,0 +1,96 @@
+"""A verdict as it is handed on: tables, a file, a log; and what a person may say of the test."""
+
+import json
+import logging
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna.diagnosis.split import split_trials
+from lacuna.system import Record
+
+LAG = {"sensor_lag__lag_s": 3.0}
+
+
+@pytest.fixture(scope="module")
+def verdict():
+    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), progress=False)
+
+
+def test_parameters_come_as_a_table_with_their_intervals(verdict):
+    pytest.importorskip("pandas")
+    frame = verdict.to_frame()
+    assert list(frame.index) == list(verdict.theta)
+    lag = frame.loc["sensor_lag.lag_s"]
+    assert lag["lower_90"] < lag["value"] < lag["upper_90"]
+    assert frame.notna().all(axis=None)
+
+
+def test_explanations_are_compared_with_differences_and_their_standard_errors(verdict):
+    pytest.importorskip("pandas")
+    frame = verdict.to_frame("compared").set_index("effects")
+    assert frame.loc["sensor_lag", "worse_by"] == frame.loc["sensor_lag", "standard_error"] == 0.0
+    assert frame.loc["base model", "worse_by"] > 2 * frame.loc["base model", "standard_error"] > 0.0
+    assert frame["weight"].sum() == pytest.approx(1.0, abs=1e-3)
+    with pytest.raises(lacuna.LacunaError, match='"parameters" or "compared"'):
+        verdict.to_frame("all")
+
+
+def test_a_verdict_is_saved_and_loaded(verdict, tmp_path):
+    path = verdict.save(tmp_path / "verdict.json")
+    again = lacuna.load(path)
+    assert str(again) == str(verdict)
+    assert (again.verdict, again.warnings, again.theta) == (verdict.verdict, verdict.warnings, verdict.theta)
+    assert again.theta.sensor_lag.lag_s == verdict.theta.sensor_lag.lag_s
+    assert again.error == pytest.approx(verdict.error, rel=1e-5)
+    assert repr(again) == "<identified, sensor_lag>"
+    assert [file.name for file in tmp_path.iterdir()] == ["verdict.json"]
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", json.dumps({"record": {}, "theta": {}, "text": ""})])
+def test_what_is_no_verdict_is_refused(text, tmp_path):
+    (tmp_path / "no.json").write_text(text)
+    with pytest.raises(lacuna.LacunaError, match="is no verdict"):
+        lacuna.load(tmp_path / "no.json")
+
+
+def test_what_is_done_is_logged(caplog):
+    caplog.set_level(logging.INFO, "lacuna")
+    lacuna.diagnose(heater.system(), heater.records(seed=2, repeats=2), progress=False)
+    said = [one.getMessage() for one in caplog.records]
+    assert any("fitting the base model" in one for one in said)
+    assert "<none" in said[-1]
+
+
+def test_a_random_state_is_a_seed(monkeypatch):
+    seeds = []
+
+    def seen(system, **how):
+        seeds.append(how["seed"])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lacuna.run.engine.diagnose", seen)
+    given = [{"seed": 3}, {"random_state": 3}, {"random_state": np.random.default_rng(0)}]
+    for how in (*given, given[-1] | {"random_state": np.random.default_rng(0)}):
+        with pytest.raises(KeyboardInterrupt):
+            lacuna.diagnose(heater.system(), heater.records(repeats=2), progress=False, **how)
+    assert seeds[0] == seeds[1] == 3
+    assert seeds[2] == seeds[3]
+
+
+def test_a_person_says_which_records_are_the_test():
+    t = np.linspace(0.0, 1.0, 20)
+    trials = [Record(f"{c}{k}", "run", c, t, {"y": t}) for c in "ab" for k in range(3)]
+    split = split_trials(trials, (), ("a0", "b2"))
+    assert [t.name for t in split.final] == ["a0", "b2"]
+    assert not {t.name for t in split.known + split.unseen} & {"a0", "b2"}
+    assert len(split.fit + split.judging + split.final) == 6
+    given = heater.records(seed=1, repeats=3, **LAG)
+    found = lacuna.diagnose(heater.system(), given, test=["steps_4W_2", "sweep_10W_3"], progress=False)
+    assert [e.name for e in found.effects] == ["sensor_lag"]
+    held_out = found.record["held_out"]
+    assert {*held_out["repeats"], *held_out["conditions"]} == {"steps_4W_2", "sweep_10W_3"}
+    with pytest.raises(lacuna.LacunaError, match="no record is called"):
+        lacuna.diagnose(heater.system(), given, test=["steps_5W_1"], progress=False)
