@@ -22,7 +22,7 @@ from bifa.cli import app
 ROOT = Path(__file__).resolve().parents[3]
 HOST = ROOT / "host"
 LINES = command_lines(ROOT)
-PLACEHOLDERS = {"METHOD": "de", "NAME": "turkish", "COMMAND": "gaits", "FOLDER": "folder"}
+PLACEHOLDERS = {"METHOD": "de", "NAME": "turkish", "COMMAND": "gaits", "FOLDER": "folder", "FILE": "file.csv"}
 MAKEFILE = (ROOT / "Makefile").read_text("utf-8")
 
 # The tests that run a command with a robot, a board or data of their own.
@@ -38,6 +38,7 @@ RUN_BY = {
     "fit": "packaging/test_wheels.py",
     "flash": "toolchain/test_carried_image.py",
     "gaits": "gait/test_gait_cli.py",
+    "instrument": "measure/test_propose.py",
     "monitor": "link/test_monitor_and_record.py",
     "optimize": "gait/test_gait_cli.py",
     "record": "link/test_monitor_and_record.py",
@@ -103,6 +104,7 @@ def bifa_line(line: CommandLine, lay_out) -> None:
 @pytest.mark.parametrize("name", sorted({line.arguments[0] for line in LINES if line.program == "bifa"}))
 def test_some_test_runs_the_command(name):
     if name not in PLACEHOLDERS and not name.startswith("-"):
+        assert name in RUN_BY, "say above which tests run it"
         assert f'"{name}"' in (HOST / "tests" / RUN_BY[name]).read_text("utf-8")
 
 
@@ -157,6 +159,8 @@ def python_line(line: CommandLine, monkeypatch) -> None:
     else:
         (source,) = (folder / words[0] for folder in (ROOT, HOST) if (folder / words[0]).is_file())
         rest = words[1:]
+    if rest == ["--help"]:
+        return
     if "argparse" not in source.read_text("utf-8"):
         assert not any(word.startswith("-") for word in rest), f"{source} has no options"
         return
