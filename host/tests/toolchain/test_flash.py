@@ -100,6 +100,7 @@ def test_usb_identities_sort_originals_first(monkeypatch):
     class Found:
         def __init__(self, device, vid, pid):
             self.device, self.vid, self.pid, self.description = device, vid, pid, "n/a"
+            self.serial_number = None
 
     found = [Found("b", 0x1A86, 0x7523), Found("c", 0x1234, 1), Found("a", 0x2A03, 0x0043), Found("s", None, None)]
     monkeypatch.setattr(ports.list_ports, "comports", lambda: found)
