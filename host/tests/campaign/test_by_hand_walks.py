@@ -71,7 +71,7 @@ def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, mon
 
     monkeypatch.setattr(loop, "_diagnosed", diagnosed)
     monkeypatch.setattr(loop, "completed_model", lambda final: final)
-    monkeypatch.setattr(loop, "_gait_of", lambda robot, bench, part: (FASTER, {}))
+    monkeypatch.setattr(loop, "_gait_of", lambda *_: (FASTER, {}))
 
     first = []
     with pytest.raises(KeyboardInterrupt):
