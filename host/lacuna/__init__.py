@@ -5,7 +5,7 @@ verdict = lacuna.diagnose(system, records)
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lacuna.version import __version__
 
@@ -25,6 +25,23 @@ _WHERE = {  # imported when first asked for: who wants one class need not wait f
     "LacunaError": ("lacuna.errors", "LacunaError"),
 }
 __all__ = ["__version__", *_WHERE]
+
+if TYPE_CHECKING:  # the same, for those who read types
+    from lacuna.diagnosis.policy import Policy as Policy
+    from lacuna.errors import LacunaError as LacunaError
+    from lacuna.function_system import FunctionSystem
+    from lacuna.records import segments as segments
+    from lacuna.records import windows as windows
+    from lacuna.run import diagnose as diagnose
+    from lacuna.system import CandidateExperiment as CandidateExperiment
+    from lacuna.system import CorrectionSite as CorrectionSite
+    from lacuna.system import Effect as Effect
+    from lacuna.system import Parameter as Parameter
+    from lacuna.system import Record as Record
+    from lacuna.verdict import Verdict as Verdict
+    from lacuna.verdict import load as load
+
+    System = FunctionSystem
 
 
 def __getattr__(name: str) -> Any:
