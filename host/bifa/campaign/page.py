@@ -234,20 +234,18 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> Section:
     """How well gaits were predicted that no fit had seen, round by round, and why the last round is the last."""
     rows = [
         [
-            str(number),
-            "what is known" if one["at_edge"] else "2 %",
-            f"{one['predicted_mm_s']:.2f}",
-            _interval(one),
+            f"{number}, edge" if one["at_edge"] else str(number),
+            f"{one['predicted_mm_s']:.2f} {_interval(one)}",
             f"{one['measured_mm_s']:.2f}{NBSP}±{NBSP}{one['spread_mm_s']:.2f}{'' if one['inside'] else ' (outside)'}",
             plain(one["error_mm"]),
             "" if one["floor_mm"] is None else plain(one["floor_mm"]),
         ]
         for number, one in enumerate(rounds, 1)
     ]
-    columns = ["round", "margin", "predicted, mm/s", "90 % interval; walks", "measured, mm/s"]
-    columns += ["RMS error, mm", "noise floor, mm"]
+    columns = ["round", "predicted, mm/s", "measured, mm/s", "RMS error, mm", "noise floor, mm"]
     caption = (
-        "Each gait as predicted by the model of its round: its speed, and the positions of head and tail over the walk."
+        "Each gait as predicted by the model of its round: its speed, its 90 % interval and the probability "
+        "of walking, and the positions of head and tail over the walk."
     )
     said = [
         "A model is judged by its prediction of a gait that no fit has seen. Round 1 is the gait found with the "
@@ -271,21 +269,19 @@ def speed_table(gaits: Sequence[Mapping[str, Any]]) -> Table:
         [
             _STAND_IN.format(gait["gait"]) if gait.get("stand_in") else _NAMES[gait["gait"]],
             f"{gait['base_model']:.2f}",
-            f"{gait['completed_model']:.2f}",
-            _interval(gait),
+            f"{gait['completed_model']:.2f} {_interval(gait)}",
             f"{gait['measured']:.2f}{NBSP}±{NBSP}{gait['spread']:.2f}",
             f"{gait['paper']:.1f}",
         ]
         for gait in gaits
     ]
-    columns = ["gait, speed in mm/s", "base model predicts", "completed model predicts", "90 % interval; walks"]
-    columns += ["measured", "in the paper"]
+    columns = ["gait, speed in mm/s", "base model predicts", "completed model predicts", "measured", "in the paper"]
     return Table(columns, rows, strong_row=len(rows) - 1)
 
 
 def _interval(prediction: Mapping[str, Any]) -> str:
     low, high = prediction["interval_90_mm_s"]
-    return f"{low:.2f} to {high:.2f}; {prediction['walks_probability']:.2f}"
+    return f"({low:.2f} to {high:.2f}; {prediction['walks_probability']:.2f})"
 
 
 def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = None) -> Table:

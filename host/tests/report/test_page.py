@@ -87,8 +87,8 @@ def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
     section = text_of(html[html.index('id="gaits-that-no-fit-has-seen"') :].split("</section>")[0])
     assert "Round 1: the model has hysteresis added to it, its gait is 2.80 s, head 204° and tail 332° ahead" in section
     assert "Round 2: the model has hysteresis and valve latency added to it, its gait is 2.61 s" in section
-    assert "1 2 % 21.40 21.30 to 21.50; 0.97 20.60 ± 0.01 (outside) 2.31 0.104 " in section
-    assert "2 what is known 20.87 20.77 to 20.97; 0.97 20.88 ± 0.02 0.117" in section
+    assert "1 21.40 (21.30 to 21.50; 0.97) 20.60 ± 0.01 (outside) 2.31 0.104 " in section
+    assert "2, edge 20.87 (20.77 to 20.97; 0.97) 20.88 ± 0.02 0.117" in section
     assert "It ended after round 2: the speed of its gait is predicted to within the scatter of repeats" in section
 
 
