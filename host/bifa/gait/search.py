@@ -12,7 +12,7 @@ from bifa.gait.methods.common import Objective, Recorder
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import Prediction, predict_speed
+from bifa.gait.prediction import FINE_M, Prediction, predict_speed
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
 from bifa.robot.gait import Gait
@@ -266,6 +266,8 @@ def _robustly(
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)
+    # at a cliff the search's own step tells another story than the one that predictions are made with
+    metric = replace(settings.metric, tolerance_m=FINE_M)
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])
     # Only where none of these walks at all by the metric in full: what the method found elsewhere.
     far = explored.finalists(_NOMINAL_FINALISTS, apart=0.02)
@@ -275,7 +277,7 @@ def _robustly(
         for row, speed in zip(rows, _finely(model, runs, rows, settings), strict=True):
             if speed <= 0.0:
                 continue
-            speeds = distribution(runs, checking, row[None], settings.metric)[0]
+            speeds = distribution(runs, checking, row[None], metric)[0]
             if np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE) > 0.5 * speed:
                 return Gait(*row.tolist()), float(speed)
             if speeds.mean() > most:
