@@ -178,6 +178,7 @@ def run(environment: Environment, tests: Sequence[str], *, unity: bool) -> tuple
         suites = subprocess.run([sys.executable, PROJECT / "tools" / "unity_suites.py", "native"], **options).returncode
         text += ", Unity suites " + ("FAILED" if suites else "passed")
         status = status or suites
+    BUILD.mkdir(parents=True, exist_ok=True)
     (BUILD / "ran").touch()  # .ci/run then runs these tests in no other environment
     spent = _processor_s() - begun
     return status, f"portability: {environment.name:12}  {text}, {spent:.0f} s of processor  ({environment.text})"

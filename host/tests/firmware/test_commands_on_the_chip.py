@@ -128,7 +128,7 @@ def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench
 
 def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench):
     uno = connected(bench.board)
-    uno.upload({"period_s": 20.0})
+    uno.upload({"period_s": 20.0, "host_timeout_s": 60.0})  # nobody talks to it for a cycle
     uno.run()
     bench.wait(1.0)
     assert len(bench.valves_on) == 3
