@@ -42,7 +42,7 @@ test: setup
 	test -z "$$failed" || { echo "failed:$$failed" >&2; exit 1; }
 
 bench: setup
-	@cd host && ../$(bin)/python -m bench $(ARGS)
+	@cd host && ../$(bin)/python -m benchmarks $(ARGS)
 
 soak: setup $(stamps)/fuzz
 	@failed=
@@ -59,7 +59,7 @@ portability: setup
 	@$(bin)/python tools/portability.py $(ARGS)
 
 blind: setup
-	@cd host && ../$(bin)/python -m bench.blind $(ARGS)
+	@cd host && ../$(bin)/python -m benchmarks.blind $(ARGS)
 
 # --- Checks ---
 

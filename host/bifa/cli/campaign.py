@@ -45,7 +45,7 @@ def campaign(
 
     On a serial port your own camera and testing machine measure: the campaign says what to mount and start, reads the
     files that they save (as declared: bifa instrument), aligns them with the Uno by the strobe, shows each trial, and
-    repeats it on request: docs/bench.md.
+    repeats it on request: docs/campaign.md.
 
     Every stage can be interrupted and resumed, even days later, and is rerun only when something that it depends on
     has changed. Only the stages that measure need the robot. What you have weighed or measured yourself is declared in

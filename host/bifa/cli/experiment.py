@@ -80,7 +80,7 @@ def experiment(
     Pressures go through the real firmware and link; timed commands are executed on the Uno. The instruments
     have their own clocks, synchronised with the Uno's by its sampling strobe (D10); each trial records how well.
     On a serial port your own instruments measure: you are told what to mount and start, trial by trial, and the
-    file that they save is the record, as it is declared in bench.toml (bifa instrument; docs/bench.md).
+    file that they save is the record, as it is declared in bench.toml (bifa instrument; docs/campaign.md).
     Run the same command again to resume an interrupted session. Ctrl-C leaves the valves off.
     """
     from bifa.files import check_targets

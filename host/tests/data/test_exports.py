@@ -340,7 +340,7 @@ def test_a_data_set_reads_exports_as_they_came(tmp_path):
         read_dataset(tmp_path)
 
 
-@pytest.mark.parametrize("page", ["bench.md", "data-format.md"])
+@pytest.mark.parametrize("page", ["campaign.md", "data-format.md"])
 def test_the_declarations_of_the_pages_are_valid(page):
     text = (Path(__file__).parents[3] / "docs" / page).read_text(encoding="utf-8")
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "[instrument." in block]

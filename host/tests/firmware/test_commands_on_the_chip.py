@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.bench_uno import connected
+from benchmarks.bench_uno import connected
 from bifa.link import frames
 from bifa.link.errors import LinkError, RefusedError
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH

@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from bench.bench_uno import connected
+from benchmarks.bench_uno import connected
 from bifa.link import frames
 from bifa.link.table import COMMANDS, PARAMETERS
 from virtual_robot.uno import CLOCK_HZ

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench import bench_uno, parts, stack_bound
+from benchmarks import bench_uno, parts, stack_bound
 
 pytestmark = pytest.mark.uno
 

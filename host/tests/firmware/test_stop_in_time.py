@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.bench_uno import connected
+from benchmarks.bench_uno import connected
 from bifa.link import frames
 from bifa.link.table import COMMANDS
 from virtual_robot.uno import CLOCK_HZ

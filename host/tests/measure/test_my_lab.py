@@ -1,4 +1,4 @@
-"""The example of docs/bench.md: a lab's own drivers as a rig, found by its entry point, measures."""
+"""The example of docs/campaign.md: a lab's own drivers as a rig, found by its entry point, measures."""
 
 import shutil
 import sys

@@ -5,7 +5,7 @@ import pytest
 from independent_lab import Lab as IndependentLab
 from independent_lab import session
 
-from bench.sealed_campaign import generate
+from benchmarks.sealed_campaign import generate
 from bifa.data import Trial, read_dataset
 from bifa.measure.plan import BRISK, PlannedTrial
 from bifa.mistakes import find_mistakes, mistakes_in

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.bench_simulate import CYCLES, FINE_M, GAITS, SEARCHING_M, SETTLED_CYCLES, reference_error
+from benchmarks.bench_simulate import CYCLES, FINE_M, GAITS, SEARCHING_M, SETTLED_CYCLES, reference_error
 from bifa.gait import library, prediction
 from bifa.robot import nominal
 from bifa.simulate import gait_rows

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from bench.sealed_campaign import generate, main
+from benchmarks.sealed_campaign import generate, main
 from bifa.data import read_dataset
 from bifa.measure.plan import PlannedTrial
 from virtual_robot.instruments.sensors import Noise, measured

@@ -1,0 +1,135 @@
+"""Where the time of a diagnosis goes, by what it says that it does: of the cases of `bench_diagnosis` with one effect
+and with one that nothing explains; and how much of a fit is the compiled kernel.
+
+Processor seconds are of all processes; the clock says something on an idle machine only.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+_CASES = {"diagnosis": "one effect", "diagnosis_unexplained": "nothing explains them"}
+_LIBRARY_WORDS = {"+", "nothing"}
+_LITTLE_S = 0.1
+
+
+@dataclass
+class _Stages:
+    """Clock and processor seconds by stage, in the order in which the stages first began."""
+
+    clock: dict[str, float] = field(default_factory=dict)
+    processor: dict[str, float] = field(default_factory=dict)
+    _now: tuple[str, float, float] | None = None
+
+    def begin(self, stage: str) -> None:
+        now, used = time.perf_counter(), _used()
+        if self._now:
+            before, since, used_before = self._now
+            self.clock[before] = self.clock.get(before, 0.0) + now - since
+            self.processor[before] = self.processor.get(before, 0.0) + used - used_before
+        self._now = stage, now, used
+
+
+def run() -> dict[str, float]:
+    """Print the stages of each diagnosis and the kernel's share of a fit; returns the figures flat."""
+    from benchmarks.bench_diagnosis import CASES, SEED
+
+    drawn = {case.key: case.drawn for case in CASES}
+    figures: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        for key, what in _CASES.items():
+            folder = Path(scratch) / key
+            sealed = ["-m", "virtual_robot.sealed", "--seed", str(SEED), "--out", str(folder), *drawn[key]]
+            subprocess.run([sys.executable, *sealed], check=True)
+            figures |= _told(what, key.replace("diagnosis", "profile"), _diagnosed(folder))
+        share = _kernel_share(Path(scratch) / "diagnosis")
+    print(f"of the base fit's processor time, on one thread, {share:.0%} is the compiled kernel")
+    return figures | {"profile_kernel_share_of_fit": share}
+
+
+def _told(what: str, key: str, stages: _Stages) -> dict[str, float]:
+    """Print a table of stages; its figures, their names beginning with `key`."""
+    print(f"{f'45 trials, {what}':52}{'clock':>8}{'processor':>11}{'cores':>7}")
+    for stage, clock in stages.clock.items():
+        if clock > _LITTLE_S:
+            _print_row(stage, clock, stages.processor[stage])
+    clock, used = sum(stages.clock.values()), sum(stages.processor.values())
+    _print_row("in all, without starting Python", clock, used)
+    print(flush=True)
+    each = {f"{key}_{_word(stage)}_processor_seconds": used for stage, used in stages.processor.items()}
+    return each | {f"{key}_cores_busy": used / clock}
+
+
+def _print_row(stage: str, clock: float, used: float) -> None:
+    print(f"{stage:52}{clock:7.1f}s{used:10.1f}s{used / clock:7.1f}")
+
+
+def _word(stage: str) -> str:
+    return stage.replace(",", "").replace(" ", "_")
+
+
+def _diagnosed(folder: Path) -> _Stages:
+    stages = _Stages()
+    stages.begin("importing and reading")
+    from bifa.data import read_dataset
+    from bifa.identify.start import prepare
+    from lacuna.diagnosis.diagnose import diagnose
+
+    measured = read_dataset(folder)
+    stages.begin("fitting the stiffness curves")
+    system = prepare(measured)
+    words = _LIBRARY_WORDS | set(system.effects) | set(system.correction_sites)
+    diagnose(system, progress=lambda what: stages.begin(_without(what, words)))
+    stages.begin("")
+    return stages
+
+
+def _without(what: str, words: set[str]) -> str:
+    """What is being done, not what it is done to: "refitting hysteresis" is "refitting"."""
+    return " ".join(word for word in what.split() if word not in words and "_" not in word)
+
+
+def _kernel_share(folder: Path) -> float:
+    """Of the processor time of a base fit on one thread, the share that is spent in the compiled kernel."""
+    from bifa.data import read_dataset
+    from bifa.identify.start import prepare
+    from bifa.simulate.lanes.kernel import Kernel
+    from lacuna.estimation.fit import fit_base
+    from lacuna.estimation.problem import use_threads
+
+    system = prepare(read_dataset(folder))
+    inside = 0.0
+    call: Callable = Kernel._call
+
+    def timed(*job) -> None:
+        nonlocal inside
+        began = time.process_time()
+        call(*job)
+        inside += time.process_time() - began
+
+    use_threads(1)
+    Kernel._call = staticmethod(timed)
+    try:
+        began = time.process_time()
+        fit_base(system, system.trials)
+        return inside / (time.process_time() - began)
+    finally:
+        Kernel._call = staticmethod(call)
+        use_threads(None)
+
+
+def _used() -> float:
+    """Processor seconds of this process and of its children that have ended."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,135 @@
+"""Whether the README's story is one that a person can repeat: `bifa demo` with seed after seed, and what it came to.
+
+    python -m benchmarks.demos [--seeds 10] [--first-seed 1000] [--jobs 2] [--out ../out/demos] [--records FILE]
+                               [--print]
+
+Each is a whole campaign through the real firmware on a robot with one undisclosed effect. Campaigns stay in OUT, so
+that an interrupted run goes on where it was; FILE has a line for each, with which it goes on on another machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks import records as lines
+from benchmarks.blind_figures import wilson
+
+SEEDS, FIRST_SEED, JOBS, OUT = 10, 1000, 2, Path("../out/demos")
+_GAIT = "completed"
+
+
+class Story(NamedTuple):
+    """A demo: what the seal held and what was named, errors on trials not fitted in units of the noise, and of the
+    gait found with the completed model the speeds predicted and measured."""
+
+    seed: int
+    truth: tuple[str, ...]
+    verdict: str
+    named: tuple[str, ...]
+    before: float
+    after: float
+    floor: float
+    predicted_mm_s: float
+    measured_mm_s: float
+
+    @property
+    def right(self) -> bool:
+        """Whether what the seal held is what was named first."""
+        return self.named[:1] == self.truth[:1]
+
+
+def told(seed: int, out: Path) -> Story:
+    """Run the demo, or what is left of it to run."""
+    folder = out / str(seed)
+    folder.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-m", "bifa", "demo", "--seed", str(seed), "--out", str(folder / "demo")]
+    with (folder / "printed.txt").open("w") as printed:
+        subprocess.run(command, check=True, stdout=printed, stderr=subprocess.STDOUT)
+    return story(seed, json.loads((folder / "demo" / "summary.json").read_text()))
+
+
+def story(seed: int, summary: dict) -> Story:
+    """From a demo's `summary.json`."""
+    gait = next(one for one in summary["gaits"] if one["gait"] == _GAIT)
+    error = {name: summary["error"][name]["held_out"] for name in ("before", "after", "noise_floor")}
+    return Story(
+        seed,
+        tuple(summary["truth"]),
+        summary["verdict"],
+        tuple(effect["name"] for effect in summary["effects"]),
+        *error.values(),
+        gait["completed_model"],
+        gait["measured"],
+    )
+
+
+HEADING = f"{'seed':6}{'sealed':22}{'named':34}{'before':>8}{'after':>7}{'floor':>7}{'predicted':>11}{'measured':>10}"
+
+
+def row(one: Story) -> str:
+    """A line of the table under `HEADING`."""
+    sealed, named = " + ".join(one.truth), " + ".join(one.named) or one.verdict
+    errors = f"{one.before:8.2f}{one.after:7.2f}{one.floor:7.2f}"
+    return f"{one.seed:<6}{sealed:22}{named:34}{errors}{one.predicted_mm_s:11.2f}{one.measured_mm_s:10.2f}"
+
+
+def summed_up(stories: Sequence[Story]) -> dict[str, float]:
+    """How many were right; printed and returned."""
+    right = sum(one.right for one in stories)
+    low, high = wilson(right, len(stories))
+    print(f"named first what the seal held: {right} of {len(stories)} [{low:.2f}, {high:.2f}]")
+    return {"demos": len(stories), "demos_right": right}
+
+
+def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:
+    """Print the table, a line as each demo ends; returns the figures flat."""
+    known = _known(kept) if kept else {}
+    print(HEADING)
+    stories = []
+    with ThreadPoolExecutor(jobs) as pool:
+        for one in pool.map(lambda seed: _story_of(known[seed]) if seed in known else told(seed, out), seeds):
+            stories.append(one)
+            print(row(one), flush=True)
+            if kept:
+                known[one.seed] = one._asdict()
+                lines.write(kept, known.values())
+    return summed_up(stories)
+
+
+def _known(kept: Path) -> dict[int, dict]:
+    return lines.read(kept, lambda record: record["seed"])
+
+
+def _story_of(record: dict) -> Story:
+    return Story(**record | {name: tuple(record[name]) for name in ("truth", "named")})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.demos", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--jobs", type=int, default=JOBS, help="at once, which share the cores")
+    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--records", type=Path, help="a line of JSON a demo; read first, and kept up to date")
+    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    options = parser.parse_args()
+    if options.print and not options.records:
+        parser.error("--print says what is in a file of records: add --records FILE")
+    if options.print:
+        run(sorted(_known(options.records)), options.out, 1, options.records)
+    else:
+        seeds = range(options.first_seed, options.first_seed + options.seeds)
+        run(seeds, options.out, options.jobs, options.records)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,274 @@
+"""What a completed model buys: gaits at the edge of what is known, found with the base and the completed model, walked.
+
+    python -m benchmarks.loop [--effects hysteresis,leak] [--seeds 3] [--first-seed 200] [--out ../out/loop]
+                              [--records FILE] [--print] [--plot PNG]
+
+For each effect of the library at its full size and each seed, a whole campaign through the real firmware, profile
+`realistic`, as `bifa campaign` runs it: another specimen of the robot, other noise. Five gaits are walked: the paper's
+baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and of all that is
+known of it (fair: its remainder is large, and so its margin); with the completed model, robust against 2 % (what
+campaigns did before) and at the edge. Each has the interval and the probability of walking that its model foretold.
+Campaigns stay in OUT, so that an interrupted run goes on where it was; FILE has a line for each, with which it goes on
+on another machine. A run "walks" if it advances by at least four fifths of what was foretold, and by 1 mm/s.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+import numpy as np
+
+from benchmarks import records as lines
+from bifa.campaign.bench import Bench
+from bifa.campaign.loop import EDGE_CYCLES, Effort, campaign, found_gait
+from bifa.campaign.stages import Stage, run_stages
+from bifa.campaign.walks import foretold, measure_walks, speeds
+from bifa.data import read_dataset
+from bifa.gait import SearchError
+from bifa.gait.prediction import FELL
+from bifa.gait.settling import STANDING_MM_S
+from bifa.robot import load_model
+from bifa.robot.gait import BASELINE, Gait, save_gait
+from virtual_robot.effects import EFFECTS, LIBRARY
+
+SEEDS, FIRST_SEED, OUT = 3, 200, Path("../out/loop")
+GAITS = ("baseline", "naive", "fair", "robust", "edge")
+_TITLES = ("baseline", "base, naive", "base, fair", "completed, 2 %", "completed, edge")
+_STAGE = 60  # the first of the rig's numbers for the walks of this table
+_LEVELS = (0.8, 0.9, 0.95)
+
+
+@dataclass(frozen=True)
+class Walked:
+    """One gait: foretold speed, its intervals by level, the probability of walking; the speeds of its runs."""
+
+    predicted_mm_s: float
+    intervals_mm_s: dict[str, tuple[float, float]]
+    walks_probability: float
+    runs_mm_s: tuple[float, ...]
+
+    @property
+    def walks(self) -> tuple[bool, ...]:
+        """Which runs walk."""
+        least = max(FELL * self.predicted_mm_s, STANDING_MM_S)
+        return tuple(speed >= least for speed in self.runs_mm_s)
+
+    def holds(self, level: float) -> list[bool]:
+        """Of the runs that walk, which lie in the interval."""
+        low, high = self.intervals_mm_s[str(level)]
+        return [low <= v <= high for v, walks in zip(self.runs_mm_s, self.walks, strict=True) if walks]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """One robot: what was named, and its gaits by name."""
+
+    effect: str
+    seed: int
+    named: tuple[str, ...]
+    gaits: dict[str, Walked]
+
+
+def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) -> Gain:
+    """Run the campaign on the robot with `effect` at its full size, or what is left of it, and walk its gaits."""
+    values = EFFECTS[effect].at(1.0, np.random.default_rng([seed, 0x100]))
+    options = {"sealed": seed, "sealed_kind": "none", "effects": {effect: values}, "profile": "realistic"}
+    bench, folder = Bench("virtual", seed, options), out / f"{effect}-{seed}"
+    stages = campaign(bench, effort or Effort(), lambda what, share: None)
+    run_stages(folder, stages, on_start=_begun)
+    summary = json.loads((folder / "summary.json").read_text())
+    gaits = walked(folder, bench, effort or Effort())
+    print("\r" + " " * 60, end="\r")
+    return Gain(effect, seed, tuple(found["name"] for found in summary["effects"]), gaits)
+
+
+def _begun(stage: Stage) -> None:
+    print(f"\r{stage.title:60}", end="", flush=True)
+
+
+def walked(folder: Path, bench: Bench, effort: Effort) -> dict[str, Walked]:
+    """The gaits of a finished campaign in `folder`; those of the base model at its edge are found and walked here."""
+    found = {"baseline": "walks-base", "robust": "walks-completed"}
+    rounds = json.loads((folder / "rounds.json").read_text())
+    if rounds[-1]["at_edge"]:
+        found["edge"] = f"rounds/walks-{len(rounds)}"
+    models = dict.fromkeys(("baseline", "robust"), "model-completed.toml") | {"edge": "model-last.toml"}
+    for number, (name, naive) in enumerate({"naive": True, "fair": False}.items()):
+        _walk_base(folder, name, naive, bench, effort, _STAGE + number)
+        found[name], models[name] = f"walks-{name}", "model-base.toml"
+    return {name: _walked(folder / found[name], folder / models[name], name) for name in GAITS if name in found}
+
+
+def _walk_base(folder: Path, name: str, naive: bool, bench: Bench, effort: Effort, stage: int) -> None:
+    if (folder / f"walks-{name}").exists():
+        return
+    try:
+        gait = found_gait(load_model(folder / "model-base.toml"), bench.seed, None, lambda *_: None, naive).gait
+    except SearchError:
+        gait = BASELINE
+    save_gait(folder / f"gait-{name}.toml", gait, {"made_by": "benchmarks.loop"})
+    with bench.open(stage) as rig:
+        measure_walks(rig, folder / f"walks-{name}", {name: gait}, EDGE_CYCLES, effort.repeats, probe=True)
+
+
+def _walked(walks: Path, model: Path, name: str) -> Walked:
+    dataset = read_dataset(walks)
+    trial = next(t for t in dataset.trials if name != "baseline" or Gait(**t.gait) == BASELINE)
+    prediction = foretold(load_model(model), trial, naive=name == "naive")
+    by_gait = speeds(dataset)
+    runs = by_gait["baseline"] if name == "baseline" else [run for each in by_gait.values() for run in each]
+    return Walked(
+        prediction.speed_mm_s,
+        {str(level): prediction.interval_mm_s(level) for level in _LEVELS},
+        prediction.walks_probability,
+        tuple(run.mean_mm_s for run in runs),
+    )
+
+
+HEADING = f"{'effect, seed':24}{'named':12}" + "".join(f"{title:>26}" for title in _TITLES)
+
+
+def row(one: Gain) -> str:
+    """A line of the table under `HEADING`: of each gait the interval foretold, the speed walked; * where runs fell."""
+    alone = "yes" if one.named == (one.effect,) else "and others" if one.effect in one.named else "no"
+    cells = [_cell(one.gaits[name]) if name in one.gaits else "none" for name in GAITS]
+    return f"{f'{one.effect}, {one.seed}':24}{alone:12}" + "".join(f"{cell:>26}" for cell in cells)
+
+
+def _cell(gait: Walked) -> str:
+    low, high = gait.intervals_mm_s["0.9"]
+    fell = "" if all(gait.walks) else "*"
+    return f"{low:.2f}..{high:.2f} {mean(gait.runs_mm_s):.2f}{fell}"
+
+
+def summed_up(gains: Sequence[Gain]) -> dict[str, float]:
+    """Means over all robots, coverage of the intervals and calibration of the probabilities; printed and returned."""
+    figures: dict[str, float] = {"loop_robots": len(gains)}
+    print(f"\n{f'robots: {len(gains)}':20}{'mm/s':>8}{'walk':>8}{'80 %':>8}{'90 %':>8}{'95 %':>8}{'Brier':>8}")
+    for name, title in zip(GAITS, _TITLES, strict=True):
+        ones = [one.gaits[name] for one in gains if name in one.gaits]
+        if not ones:
+            continue
+        own = {
+            "mm_s": mean(mean(one.runs_mm_s) for one in ones),
+            "walks": mean(walks for one in ones for walks in one.walks),
+            **{f"holds_{100 * level:.0f}": _share([h for one in ones for h in one.holds(level)]) for level in _LEVELS},
+            "brier": mean((one.walks_probability - walks) ** 2 for one in ones for walks in one.walks),
+        }
+        print(f"{title:20}" + "".join(f"{value:8.2f}" for value in own.values()))
+        figures |= {f"loop_{name}_{key}": value for key, value in own.items()}
+    return figures | _against(gains)
+
+
+def _share(held: Sequence[bool]) -> float:
+    return mean(held) if held else float("nan")
+
+
+def _against(gains: Sequence[Gain]) -> dict[str, float]:
+    """The completed model's edge against today's robust gait and against the better of the base model's."""
+    pairs = [one.gaits for one in gains if "edge" in one.gaits]
+    if not pairs:
+        return {}
+    speed = [{name: mean(gait.runs_mm_s) for name, gait in gaits.items()} for gaits in pairs]
+    gain = mean(one["edge"] for one in speed) / mean(one["robust"] for one in speed) - 1.0
+    slower = max(max(one["naive"], one["fair"]) / max(one["edge"], 1e-9) - 1.0 for one in speed)
+    print(
+        f"edge against the robust gait: {100 * gain:+.1f} % on average; at worst {100 * slower:.1f} % behind the base"
+    )
+    return {"loop_edge_gain": gain, "loop_edge_worst_behind_base": slower}
+
+
+def reliability(gains: Sequence[Gain], bins: Sequence[float] = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)) -> list[tuple]:
+    """Foretold probability of walking against the share that walked: (mean foretold, share, runs) of each bin."""
+    pairs = np.array([(g.walks_probability, w) for one in gains for g in one.gaits.values() for w in g.walks], float)
+    found = []
+    for low, high in pairwise(bins):
+        inside = pairs[(pairs[:, 0] > low) & (pairs[:, 0] <= high)]
+        if len(inside):
+            found.append((float(inside[:, 0].mean()), float(inside[:, 1].mean()), len(inside)))
+    return found
+
+
+def plot(gains: Sequence[Gain], file: Path) -> None:
+    """The reliability plot."""
+    from matplotlib.figure import Figure
+
+    figure = Figure((4.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color="0.7")
+    for foretold_share, share, runs in reliability(gains):
+        axes.plot(foretold_share, share, "o", color="C0")
+        axes.annotate(f"{runs}", (foretold_share, share), xytext=(4, -10), textcoords="offset points")
+    axes.set(
+        xlabel="probability of walking, foretold", ylabel="share of runs that walk", xlim=(0, 1.03), ylim=(0, 1.03)
+    )
+    figure.savefig(file, dpi=120)
+
+
+def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | None = None) -> dict[str, float]:
+    """Print the table, a line as each campaign ends; returns the figures flat. Ctrl-C sums up what there is. `kept`:
+    the file of records."""
+    known = lines.read(kept, _place) if kept else {}
+    print(HEADING)
+    gains = []
+    try:
+        for seed in seeds:
+            for effect in effects:
+                record = known.get((effect, seed))
+                gains.append(_gain_of(record) if record else measured(effect, seed, out))
+                print(row(gains[-1]), flush=True)
+                if kept and not record:
+                    known[effect, seed] = asdict(gains[-1])
+                    lines.write(kept, known.values())
+    except KeyboardInterrupt:
+        print(f"\ninterrupted after {len(gains)} of {len(effects) * len(seeds)} robots; the same command goes on")
+    return summed_up(gains) if gains else {}
+
+
+def _place(record: dict) -> tuple[str, int]:
+    return record["effect"], record["seed"]
+
+
+def _gain_of(record: dict[str, Any]) -> Gain:
+    gaits = {name: Walked(**one | {"runs_mm_s": tuple(one["runs_mm_s"])}) for name, one in record["gaits"].items()}
+    return Gain(record["effect"], record["seed"], tuple(record["named"]), gaits)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.loop", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--effects", default=",".join(LIBRARY), help="names, with commas; default: all of the library")
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
+    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--records", type=Path, help="a line of JSON a campaign; read first, and kept up to date")
+    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    parser.add_argument("--plot", type=Path, metavar="PNG", help="draw the reliability of the records' probabilities")
+    options = parser.parse_args()
+    effects = options.effects.split(",")
+    if unknown := set(effects) - set(LIBRARY):
+        parser.error(f"no effect {', '.join(sorted(unknown))}; there are {', '.join(LIBRARY)}")
+    if (options.print or options.plot) and not options.records:
+        parser.error("--print and --plot take what is in a file of records: add --records FILE")
+    if not options.print:
+        seeds = range(options.first_seed, options.first_seed + options.seeds)
+        run(effects, seeds, options.out, options.records)
+    if options.print or options.plot:
+        gains = [_gain_of(record) for record in lines.read(options.records, _place).values()]
+        if options.print:
+            print("\n".join([HEADING, *map(row, gains)]))
+            summed_up(gains)
+        if options.plot:
+            plot(gains, options.plot)
+
+
+if __name__ == "__main__":
+    main()

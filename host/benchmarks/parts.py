@@ -1,0 +1,98 @@
+"""What each part of the image costs, by the symbols that the linker left.
+
+`python -m benchmarks.parts`. Link-time optimisation inlines across files: what a part has in `main` or in the tick is
+counted there. Vectors, start-up code and gaps are what no symbol claims.
+"""
+
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+FIRMWARE = Path(__file__).resolve().parents[2] / ".pio/build/uno/firmware.elf"
+DATA_SPACE = 0x800000
+REST = "vectors, start-up, what no symbol claims"
+
+# The first that matches the demangled name.
+PARTS = (
+    ("the tick: oscillators, holds, valves, watches, samples", r"__vector_11$|bifa::kSineTable|under_way|round_begins"),
+    (
+        "console and its texts",
+        r"Console|bifa::\S*print|bifa::k\w+(Texts|Words|Phrases)|kPhrases|divide|parse_decimal|kLong|"
+        r"kShort|find_command",
+    ),
+    (
+        "frames and sessions",
+        r"Session|send_frame|checks|Receiver|HostPort|FrameDecoder|answer<|inward|kInward|payload_size|"
+        r"kStopFrame|kFirmwareVersion|Name|_crc|crc16|__vector_18",
+    ),
+    ("presets in EEPROM", r"Store|[Rr]ecord|eeprom|read_bytes|is_name|kSettingsName"),
+    (
+        "commands and parameters",
+        r"Commands|[Pp]arameter|[Pp]reset|value_of|is_valid|kResults|kCommand|take_over|result_of|flash_",
+    ),
+    (
+        "controller, outside the tick",
+        r"Controller|Supervisor|Schedule|LastSecond|set_valves|gait_of|Oscillators|controller|"
+        r"Accumulation",
+    ),
+    ("the serial port's object: console, session, queue, sets", r"4port|::port\b"),
+    ("DAC library and Wire", r"TwoWire|twi_|\bWire\b|Adafruit|__vector_24|Print::|Stream::|vtable"),
+    (
+        "Arduino's clock and pins",
+        r"digitalWrite|pinMode|digital_pin|port_to|timer0|micros|delay|__vector_16|turnOffPWM|_to_",
+    ),
+    (
+        "UART, converter, watchdog, start",
+        r"board::|__vector_|give_up|look_at_start|\bring\b|head|tail|life|nonce|flags|no_wait|attend|"
+        r"bifa::output|unfed_ms|ticked|tell_supply",
+    ),
+    ("main loop, with what is inlined there", r"^main$|GLOBAL__sub|global constructors"),
+    (
+        "compiler's library",
+        r"^_*(mul|div|udiv|umul|tablejump|prologue|epilogue|mem|str|cmp|ashl|lshr|neg|do_|u?divmod|"
+        r"movmem|usmul)|_P$",
+    ),
+)
+
+
+def costs(firmware: Path = FIRMWARE) -> dict[str, tuple[int, int]]:
+    """Part -> bytes of flash, bytes of static RAM; together they are the image."""
+    listing = subprocess.run(["avr-nm", "-S", "-C", firmware], check=True, capture_output=True, text=True).stdout
+    flash: Counter[str] = Counter()
+    ram: Counter[str] = Counter()
+    for line in listing.splitlines():
+        if not (symbol := re.match(r"([0-9a-f]{8}) ([0-9a-f]{8}) (\w) (.*)", line)):
+            continue
+        address, size, kind, name = int(symbol[1], 16), int(symbol[2], 16), symbol[3], symbol[4]
+        part = _part_of(name)
+        if address >= DATA_SPACE:
+            ram[part] += size
+        if address < DATA_SPACE or kind in "dD":  # data that is not zero lies in flash, too
+            flash[part] += size
+    text, data, bss = _sections(firmware)
+    flash[REST] += text + data - flash.total()
+    ram[REST] += data + bss - ram.total()
+    return {part: (flash[part], ram[part]) for part in sorted(flash | ram, key=lambda part: -flash[part])}
+
+
+def _part_of(name: str) -> str:
+    function = name.replace("(anonymous namespace)::", "").split("(")[0]  # not what it takes
+    return next((part for part, pattern in PARTS if re.search(pattern, function)), REST)
+
+
+def _sections(firmware: Path) -> tuple[int, int, int]:
+    listing = subprocess.run(["avr-size", firmware], check=True, capture_output=True, text=True).stdout
+    text, data, bss = (int(word) for word in listing.splitlines()[1].split()[:3])
+    return text, data, bss
+
+
+def lines(firmware: Path = FIRMWARE) -> list[str]:
+    """The table."""
+    return [f"  {part:<58} {flash:>6} {ram:>6}" for part, (flash, ram) in costs(firmware).items()]
+
+
+if __name__ == "__main__":
+    print(*lines(), sep="\n")
+    sys.exit(0)

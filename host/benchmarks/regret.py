@@ -1,0 +1,166 @@
+"""How far gait searches end from the best that is known, robot by robot and seed by seed.
+
+    python -m benchmarks.regret [--robots 60] [--seeds 5] [--models DIR] [--long 5] [--records FILE] [--print]
+
+Robots: the nominal one and the strong push, then specimens (5 % in every parameter) with each effect of the library at
+its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model file below
+DIR. The best known of a robot is the best of all its runs: of every seed, of `--long` searches of five times the
+budget, and of the peers (differential evolution, SciPy's DIRECT) on about the same budget. FILE has a line for each
+robot, with which an interrupted run goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from statistics import mean
+
+import numpy as np
+from scipy.optimize import direct
+
+from benchmarks import records as lines
+from bifa import effects
+from bifa.gait import SearchError, Settings, optimise, simulations
+from bifa.gait.library.scenarios import SCENARIOS
+from bifa.gait.objectives import NominalSpeed
+from bifa.gait.uncertainty import SPREAD
+from bifa.robot import BASE_PARAMETERS, Model, load_model, nominal, strong_push
+from bifa.simulate import plant
+
+ROBOTS, SEEDS, LONG, ALLOWED = 60, 5, 5, 0.01
+_LONGER = 5
+_SPECIMEN = 0.05
+
+
+def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model, Settings]]:
+    """Name, model and how it is searched of each robot."""
+    if models:
+        for file in sorted(models.rglob("model-*.toml")):
+            yield file.relative_to(models).with_suffix("").as_posix(), load_model(file), Settings()
+    names = sorted(effects.library())
+    for k in range(count):
+        if k < 2:
+            yield (("nominal", nominal(), Settings()), ("strong push", strong_push(), Settings()))[k]
+            continue
+        effect = names[(k - 2) % len(names)]
+        place = {8: "vertical", 9: "obstacle"}.get(k % 10, "")
+        settings = replace(SCENARIOS[place].settings, evaluations=None) if place else Settings()
+        yield f"{k} {effect} {place}".strip(), specimen(k).with_effects({effect: {}}), settings
+
+
+def specimen(seed: int) -> Model:
+    """A robot of the nominal kind."""
+    factors = 1.0 + _SPECIMEN * np.random.default_rng([seed, 44]).standard_normal(len(BASE_PARAMETERS))
+    values = {n: nominal()[n] * f for n, f in zip(BASE_PARAMETERS, factors, strict=True)}
+    values["mu_k"] = min(values["mu_k"], values["mu_s"])
+    return nominal().with_values(values)
+
+
+def searched(model: Model, settings: Settings, seeds: Sequence[int], long: int, runs) -> dict:
+    """Speeds of each seed, nominal and robust, of the long runs and of the peers, and processor seconds a search."""
+    record: dict = {}
+    for kind, robust in (("nominal", False), ("robust", True)):
+        start = time.process_time()
+        own = [_speed(model, replace(settings, robust=robust, seed=seed, spread=SPREAD), runs) for seed in seeds]
+        record[kind] = own
+        record[f"{kind}_s"] = (time.process_time() - start) / len(seeds)
+        budget = 8000 if not robust else 1400
+        more = replace(settings, robust=robust, evaluations=_LONGER * budget, spread=SPREAD)
+        record[f"{kind}_long"] = [_speed(model, replace(more, seed=1000 + k), runs) for k in range(long)]
+    record["de"] = _speed(model, replace(settings, robust=False, method="de"), runs)
+    record["direct"] = _by_direct(model, settings, runs)
+    return record
+
+
+def _speed(model: Model, settings: Settings, runs) -> float:
+    try:
+        found = optimise(model, runs, settings)
+    except SearchError:
+        return 0.0
+    return found.quantile_mm_s if settings.robust else found.nominal_mm_s
+
+
+def _by_direct(model: Model, settings: Settings, runs) -> float:
+    """SciPy's DIRECT on the search's own objective; what it finds is judged by the finer metric as well."""
+    speed = NominalSpeed(runs, plant(model), settings.space, settings.metric)
+    best = direct(lambda x: -float(speed(x[None])[0]), [(0.0, 1.0)] * len(settings.space.axes), maxfun=4000).x
+    return float(NominalSpeed(runs, plant(model), settings.space, settings.metric.finer())(best[None])[0])
+
+
+def regrets(record: dict) -> list[float]:
+    """Of every seed, nominal and robust, the part by which it is slower than the best known."""
+    found = []
+    for kind in ("nominal", "robust"):
+        others = [record["de"], record["direct"]] if kind == "nominal" else []
+        best = max([*record[kind], *record[f"{kind}_long"], *others])
+        found += [0.0 if best <= 0.0 else 1.0 - speed / best for speed in record[kind]]
+    return found
+
+
+def row(name: str, record: dict) -> str:
+    """A line of the table: the worst of the seeds and the best known, nominal and robust; the peers."""
+    text = f"{name:34}"
+    for kind in ("nominal", "robust"):
+        best = max([*record[kind], *record[f"{kind}_long"]])
+        text += f"{min(record[kind]):9.2f}{best:9.2f}{record[f'{kind}_s']:7.1f}"
+    return text + f"{record['de']:9.2f}{record['direct']:9.2f}{100 * max(regrets(record)):9.2f}"
+
+
+HEADING = (
+    f"{'':34}{'nominal, mm/s':>18}{'s':>7}{'robust, mm/s':>18}{'s':>7}{'peers, nominal':>18}{'worst':>9}\n"
+    f"{'robot':34}" + f"{'worst':>9}{'best':>9}{'':7}" * 2 + f"{'DE':>9}{'DIRECT':>9}{'regret %':>9}"
+)
+
+
+def run(
+    count: int, seeds: int, long: int, models: Path | None = None, kept: Path | None = None, only_print: bool = False
+) -> dict[str, float]:
+    """Print the table, a line as each robot ends; returns the figures flat. Ctrl-C sums up what there is."""
+    known = lines.read(kept, lambda record: record["robot"]) if kept else {}
+    print(HEADING)
+    found: list[dict] = []
+    try:
+        with simulations() as runs:
+            for name, model, settings in robots(count, models):
+                record = known.get(name)
+                if record is None and only_print:
+                    continue
+                if record is None:
+                    record = {"robot": name} | searched(model, settings, range(seeds), long, runs)
+                    known[name] = record
+                    if kept:
+                        lines.write(kept, known.values())
+                found.append(record)
+                print(row(name, record), flush=True)
+    except KeyboardInterrupt:
+        print(f"\ninterrupted after {len(found)} robots; the same command goes on")
+    return summed_up(found) if found else {}
+
+
+def summed_up(found: Sequence[dict]) -> dict[str, float]:
+    """Worst regret and the share of searches over one per cent; printed and returned."""
+    every = [regret for record in found for regret in regrets(record)]
+    worst, share = max(every), mean(regret > ALLOWED for regret in every)
+    print(f"regret over {len(every)} searches: worst {100 * worst:.2f} %, over 1 %: {100 * share:.1f} %")
+    return {"gait_regret_worst": worst, "gait_regret_share_over_1_percent": share, "gait_regret_robots": len(found)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.regret", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--robots", type=int, default=ROBOTS)
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--long", type=int, default=LONG, help="searches of five times the budget, of each kind")
+    parser.add_argument("--models", type=Path, help="folder below which model-*.toml are searched as well")
+    parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
+    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    options = parser.parse_args()
+    run(options.robots, options.seeds, options.long, options.models, options.records, options.print)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""Rules of decision, tried in seconds on what blind trials have kept, and how probabilities turned out.
+
+    python -m benchmarks.replay small.jsonl                                   every rule of benchmarks/rules.py
+    python -m benchmarks.replay small.jsonl benchmarks/recorded/foreign.jsonl  on both together
+    python -m benchmarks.replay small.jsonl --rule my_rules:careful           a function of your own, beside them
+    python -m benchmarks.replay small.jsonl --reliability picture.png         probabilities against what is true
+
+FILE is what `benchmarks.small_systems --records` or `benchmarks.blind --records` wrote; the losses of every explanation
+that was tried lie beside it (.losses.jsonl.gz). No model is simulated: a rule chooses among what the search had found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks import records as lines
+from benchmarks.blind_figures import share_text
+from benchmarks.blind_records import losses_beside, place
+from benchmarks.reliability import bins, brier, draw, foretold
+from benchmarks.rules import RULES, Rule
+
+_KINDS = {"single": "one effect", "none": "none", "outside": "withheld", "pair": "two", "decoys": "20 decoys"}
+
+
+def searches(path: Path) -> list[dict[str, Any]]:
+    """What was tried of each set, with the `kind` of its truth, the effects on offer that are there (`truth`), and what
+    the verdict `named`."""
+    tried = lines.read(losses_beside(path), place)
+    if not tried:
+        raise SystemExit(f"{losses_beside(path)}: nothing there. Run the trial with --records {path}.")
+    return [
+        _joined(record, tried[key])
+        for key, record in lines.read(path, place).items()
+        if tried.get(key, {}).get("tried")
+    ]
+
+
+def _joined(record: dict[str, Any], tried: dict[str, Any]) -> dict[str, Any]:
+    on_offer = record.get("on_offer", [] if record["kind"] == "outside" else record["truth"])
+    return tried | {"truth": sorted(on_offer), "named": [e["name"] for e in record["effects"]]}
+
+
+def replayed(found: Sequence[dict[str, Any]], rules: dict[str, Rule]) -> str:
+    """Of each rule, by kind of truth, how often it names exactly what is there and on offer; and how often something
+    that is not."""
+    kinds = [kind for kind in _KINDS if any(s["kind"] == kind for s in found)]
+    heads = "".join(f"{_KINDS[kind]:12}" for kind in kinds)
+    rows = [
+        f"{len(found)} sets: exactly what is there, no more and no fewer\n",
+        f"{'':30}{heads}names what is not there",
+    ]
+    for name, rule in {"the verdict": lambda search: search["named"], **rules}.items():
+        said = [sorted(rule(s)) for s in found]
+        cells = ""
+        for kind in kinds:
+            hits = [n == s["truth"] for n, s in zip(said, found, strict=True) if s["kind"] == kind]
+            cells += f"{f'{sum(hits)}/{len(hits)}':12}"
+        false = [not set(n) <= set(s["truth"]) for n, s in zip(said, found, strict=True)]
+        rows.append(f"{name:30}{cells}{share_text(false)}")
+    return "\n".join(rows)
+
+
+def reliable(found: Sequence[dict[str, Any]], picture: Path | None) -> str:
+    """How often effects of each probability are there; and the same where what is there is on offer at all."""
+    offered = [s for s in found if s["kind"] != "outside"]
+    if picture:
+        draw(bins(*foretold(found)), picture)
+    cases = {"": found, ", without those whose effect is withheld": offered if len(offered) < len(found) else []}
+    return "\n\n".join(_reliable(sets, of) for of, sets in cases.items() if sets)
+
+
+def _reliable(found: Sequence[dict[str, Any]], of: str) -> str:
+    probability, there = foretold(found)
+    if not len(probability):
+        return f"no explanation was weighed{of}: there are no probabilities"
+    rows = [f"{len(probability)} probabilities{of}; Brier score {brier(probability, there):.4f}", "said    is there"]
+    for one in bins(probability, there):
+        rows.append(f"{one.mean:<8.3f}{share_text([True] * one.there + [False] * (one.count - one.there))}")
+    return "\n".join(rows)
+
+
+def own(spec: str) -> Rule:
+    """`module:function`, looked for where the command is run, too."""
+    sys.path.insert(0, str(Path.cwd()))
+    module, _, name = spec.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise SystemExit(f"--rule {spec}: {error}. Write it as module:function.") from None
+
+
+def main(given: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    parser.add_argument("--rule", action="append", default=[], metavar="MODULE:FUNCTION", help="a rule of your own")
+    parser.add_argument("--reliability", type=Path, metavar="PNG", help="draw probabilities against what is true")
+    options = parser.parse_args(given)
+    found = [search for path in options.files for search in searches(path)]
+    print(replayed(found, RULES | {spec: own(spec) for spec in options.rule}), end="\n\n")
+    print(reliable(found, options.reliability))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

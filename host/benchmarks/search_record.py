@@ -1,0 +1,58 @@
+"""The search behind a verdict in plain types: what a rule of decision is tried on afterwards (`benchmarks.replay`).
+
+The only place of the benchmarks that knows how the engine names what it tried.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import lacuna
+
+_DIGITS = 5
+
+
+def searched(diagnosis: Any, simulations: int) -> dict[str, Any]:
+    """Of every explanation tried: its whole cost (minus log-likelihood, with what parameters cost), the loss of each
+    trial (minus log-likelihood), and the RMS residual of those it was not fitted to, in units of the noise."""
+    search, choice, split = diagnosis.search, diagnosis.choice, diagnosis.split
+    trials = search.base.trials
+    named = {(): search.base} | {c.effects: c for c in search.tried} | {choice.candidate.effects: choice.candidate}
+    return {
+        "version": version(),
+        "simulations": simulations,
+        "trials": [t.name for t in trials],
+        "conditions": [f"{t.experiment}: {t.condition}" for t in trials],
+        "split": {part: [t.name for t in getattr(split, part)] for part in ("fit", "select", "unseen", "final")},
+        "pieces": _short(search.base.pieces),
+        "tried": [_tried(candidate, trials) for candidate in named.values()],
+        "chosen": list(choice.candidate.effects),
+        "probability": {name: _short(p) for name, p in choice.probability.items()},
+        "weights": [[list(effects), _short(weight)] for effects, weight in choice.weights.items()],
+    }
+
+
+def _tried(candidate: Any, trials: Any) -> dict[str, Any]:
+    library = candidate.fitted.structure.system.effects
+    return {
+        "effects": list(candidate.effects),
+        "parameters": sum(len(library[name].parameters) for name in candidate.effects),
+        "cost": _short(candidate.cost),
+        "losses": [_short(candidate.by_trial[t.name]) for t in trials],
+        "errors": {name: _short(error) for name, error in candidate.errors.items()},
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
+
+
+@cache
+def version() -> str:
+    """The commit that this is run from, marked where something is changed; of an installed engine its version."""
+    ask = ["git", "describe", "--always", "--dirty", "--abbrev=9"]
+    found = subprocess.run(ask, cwd=Path(__file__).parent, capture_output=True, text=True)
+    return found.stdout.strip() or lacuna.__version__

@@ -1,0 +1,78 @@
+"""What others make of the same sets, with the rivals of `benchmarks.systems`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+
+from benchmarks.small.kinds.terms import TERMS
+from benchmarks.small.offered import Offered
+from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.rivals import best_subset, gaussian_process, sparse_regression
+
+_STARTS, _POINTS = 2, 200
+_ALL_PAIRS = 8  # candidates; where there are more, the best one is grown
+
+
+def problem(offered: Offered) -> Problem:
+    """The set as the rivals take it: nothing in it is known of the truth."""
+    return Problem(
+        key=offered.key,
+        name=offered.kind.name,
+        source="",
+        output=offered.kind.output,
+        simulate=offered.model,
+        parameters=offered.parameters,
+        effects=offered.effects,
+        truth=frozenset(),
+        fitted=offered.records,
+        held_out=(),
+        model_lines=0,
+        nuisances=offered.nuisances,
+        terms=_terms(offered),
+    )
+
+
+def _terms(offered: Offered):
+    """For sparse regression: where the model is a sum of terms, sampled evenly and without gaps."""
+    terms = TERMS.get(offered.kind.key)
+    if terms is None or any(_uneven(run.time_s) or not _whole(run.measured) for run in offered.runs):
+        return None
+    on_offer = {e.name for e in offered.effects}
+    return terms.only([name for name in terms.of if "." not in name or name.split(".")[0] in on_offer])
+
+
+def _uneven(time_s) -> bool:
+    steps = time_s[1:] - time_s[:-1]
+    return bool(steps.max() > 1.001 * steps.min())
+
+
+def _whole(measured) -> bool:
+    return bool((measured == measured).all())
+
+
+def by_bic(given: Problem) -> Answer:
+    """The set of up to two with the least BIC (no truth has more): all of them, or grown from the best one. Pairs are
+    begun once, where the other explanations are begun twice."""
+    names = list(given.library)
+    found = {chosen: best_subset.fit(given, chosen, _STARTS) for chosen in [(), *((name,) for name in names)]}
+    pairs = list(combinations(names, 2))
+    if len(names) > _ALL_PAIRS:
+        (best,) = min((c for c in found if c), key=lambda chosen: best_subset.bic(given, found[chosen]))
+        pairs = [(best, name) for name in names if name != best]
+    found |= {pair: best_subset.fit(given, pair, starts=1) for pair in pairs}
+    best = min(found, key=lambda chosen: best_subset.bic(given, found[chosen]))
+    return Answer(best, lambda record: given.predict(record, found[best]))
+
+
+def _as_it_is(given: Problem) -> Answer:
+    base = best_subset.fit(given, (), _STARTS)
+    return Answer(None, lambda record: given.predict(record, base))
+
+
+PEERS: dict[str, Callable[[Problem], Answer]] = {
+    "the model as it is": _as_it_is,
+    "best subset by BIC, SciPy": by_bic,
+    "sparse regression, pysindy": sparse_regression.solve,
+    "model and Gaussian process": lambda given: gaussian_process.solve(given, _POINTS, _STARTS),
+}

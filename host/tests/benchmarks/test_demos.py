@@ -1,0 +1,52 @@
+"""Whether what a demo's seal held was named, from the summaries of campaigns."""
+
+import json
+
+import pytest
+
+from benchmarks import demos
+
+
+def summary(*named, truth="leak"):
+    errors = {"before": 4.0, "after": 1.02, "noise_floor": 1.0}
+    return {
+        "truth": {truth: {"rate_per_s": 0.05}},
+        "verdict": "identified" if named else "unexplained",
+        "effects": [{"name": name} for name in named],
+        "error": {name: {"held_out": value} for name, value in errors.items()},
+        "gaits": [
+            {"gait": "base", "completed_model": 9.0, "measured": 8.0},
+            {"gait": "completed", "completed_model": 20.1, "measured": 20.2},
+        ],
+    }
+
+
+@pytest.mark.parametrize(
+    ("named", "right"), [(("leak",), True), (("leak", "backlash"), True), (("backlash", "leak"), False), ((), False)]
+)
+def test_a_story_is_right_if_what_was_sealed_is_named_first(named, right):
+    one = demos.story(3, summary(*named))
+    assert one.right == right
+    assert (one.before, one.after, one.floor) == (4.0, 1.02, 1.0)
+    assert (one.predicted_mm_s, one.measured_mm_s) == (20.1, 20.2)
+
+
+def test_a_row_stands_under_its_heading():
+    assert len(demos.row(demos.story(3, summary("leak")))) == len(demos.HEADING)
+    assert "unexplained" in demos.row(demos.story(3, summary()))
+
+
+def test_demos_go_on_from_their_records(monkeypatch, tmp_path, capsys):
+    asked, kept = [], tmp_path / "demos.jsonl"
+
+    def told(seed, out):
+        asked.append(seed)
+        return demos.story(seed, summary("leak" if seed % 2 else "backlash"))
+
+    monkeypatch.setattr(demos, "told", told)
+    figures = demos.run(range(4), tmp_path, 2, kept)
+    assert figures == {"demos": 4, "demos_right": 2}
+    assert "2 of 4 [0.15, 0.85]" in capsys.readouterr().out
+    assert demos.run(range(4), tmp_path, 2, kept) == figures
+    assert sorted(asked) == [0, 1, 2, 3]
+    assert [json.loads(line)["seed"] for line in kept.read_text().splitlines()] == [0, 1, 2, 3]

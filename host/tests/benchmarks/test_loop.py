@@ -1,0 +1,94 @@
+"""What the loop buys: its table, its coverage and its records."""
+
+import pytest
+
+from benchmarks import loop
+from benchmarks.loop import Gain, Walked
+
+
+def gait(speed, runs=None, probability=0.97, half=0.2):
+    intervals = {str(level): (speed - half * level, speed + half * level) for level in (0.8, 0.9, 0.95)}
+    return Walked(speed, intervals, probability, tuple(runs or (speed, speed, speed)))
+
+
+def robot(effect="leak", seed=3, named=("leak",), **gaits):
+    speeds = {"baseline": 10.8, "naive": 23.0, "fair": 21.0, "robust": 22.0, "edge": 23.0}
+    return Gain(effect, seed, named, {name: gait(v) for name, v in speeds.items()} | gaits)
+
+
+@pytest.mark.parametrize(
+    ("named", "said"), [(("leak",), "yes"), (("leak", "stribeck"), "and others"), (("stribeck",), "no"), ((), "no")]
+)
+def test_a_row_says_whether_the_effect_was_named(named, said):
+    text = loop.row(robot(named=named))
+    assert text.split("  ")[0] == "leak, 3"
+    assert text[24:36].strip() == said
+    assert len(text) == len(loop.HEADING)
+
+
+def test_a_row_shows_interval_speed_and_where_runs_fell():
+    text = loop.row(robot(naive=gait(23.0, (23.0, 1.0, 23.0))))
+    assert "22.82..23.18 15.67*" in text
+    assert "22.82..23.18 23.00" in text
+    one = robot()
+    del one.gaits["edge"]
+    assert loop.row(one).endswith("none")
+
+
+def test_runs_that_fall_count_for_the_probability_and_not_for_the_coverage():
+    one = gait(23.0, (23.0, 23.185, 1.0), probability=0.9)
+    assert one.walks == (True, True, False)
+    assert one.holds(0.9) == [True, False]
+    assert one.holds(0.95) == [True, True]
+
+
+def test_means_over_robots(capsys):
+    gains = [robot(), robot(seed=4, naive=gait(23.0, (1.0, 1.0, 1.0)), edge=gait(24.2, (24.2, 24.2, 24.2)))]
+    figures = loop.summed_up(gains)
+    assert figures["loop_edge_mm_s"] == pytest.approx(23.6)
+    assert figures["loop_edge_gain"] == pytest.approx(23.6 / 22.0 - 1.0)
+    assert figures["loop_naive_walks"] == pytest.approx(0.5)
+    assert figures["loop_naive_brier"] == pytest.approx(0.5 * (0.03**2 + 0.97**2))
+    assert figures["loop_edge_holds_90"] == 1.0
+    assert figures["loop_edge_worst_behind_base"] == pytest.approx(0.0)
+    assert "robots: 2" in capsys.readouterr().out
+
+
+def test_reliability_compares_what_was_foretold_with_what_walked():
+    found = loop.reliability([robot(naive=gait(23.0, (23.0, 1.0, 1.0), probability=0.6))])
+    assert found == [(pytest.approx(0.6), pytest.approx(1 / 3), 3), (pytest.approx(0.97), 1.0, 12)]
+
+
+def test_the_reliability_plot_is_drawn(tmp_path):
+    loop.plot([robot()], tmp_path / "reliability.png")
+    assert (tmp_path / "reliability.png").stat().st_size > 5000
+
+
+def test_an_interrupted_run_sums_up_what_there_is(monkeypatch, capsys, tmp_path):
+    done = iter([robot()])
+
+    def measured(effect, seed, out):
+        try:
+            return next(done)
+        except StopIteration:
+            raise KeyboardInterrupt from None
+
+    monkeypatch.setattr(loop, "measured", measured)
+    figures = loop.run(("leak", "stribeck"), range(2), tmp_path)
+    assert figures["loop_edge_mm_s"] == 23.0
+    assert "interrupted after 1 of 4 robots" in capsys.readouterr().out
+
+
+def test_a_run_goes_on_from_its_records(monkeypatch, tmp_path):
+    asked, kept = [], tmp_path / "loop.jsonl"
+
+    def measured(effect, seed, out):
+        asked.append((effect, seed))
+        return robot(effect, seed)
+
+    monkeypatch.setattr(loop, "measured", measured)
+    first = loop.run(("leak",), range(2), tmp_path, kept)
+    assert loop.run(("leak",), range(2), tmp_path, kept) == first
+    loop.run(("leak", "stribeck"), range(1), tmp_path, kept)
+    assert asked == [("leak", 0), ("leak", 1), ("stribeck", 0)]
+    assert len(kept.read_text().splitlines()) == 3
