@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from bifa.check.lag import LIMIT_S, displacement_lag
 from bifa.data import Trial
-from bifa.data.lag import LIMIT_S, displacement_lag
 from bifa.link import Uno
 from bifa.measure.recording import Recording
 from bifa.rig import open_rig

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from independent_lab import Lab
 
 from bifa.data import Dataset, write_dataset
 from bifa.rig import check_port
+from harness.independent_lab import Lab
 
 HOST = Path(__file__).resolve().parent.parent
 ROOMS = [

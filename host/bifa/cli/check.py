@@ -11,8 +11,8 @@ from bifa.cli._options import DATASET, PICTURES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bifa.check import Finding
     from bifa.data import Dataset
-    from bifa.data.check import Finding
     from bifa.screen import Console
 
 
@@ -41,15 +41,14 @@ def register(app: typer.Typer) -> None:
 
         check_targets(folders=(pictures,))
 
+        from bifa.check import check_dataset
         from bifa.data import read_dataset
-        from bifa.data.check import check_dataset
-        from bifa.mistakes import find_mistakes
         from bifa.screen import Console
 
         console = Console()
         with console.status("reading"):
             content = read_dataset(dataset)
-            findings = check_dataset(content) + find_mistakes(content)
+            findings = check_dataset(content)
         _print_contents(console, content)
         _print_findings(console, findings)
         if not findings:
@@ -66,9 +65,9 @@ def register(app: typer.Typer) -> None:
 
 def warn_of_units(console: "Console", dataset: "Dataset") -> None:
     """What a fit would stumble over, or make a diagnosis of."""
-    from bifa.mistakes import find_mistakes
+    from bifa.check.plausibility import check_plausibility
 
-    _print_findings(console, [finding for finding in find_mistakes(dataset) if finding.kind == "unit"])
+    _print_findings(console, [finding for finding in check_plausibility(dataset) if finding.kind == "unit"])
 
 
 def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:

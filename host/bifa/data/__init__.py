@@ -1,4 +1,4 @@
-"""Measured data: the data set's format, read strictly, written safely, checked for what looks wrong."""
+"""Measured data: the data set's format, read strictly, written safely."""
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError

@@ -54,8 +54,8 @@ def record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repea
 
 
 def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
+    from bifa.check.lag import misfit_of_last
     from bifa.data import DatasetWriter, Trial
-    from bifa.data.lag import misfit_of_last
     from bifa.gait.measured import measured_speed
     from bifa.gait.settling import LEAST, Walking
     from bifa.measure.experiments import record_columns

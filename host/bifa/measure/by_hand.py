@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from bifa.check import check_trial
+from bifa.check.lag import misfit_of
 from bifa.data import DatasetWriter, Trial
-from bifa.data.check import check_trial
 from bifa.data.export import Export
-from bifa.data.lag import misfit_of
 from bifa.data.layout import RAW
 from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, Uno
@@ -22,7 +22,6 @@ from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import idle
 from bifa.measure.sketch import sketch
-from bifa.mistakes import mistakes_in
 from bifa.rig import Rig
 
 _REPEAT = ("r", "repeat")
@@ -95,7 +94,7 @@ class ByHand:
     def _accepted(self, rig: Rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
         for line in sketch(trial, self._plain):
             self._desk.say(line)
-        wrong = [str(finding) for finding in [*check_trial(trial), *mistakes_in(trial)]]
+        wrong = [str(finding) for finding in check_trial(trial)]
         if misfit := misfit_of(trial, writer.trials):
             wrong.append(misfit)
         seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."

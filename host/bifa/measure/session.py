@@ -14,8 +14,8 @@ from types import MappingProxyType
 from typing import Any, Protocol
 
 import bifa
+from bifa.check.lag import misfit_of_last
 from bifa.data import Dataset, DatasetError, DatasetWriter, Trial
-from bifa.data.lag import misfit_of_last
 from bifa.link import Uno
 from bifa.lock import locked
 from bifa.measure.experiments import record_trial

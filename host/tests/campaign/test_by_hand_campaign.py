@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from bifa.check.plausibility import check_trial_plausibility
 from bifa.data import read_dataset
 from bifa.measure.plan import BRISK
-from bifa.mistakes import mistakes_in
 from bifa.robot.gait import save_gait
 from harness.exports import EXPORTS
 
@@ -109,4 +109,4 @@ def test_a_campaign_takes_the_exports_of_every_named_program_by_preset(lab, tmp_
     trials = read_dataset(tmp_path / "run" / ".measure-unfinished" / "measured.partial").trials
     assert len(trials) == 15
     assert all(trial.extra["clock_error_s"] < 1e-3 for trial in trials)
-    assert [str(found) for trial in trials for found in mistakes_in(trial)] == []
+    assert [str(found) for trial in trials for found in check_trial_plausibility(trial)] == []

@@ -1,8 +1,7 @@
 import pytest
 
 from bifa.data import write_dataset
-
-from .data_sets import make_dataset
+from harness.data_sets import make_dataset
 
 
 @pytest.fixture

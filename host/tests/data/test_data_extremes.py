@@ -10,8 +10,7 @@ from typer.testing import CliRunner
 from bifa.cli import app
 from bifa.data import DatasetError, read_dataset, write_dataset
 from bifa.robot.gait import GaitError, load_gait, read_gait_file
-
-from .data_sets import make_dataset
+from harness.data_sets import make_dataset
 
 WALK = "locomotion_1.csv"
 TITLE = "\x1b]0;owned\x07"  # sets a window's title

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from bifa.data import DatasetError, read_dataset
-
-from .data_sets import assert_same, make_dataset
+from harness.data_sets import assert_same, make_dataset
 
 WALK = "locomotion_1.csv"
 

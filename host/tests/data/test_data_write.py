@@ -10,8 +10,7 @@ from hypothesis import HealthCheck, given, settings
 
 from bifa.data import EXPERIMENTS, Dataset, DatasetError, DatasetWriter, read_dataset, write_dataset
 from bifa.data.table import LARGEST
-
-from .data_sets import GAIT, SETTINGS, assert_same, make_dataset, make_trial
+from harness.data_sets import GAIT, SETTINGS, assert_same, make_dataset, make_trial
 
 finite = st.floats(-LARGEST, LARGEST, width=64)
 names = st.text(st.characters(codec="utf-8", categories=["L", "N", "P", "S"]), min_size=1, max_size=20)

@@ -6,7 +6,6 @@ from io import StringIO
 
 import numpy as np
 import pytest
-from independent_lab import Lab, session, small_session
 from rich.console import Console
 from scipy.stats import binom
 
@@ -20,6 +19,7 @@ from bifa.report.identification_remarks import remarks
 from bifa.report.page import render
 from bifa.report.terminal import print_sections, print_table
 from bifa.robot import load_model, save_model
+from harness.independent_lab import Lab, session, small_session
 
 pytestmark = pytest.mark.slow
 

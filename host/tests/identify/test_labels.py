@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from independent_lab import Lab
 
 from bifa.data import Dataset
 from bifa.identify.robust import labelled
 from bifa.identify.start import prepare
+from harness.independent_lab import Lab
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from independent_lab import Lab
 from numpy.polynomial import chebyshev
 
 from bifa.data import Dataset
@@ -15,6 +14,7 @@ from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.motion import imposed_motion
 from bifa.pipe_robot.stiffness import fit_stiffness
 from bifa.robot import nominal
+from harness.independent_lab import Lab
 
 
 def bench(lab, actuator, pressures=(0.0, 4.0, 8.0), repeats=3) -> Dataset:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from bifa.check import check_trial
 from bifa.data import read_dataset
-from bifa.data.check import check_trial
 from bifa.data.layout import RAW
 from bifa.measure.by_hand import ByHand
 from bifa.measure.desk import Desk

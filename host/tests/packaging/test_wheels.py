@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from independent_lab import Lab, small_session
 from stranger import Stranger, lowest
 
 from bifa.data import write_dataset
 from bifa.link.table import TABLE_HASH
 from bifa.robot.gait import BASELINE, save_gait
+from harness.independent_lab import Lab, small_session
 from virtual_robot.uno import Uno
 from virtual_robot.uno.board import lib as chip
 

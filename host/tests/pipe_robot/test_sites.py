@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent_lab import BASELINE, Lab
 from scipy.signal import lsim
 
 from bifa.data import Dataset
@@ -12,6 +11,7 @@ from bifa.identify.start import prepare
 from bifa.pipe_robot.sites import corrected, learnt_curves, modules
 from bifa.robot.learnt import ROWS
 from bifa.simulate import plant, vented_between
+from harness.independent_lab import BASELINE, Lab
 from lacuna.system import Correction
 
 

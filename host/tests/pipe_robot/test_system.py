@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent_lab import BASELINE, Lab
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
@@ -13,6 +12,7 @@ from bifa.pipe_robot.errors import UndeterminedError
 from bifa.pipe_robot.inputs import inputs_of
 from bifa.pipe_robot.library import engine_effects
 from bifa.robot import ModelParameterError
+from harness.independent_lab import BASELINE, Lab
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import estimate_noise

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent_lab import BASELINE, Lab
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
 from bifa.pipe_robot.accuracy import AccuracyError, accuracies, accuracy_of
 from bifa.pipe_robot.spare import spare
 from bifa.pipe_robot.unmeasured import LOAD_CELL, PRIOR_SD, STAND_MASS
+from harness.independent_lab import BASELINE, Lab
 
 GAITS = [BASELINE | {"period_s": period} for period in (5.7, 4.4, 3.4)]
 

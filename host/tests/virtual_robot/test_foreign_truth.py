@@ -5,8 +5,8 @@ import tomllib
 import numpy as np
 import pytest
 
+from bifa.check import check_dataset
 from bifa.data import read_dataset
-from bifa.data.check import check_dataset
 from virtual_robot.gait import BASELINE
 from virtual_robot.instruments.noise import coloured, flicker
 from virtual_robot.plant import Curve, Plant

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bifa.check.plausibility import check_plausibility
 from bifa.data import Dataset, Trial, read_dataset
-from bifa.mistakes import find_mistakes
 from virtual_robot import sealed
 from virtual_robot.truths import foreign
 
@@ -32,7 +32,7 @@ def mistaken(day: Dataset, file: str, change: Change) -> Dataset:
 
 def said(day: Dataset) -> list[tuple[str, str | None]]:
     """Kind and file of all that is found in it."""
-    return [(found.kind, found.file) for found in find_mistakes(day)]
+    return [(found.kind, found.file) for found in check_plausibility(day)]
 
 
 def with_columns(trial: Trial, **columns: np.ndarray) -> Trial:

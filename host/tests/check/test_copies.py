@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifa.check.copies import check_copies
 from bifa.data import Dataset, Trial
-from bifa.mistakes.copies import check_copies
 
 
 def test_a_record_that_stands_in_two_trials_is_told_once():

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bifa.check.plausibility import check_plausibility
 from bifa.data import Trial
-from bifa.mistakes import find_mistakes
 
 from .days import mistaken, said, with_columns
 
@@ -36,7 +36,7 @@ def test_what_was_mounted_or_set_otherwise_is_named(day, file, other):
 
 def test_another_scale_of_the_camera_is_named_with_how_much_it_makes(any_day):
     file = "walk_baseline_2.csv"
-    (found,) = find_mistakes(mistaken(any_day, file, scaled(1.3, "displacement_head_mm", "displacement_tail_mm")))
+    (found,) = check_plausibility(mistaken(any_day, file, scaled(1.3, "displacement_head_mm", "displacement_tail_mm")))
     assert (found.kind, found.file) == ("repeat", file)
     assert "repeat 2 of walk, period 5.7 s differs from the others by 1" in str(found)
     assert "mm (RMS)" in str(found)
@@ -56,7 +56,7 @@ def test_of_two_repeats_nobody_knows_which_is_the_odd_one(day):
     pair = replace(day, trials=tuple(trial for trial in day.trials if trial.repeat < 3))
     assert said(pair) == []
     wrong = mistaken(pair, "step_small_8.5psi_1.csv", recorded_as(day, "step_large_8.5psi_1.csv"))
-    (found,) = find_mistakes(wrong)
+    (found,) = check_plausibility(wrong)
     assert (found.kind, found.file) == ("repeat", None)
     assert "step_small_8.5psi_1.csv and step_small_8.5psi_2.csv differ by" in str(found)
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from bifa.check.finding import Finding
+from bifa.check.lag import displacement_lag
 from bifa.data import Trial
-from bifa.data.check import Finding
-from bifa.data.lag import displacement_lag
 
 from .swing import follow, swing
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from bifa.check.lag import displacement_lag, misfit, misfit_of_last
+from bifa.check.recordings import check_recordings
 from bifa.data import Dataset, Trial
-from bifa.data.check import check_dataset
-from bifa.data.lag import displacement_lag, misfit, misfit_of_last
 from virtual_robot.effects import EFFECTS, plant_parameters
 from virtual_robot.sealed import plans, specimen
 from virtual_robot.trials import Lab
@@ -42,7 +42,7 @@ def late(trial, late_s):
 
 
 def findings(trials):
-    return [found for found in check_dataset(Dataset(None, "x", {}, tuple(trials))) if found.kind == "lag"]
+    return [found for found in check_recordings(Dataset(None, "x", {}, tuple(trials))) if found.kind == "lag"]
 
 
 @pytest.mark.parametrize("late_s", [-0.02, -0.01, -0.004, 0.0, 0.0017, 0.01])

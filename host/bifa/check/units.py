@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Dataset, Trial
-from bifa.data.check import Finding
 from bifa.robot.parameters import BASE_PARAMETERS
 
 _MM = {"cm": 10.0, "in": 25.4, "m": 1000.0, "um": 1e-3}  # in mm

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bifa.mistakes import find_mistakes
+from bifa.check.plausibility import check_plausibility
 
 from .days import inverted, mistaken, said, turned
 
@@ -17,25 +17,25 @@ def test_a_force_of_the_wrong_sign(any_day, experiment):
 @pytest.mark.parametrize("column", ["displacement_mm", "pressure_psi"])
 def test_a_step_response_with_a_column_of_the_wrong_sign(any_day, column):
     for trial in any_day.of("step_response"):
-        (found,) = find_mistakes(mistaken(any_day, trial.file, turned(column)))
+        (found,) = check_plausibility(mistaken(any_day, trial.file, turned(column)))
         assert (found.kind, found.file, found.column) == ("sign", trial.file, column)
 
 
 def test_a_cross_head_that_counts_down(any_day):
     for trial in any_day.of("static_loading"):
-        (found,) = find_mistakes(mistaken(any_day, trial.file, turned("displacement_mm")))
+        (found,) = check_plausibility(mistaken(any_day, trial.file, turned("displacement_mm")))
         assert (found.kind, found.file, found.column) == ("sign", trial.file, "displacement_mm")
 
 
 def test_commands_of_a_step_written_the_other_way_round(any_day):
     file = any_day.of("step_response")[0].file
-    (found,) = find_mistakes(mistaken(any_day, file, inverted))
+    (found,) = check_plausibility(mistaken(any_day, file, inverted))
     assert (found.kind, found.file, found.column) == ("sign", file, "command")
     assert "1 is positive pressure, 0 vacuum; exchange them" in str(found)
 
 
 def test_the_number_the_convention_and_what_to_do_are_said(day):
-    (found,) = find_mistakes(mistaken(day, "anchor_8.5psi_2.csv", turned("force_N")))
+    (found,) = check_plausibility(mistaken(day, "anchor_8.5psi_2.csv", turned("force_N")))
     assert str(found).startswith("anchor_8.5psi_2.csv, force_N: -")
     assert "N in the middle (median), where a resistance is positive" in str(found)
     assert str(found).endswith("Turn the sign")

@@ -1,15 +1,16 @@
-"""What looks wrong in a data set that is well-formed: findings to look at before anything is fitted."""
+"""Defects of recordings: saturated, stuck or clipped channels, clocks that jump, lost markers, missing repeats."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from .dataset import Dataset, Trial
+from bifa.data import EXPERIMENTS, Dataset, Trial
+from bifa.data.layout import is_command
+from bifa.data.lost import codes, held
+
+from .finding import Finding
 from .lag import displacement_lag, misfit, shift_of_all
-from .layout import EXPERIMENTS, is_command
-from .lost import codes, held
 
 SENSOR_SPAN_PSI = 15.0  # Honeywell ABP...015PD: +-15 psi; beyond it the output is not specified
 ADC_LIMITS_PSI = (-18.75, 18.75)  # counts 0 and 1023, where 10-90 % of the supply spans 30 psi
@@ -19,32 +20,14 @@ FLAT_SAMPLES = 8  # equal extremes in a row, in a channel that otherwise never r
 SPIKE_MM = 5.0  # there and back within two samples; a snap-through goes there only
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing to look at. `file` is None where it concerns the whole data set, or several `files`; `line` is that of
-    the CSV file."""
-
-    kind: str
-    text: str
-    file: str | None = None
-    line: int | None = None
-    column: str | None = None
-    files: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        place = [self.file, f"line {self.line}" if self.line else None, self.column]
-        where = ", ".join(part for part in place if part)
-        return f"{where}: {self.text}" if where else self.text
-
-
-def check_dataset(dataset: Dataset) -> list[Finding]:
-    """Every finding, those of single trials first, in the order of the data set."""
-    findings = [found for trial in dataset.trials for found in check_trial(trial)]
+def check_recordings(dataset: Dataset) -> list[Finding]:
+    """Every defect, those of single trials first, in the order of the data set."""
+    findings = [found for trial in dataset.trials for found in check_recording(trial)]
     return findings + [found for check in DATASET_CHECKS for found in check(dataset)]
 
 
-def check_trial(trial: Trial) -> list[Finding]:
-    """What looks wrong in one trial by itself."""
+def check_recording(trial: Trial) -> list[Finding]:
+    """Defects of one trial by itself."""
     return [found for check in TRIAL_CHECKS for found in check(trial)]
 
 

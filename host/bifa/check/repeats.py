@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Dataset, Trial
-from bifa.data.check import Finding
 from bifa.data.layout import is_command
 
 # Of a channel's range, as an RMS difference. Healthy: 0.08 at most, where areas drift or sensors warm.

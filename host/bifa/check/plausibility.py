@@ -1,4 +1,4 @@
-"""Mistakes made at a bench that the format cannot refuse: signs, mirrors, exchanged tubes, another gait, a wrong unit.
+"""Mistakes made in the lab that the format cannot refuse: signs, mirrors, exchanged tubes, another gait, a wrong unit.
 
 A diagnosis would look for their cause in the robot. Each check has its own file, with its limits and how far from them
 healthy data stay, strong effects included. Nothing here changes what is fitted.
@@ -7,17 +7,15 @@ healthy data stay, strong effects included. Nothing here changes what is fitted.
 from collections.abc import Iterable, Sequence
 
 from bifa.data import Dataset, Trial
-from bifa.data.check import Finding
 
 from .copies import check_copies
+from .finding import Finding
 from .known import check_known
 from .loadings import check_anchor_pull, check_static_loading
 from .repeats import check_repeats
 from .steps import check_step_response
 from .units import check_strokes, check_units
 from .walks import check_walk
-
-__all__ = ["find_mistakes", "mistakes_in"]
 
 _CHECKS = {
     "static_loading": check_static_loading,
@@ -26,17 +24,17 @@ _CHECKS = {
 }
 
 
-def mistakes_in(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
+def check_trial_plausibility(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
     """What was mistaken in one trial, as it seems; `walks`, others of the day, may have the gait that it was."""
     if trial.experiment == "locomotion":
         return [*check_walk(trial, walks), *check_units(trial)]
     return [*_CHECKS[trial.experiment](trial), *check_units(trial)]
 
 
-def find_mistakes(dataset: Dataset) -> list[Finding]:
+def check_plausibility(dataset: Dataset) -> list[Finding]:
     """What was mistaken in a data set, as it seems: what is known beforehand, single trials, odd repeats."""
     walks = dataset.of("locomotion")
-    found = [finding for trial in dataset.trials for finding in mistakes_in(trial, walks)]
+    found = [finding for trial in dataset.trials for finding in check_trial_plausibility(trial, walks)]
     found += check_strokes(dataset, _files(finding for finding in found if finding.kind == "unit"))
     files = _files(found)
     odd = list(check_repeats(dataset, files))

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bifa.check.recordings import check_recording, check_recordings
 from bifa.cli import app
 from bifa.data import EXPERIMENTS, Dataset, write_dataset
-from bifa.data.check import check_dataset, check_trial
 from bifa.files import TargetError
-
-from .data_sets import make_dataset, make_trial
+from harness.data_sets import make_dataset, make_trial
 
 
 def sound() -> Dataset:
@@ -35,7 +34,7 @@ def damaged(file: str, **columns) -> list:
         else t
         for t in dataset.trials
     ]
-    return check_dataset(replace(dataset, trials=tuple(trials)))
+    return check_recordings(replace(dataset, trials=tuple(trials)))
 
 
 def put(start, stop, value):
@@ -54,11 +53,11 @@ def held_over(values, start, stop):
 
 def test_a_slow_camera_is_pointed_out_though_its_samples_are_taken_at_the_unos():
     trial = replace(make_trial("step_response", 1), extra={"camera_rate_hz": 60.0})
-    assert "the camera recorded 60 samples a second" in " ".join(map(str, check_trial(trial)))
+    assert "the camera recorded 60 samples a second" in " ".join(map(str, check_recording(trial)))
 
 
 def test_a_sound_data_set_has_no_findings():
-    assert check_dataset(sound()) == []
+    assert check_recordings(sound()) == []
 
 
 @pytest.mark.parametrize(
@@ -113,7 +112,7 @@ def test_missing_repeats_and_experiments():
         else t
         for t in kept
     ]
-    texts = [str(found) for found in check_dataset(replace(dataset, trials=tuple(kept)))]
+    texts = [str(found) for found in check_recordings(replace(dataset, trials=tuple(kept)))]
     assert len(texts) == 4
     assert "step response, small, 8.5 psi: repeat 2, 3 is missing; no noise floor can be estimated" in texts[0]
     assert "repeat 2 is missing; the noise floor is less certain" in texts[1]
@@ -124,7 +123,7 @@ def test_missing_repeats_and_experiments():
 def test_session_order_given_in_part_or_twice():
     dataset = sound()
     trials = [replace(t, session_order=[None, 4, 4][i % 3]) for i, t in enumerate(dataset.trials)]
-    texts = [str(found) for found in check_dataset(replace(dataset, trials=tuple(trials)))]
+    texts = [str(found) for found in check_recordings(replace(dataset, trials=tuple(trials)))]
     assert "4 of 12 trials have no session_order" in texts[0]
     assert "session_order 4 is given to several trials" in texts[1]
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
+from bifa.check.plausibility import check_plausibility
 from bifa.cli import app
 from bifa.data import write_dataset
-from bifa.mistakes import find_mistakes
 
 from .days import exchanged, mistaken, with_columns
 
@@ -21,7 +21,7 @@ def in_unit(column, size):
 
 
 def units_found(day):
-    return [(found.file, found.column, str(found)) for found in find_mistakes(day) if found.kind == "unit"]
+    return [(found.file, found.column, str(found)) for found in check_plausibility(day) if found.kind == "unit"]
 
 
 @pytest.mark.parametrize("unit", LENGTHS)

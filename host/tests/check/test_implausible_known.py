@@ -2,7 +2,7 @@
 
 import pytest
 
-from bifa.mistakes.known import check_known
+from bifa.check.known import check_known
 from bifa.robot.parameters import BASE_PARAMETERS
 
 KNOWN = {"head_mass_kg": 0.182, "tail_mass_kg": 0.17, "supply_positive_psi": 8.43, "supply_negative_psi": -13.0}

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Trial
-from bifa.data.check import Finding
 
 from .chambers import exchange_finding, exchanged, following, turned
 from .mirror import check_mirror, shortens_mm

@@ -6,7 +6,7 @@ What is plausible, and what can be computed at all, stands in the model's own ta
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 
-from bifa.data.check import Finding
+from bifa.check.finding import Finding
 from bifa.data.layout import TABLE_FILE
 from bifa.printable import printable
 from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter

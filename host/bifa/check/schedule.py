@@ -5,8 +5,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Trial
-from bifa.data.check import Finding
 from bifa.ranges import RANGES
 from bifa.robot.cpg import CHAMBERS, COUPLING_PER_S
 

@@ -5,8 +5,8 @@ from itertools import permutations
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Trial
-from bifa.data.check import Finding
 from bifa.robot.cpg import CHAMBERS
 
 from .schedule import contradicted, seen_gait

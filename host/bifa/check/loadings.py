@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Trial
-from bifa.data.check import Finding
 
 _TRAVEL_MM = 5.0  # less of it shows no stable end
 _ENDS = ((0.0, 0.05), (0.15, 0.25), (0.75, 0.85), (0.95, 1.0))  # of the travel

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bifa.mistakes import find_mistakes
+from bifa.check.plausibility import check_plausibility
 from bifa.robot.cpg import CHAMBERS
 
 from .days import exchanged, head_only, inverted, mistaken, said, told, turned
@@ -32,13 +32,13 @@ def test_head_and_tail_exchanged(any_day):
 def test_pressures_of_the_wrong_sign(any_day, chambers):
     columns = [f"pressure_{chamber}_psi" for chamber in chambers]
     for trial in any_day.of("locomotion"):
-        (found,) = find_mistakes(mistaken(any_day, trial.file, turned(*columns)))
+        (found,) = check_plausibility(mistaken(any_day, trial.file, turned(*columns)))
         assert (found.kind, found.file, found.column) == ("sign", trial.file, ", ".join(columns))
 
 
 def test_commands_written_the_other_way_round(any_day):
     for trial in any_day.of("locomotion"):
-        (found,) = find_mistakes(mistaken(any_day, trial.file, inverted))
+        (found,) = check_plausibility(mistaken(any_day, trial.file, inverted))
         assert (found.kind, found.file) == ("sign", trial.file)
         assert "1 is positive pressure, 0 vacuum; exchange them in all three columns" in str(found)
 
@@ -52,7 +52,7 @@ def test_exchanged_commands_are_told_from_exchanged_pressures_by_the_gait(any_da
             ("pressure_{}_psi", f"the pressures' columns, sensors or tubes of {names} are exchanged"),
         ):
             change = exchanged(*(columns.format(chamber) for chamber in pair))
-            (found,) = find_mistakes(mistaken(any_day, trial.file, change))
+            (found,) = check_plausibility(mistaken(any_day, trial.file, change))
             assert (found.kind, found.file) == ("swapped", trial.file)
             assert words in str(found)
 
@@ -63,7 +63,7 @@ def test_exchanged_commands_are_told_from_exchanged_pressures_by_the_gait(any_da
     ids=str,
 )
 def test_a_gait_that_was_not_walked(any_day, gait):
-    (found,) = find_mistakes(mistaken(any_day, "walk_baseline_2.csv", told(**gait)))
+    (found,) = check_plausibility(mistaken(any_day, "walk_baseline_2.csv", told(**gait)))
     assert (found.kind, found.file) == ("gait", "walk_baseline_2.csv")
     assert all(f"{name} = " in str(found) for name in gait)
 
@@ -75,7 +75,7 @@ def test_a_rounded_gait_and_an_uncertain_clock_are_none(any_day):
 
 def test_the_walk_whose_gait_it_is_is_named(day):
     easy = next(trial for trial in day.trials if trial.file == "walk_easy_1.csv")
-    (found,) = find_mistakes(mistaken(day, "walk_baseline_2.csv", told(**easy.gait)))
+    (found,) = check_plausibility(mistaken(day, "walk_baseline_2.csv", told(**easy.gait)))
     assert "period_s = 5.70 s, psi12_deg = 270 deg, psi13_deg = 90 deg" in str(found)
     assert "that is the gait of walk_baseline_1.csv; does dataset.toml name the right file?" in str(found)
 
@@ -93,7 +93,7 @@ def test_a_likely_cause_is_named(day, gait, cause):
     wrong = day
     for file in walks:
         wrong = mistaken(wrong, file, told(**gait))
-    found = find_mistakes(wrong)
+    found = check_plausibility(wrong)
     assert [finding.file for finding in found] == walks
     assert all(cause in str(finding) for finding in found)
 

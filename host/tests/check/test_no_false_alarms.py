@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from independent_lab import Lab as IndependentLab
-from independent_lab import session
 
 from benchmarks.sealed_campaign import generate
+from bifa.check.plausibility import check_plausibility, check_trial_plausibility
 from bifa.data import Trial, read_dataset
 from bifa.measure.plan import BRISK, PlannedTrial
-from bifa.mistakes import find_mistakes, mistakes_in
+from harness.independent_lab import Lab as IndependentLab
+from harness.independent_lab import session
 from virtual_robot.effects import EFFECTS, plant_parameters
 from virtual_robot.gait import Gait
 from virtual_robot.sealed import specimen
@@ -21,7 +21,7 @@ STRONG = ["sensor_calibration", "backlash", "leak", "choked_flow", "pump_fade"] 
 
 
 def assert_nothing_is_found(day):
-    assert [str(found) for found in find_mistakes(day)] == []
+    assert [str(found) for found in check_plausibility(day)] == []
 
 
 @pytest.mark.parametrize("effect", STRONG)
@@ -71,7 +71,7 @@ def assert_walks_have_none(seeds):
     for seed in seeds:
         walk = any_walk(seed)
         for seen in (walk, head_only(walk)):
-            assert [(seed, str(found)) for found in mistakes_in(seen)] == []
+            assert [(seed, str(found)) for found in check_trial_plausibility(seen)] == []
 
 
 def test_no_gait_is_a_mistake():

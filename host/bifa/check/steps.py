@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from bifa.check.finding import Finding
 from bifa.data import Trial
-from bifa.data.check import Finding
 
 from .swing import follow, swing
 

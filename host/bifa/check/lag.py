@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .dataset import Trial
+from bifa.data import Trial
 
 Motion = Callable[..., np.ndarray]  # (time_s, derivative's order) -> mm/s, as SciPy's splines
 

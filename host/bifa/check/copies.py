@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
+from bifa.check.finding import Finding
 from bifa.data import Dataset
-from bifa.data.check import Finding
 
 
 def check_copies(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[Finding]:
