@@ -1,5 +1,6 @@
 """The console that commands print on: text is text, wherever it comes from."""
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,36 @@ class Console(rich.console.Console):
     def status(self, status: Any, **options: Any) -> "Status":
         """See rich.console.Console, whose status would take markup."""
         return super().status(Text(status) if isinstance(status, str) else status, **options)
+
+
+class Countdown:
+    """What is waited for and for how long still: one line, redrawn in place; where nothing can be, said once.
+
+    What is typed meanwhile may stand behind it.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._status: Status | None = None
+        self._what = ""
+
+    def show(self, what: str, left_s: float) -> None:
+        """`what` goes on for `left_s` more."""
+        text = f"{what}: {math.ceil(left_s)} s"
+        if self._status is not None:
+            self._status.update(Text(text))
+        elif self._console.is_terminal:
+            self._status = self._console.status(text)
+            self._status.start()
+        elif what != self._what:
+            self._console.print(text, highlight=False)
+        self._what = what
+
+    def close(self) -> None:
+        """The line goes; a second call does nothing."""
+        if self._status is not None:
+            self._status.stop()
+        self._status, self._what = None, ""
 
 
 def words(template: str, **options: Any) -> "TextColumn":

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from bifa.cli import app
 from bifa.robot import nominal, save_model
-from bifa.screen import Console, warning, words
+from bifa.screen import Console, Countdown, warning, words
 
 NAMES = ["[/x]", "[link=https://evil.example]here[/link]", "[red]", "[bold]x[/bold]", ":warning:", "a\\[b"]
 
@@ -50,3 +50,23 @@ def test_a_model_may_be_called_anything(tmp_path, name, command):
     result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"}, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     assert name in result.output
+
+
+def counted_down(**options) -> str:
+    out = io.StringIO()
+    countdown = Countdown(Console(file=out, width=80, **options))
+    for left_s in (2.2, 1.9, 0.4):
+        countdown.show("The [head] is vented", left_s)
+    countdown.close()
+    countdown.close()
+    return out.getvalue()
+
+
+def test_a_countdown_is_redrawn_in_one_line_of_a_terminal_and_leaves_none():
+    seen = counted_down(force_terminal=True)
+    assert "The [head] is vented: 1 s" in seen
+    assert seen.endswith("\x1b[1A\x1b[2K"), "the line is wiped"
+
+
+def test_where_nothing_can_be_redrawn_what_is_waited_for_is_said_once():
+    assert counted_down() == "The [head] is vented: 3 s\n"

@@ -86,9 +86,10 @@ def test_a_rig_needs_a_pseudo_terminal_and_says_so(elsewhere):
     )
 
 
-def test_advice_about_ports_is_that_of_the_system(elsewhere):
+def test_advice_about_ports_is_that_of_the_system(elsewhere, tmp_path):
+    (tmp_path / "no-port").touch()
     assert "--port COM3" in bifa(elsewhere, "upload", "--help")
-    said = elsewhere("harness.without_posix", "monitor", "--port", "COM77").stderr.decode()
+    said = elsewhere("harness.without_posix", "monitor", "--port", tmp_path / "no-port").stderr.decode()
     assert said.rstrip().endswith("is it plugged in, and is another program using it?")
 
 

@@ -233,11 +233,20 @@ def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, An
     differing = _differing(begun.get("settings", {}), asked["settings"])
     differing += [f"another {name}" for name in _other_inputs(begun, asked)]
     if differing:
+        trials = trials_in(scratch)
+        held = f"holds {trials} trial{'' if trials == 1 else 's'} of the stage {stage.name}, begun"
         raise StageError(
-            f"{scratch} was begun with {', '.join(differing)}: run with the same to go on there, or delete that "
-            f"folder to begin the stage {stage.name} anew"
+            f"{scratch} {held if trials else 'was begun'} with {', '.join(differing)}: go on there with what it was "
+            "begun with, or name another folder for a new campaign; both are kept then"
         )
     return begun
+
+
+def trials_in(scratch: Path) -> int:
+    """How many trials an interrupted stage has left in its scratch folder."""
+    from bifa.data.write import PARTIAL_SUFFIX  # numpy comes with it: errors of usage do not wait for that
+
+    return len(list(scratch.glob(f"**/*{PARTIAL_SUFFIX}/*.csv")))
 
 
 def _other_inputs(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:

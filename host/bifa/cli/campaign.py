@@ -151,11 +151,12 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
     from bifa.measure.bench_file import read_exports
     from bifa.measure.by_hand import ByHand
     from bifa.measure.desk import Desk
+    from bifa.screen import Countdown
 
     if watch is not None and not watch.is_dir():
         raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
     plain = not console.encoding.lower().startswith("utf")
-    desk = Desk(lambda text: console.print(text, highlight=False), watch)
+    desk = Desk(lambda text: console.print(text, highlight=False), watch, Countdown(console))
     exports = partial(read_exports, bench_file) if bench_file else dict
     exports()  # what is wrong is said before anything moves
     return desk, ByHand(desk, watch, plain, exports)
@@ -165,14 +166,13 @@ def _kept(out: Path) -> str:
     """What an interrupted campaign has on disk, in words."""
     import json
 
-    from bifa.campaign.stages import PROVENANCE
-    from bifa.data.write import PARTIAL_SUFFIX
+    from bifa.campaign.stages import PROVENANCE, trials_in
 
     try:
         done = list(json.loads((out / PROVENANCE).read_text())["stages"])
     except (OSError, ValueError, KeyError):
         done = []
-    trials = sum(len(list(folder.glob("*.csv"))) for folder in out.glob(f".*-unfinished/**/*{PARTIAL_SUFFIX}"))
+    trials = sum(map(trials_in, out.glob(".*-unfinished")))
     under_way = f"{trials} trial{'' if trials == 1 else 's'} of the stage under way" if trials else ""
     kept = " and ".join(part for part in (f"the stages {', '.join(done)}" if done else "", under_way) if part)
     return f"{out} keeps {kept}" if kept else "nothing has been finished yet"

@@ -142,7 +142,7 @@ def record_telemetry(
                 try:
                     recorder.record_until_gone(path)
                 except GONE as error:
-                    if isinstance(error.__cause__, KeyboardInterrupt):
+                    if isinstance(error.__cause__, KeyboardInterrupt) or not recorder.has_begun:
                         raise
                     if path.exists() or not is_told:
                         console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
@@ -169,6 +169,11 @@ class _Recorder:
         self._nonce: int | None = None  # of the start that was seen last; None before the first
         self._desk = Desk(lambda text: console.print(text, highlight=False))
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether the Uno has ever answered."""
+        return self._nonce is not None
+
     def record_until_gone(self, path: Path) -> None:
         """Into the new file `path`; raises one of GONE when the Uno is."""
         uno: Uno | None = None
@@ -176,7 +181,7 @@ class _Recorder:
             with self._board.open() as rig, self._console.status("waiting for the Uno") as status:
                 uno = Uno(rig.transport, rig.clock)
                 with uno:
-                    is_back, known = self._nonce is not None, self._greet(uno)
+                    is_back, known = self.has_begun, self._greet(uno)
                     if self._parameters:
                         uno.upload(self._parameters)
                     uno.stream(True)

@@ -15,7 +15,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import tomli_w
 
@@ -32,13 +32,34 @@ class NobodyError(BifaError):
     """There is nobody who could answer."""
 
 
-class Desk:
-    """`say(text)` shows a line to the person; `watch` is the folder for scripts, if there is one. `is_asking`: a
-    question has not been answered yet."""
+class Countdown(Protocol):
+    """Shows how long something takes still (`bifa.screen.Countdown`)."""
 
-    def __init__(self, say: Callable[[str], None], watch: Path | None = None) -> None:
+    def show(self, what: str, left_s: float) -> None:
+        """`what` goes on for `left_s` more."""
+
+    def close(self) -> None:
+        """Nothing is counted any more; a second call does nothing."""
+
+
+class _Unseen:
+    def show(self, what: str, left_s: float) -> None:
+        """See Countdown."""
+
+    def close(self) -> None:
+        """See Countdown."""
+
+
+class Desk:
+    """`say(text)` shows a line to the person, `countdown` what they wait for; `watch` is the folder for scripts, if
+    there is one. `is_asking`: a question has not been answered yet."""
+
+    def __init__(
+        self, say: Callable[[str], None], watch: Path | None = None, countdown: Countdown | None = None
+    ) -> None:
         self.say = say
         self._watch = watch
+        self._countdown: Countdown = countdown or _Unseen()
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._is_listening = False
         self.is_asking = False
@@ -49,6 +70,7 @@ class Desk:
 
         `about`: what else a script needs to know, plain values.
         """
+        self._countdown.close()
         self._listen()
         self._forget()
         self.is_asking = True
@@ -81,6 +103,10 @@ class Desk:
         if self._is_stopped:
             raise KeyboardInterrupt
 
+    def count_down(self, what: str, left_s: float) -> None:
+        """While nothing is asked: `what` the robot does, for `left_s` still."""
+        self._countdown.show(what, left_s)
+
     def _taken(self) -> str | None:
         if self._watch is not None and (text := _from_file(self._watch / ANSWER)) is not None:
             return text
@@ -98,7 +124,8 @@ class Desk:
         return line.strip()
 
     def clear(self) -> None:
-        """Nothing is asked any more."""
+        """Nothing is asked any more, nor counted."""
+        self._countdown.close()
         if self._watch is not None:
             (self._watch / ASKS).unlink(missing_ok=True)
 

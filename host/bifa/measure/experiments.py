@@ -107,11 +107,12 @@ def _step(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> R
     _off(uno)
     uno.set("pressure_psi", planned.commanded_psi)
     uno.hold(chamber, "vacuum")
-    idle(rig, uno, SETTLE_S)
+    idle(rig, uno, SETTLE_S, f"The {chamber} is evacuated until it rests, contracted")
     with Recording(rig, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         uno.schedule([(STEP_UP_S, chamber, "positive"), (STEP_DOWN_S, chamber, "vacuum")])
-        tape.wait(STEP_END_S + LEAD_S)
+        step = f"The {chamber} steps to {planned.commanded_psi:g} psi and back to vacuum"
+        tape.wait(STEP_END_S + LEAD_S, doing=step)
     refuse_disturbed(tape.samples, "holding")
     i = CHAMBERS.index(chamber)
     command = tape.commands[:, i]
@@ -157,12 +158,15 @@ def _off(uno: Uno) -> None:
 def _pressurise(rig: Rig, uno: Uno, chamber: str, pressure_psi: float, settle_s: float = SETTLE_S) -> None:
     """Bring a chamber to a positive pressure, 0 (vented) or, for any negative one, full vacuum, and let it settle."""
     _off(uno)
+    doing = f"The {chamber} is vented"
     if pressure_psi > 0.0:
         uno.set("pressure_psi", pressure_psi)
         uno.hold(chamber, "positive")
+        doing = f"The {chamber} is held at {pressure_psi:g} psi"
     elif pressure_psi < 0.0:
         uno.hold(chamber, "vacuum")
-    idle(rig, uno, settle_s)
+        doing = f"The {chamber} is evacuated"
+    idle(rig, uno, settle_s, f"{doing} until the pressure has settled")
 
 
 def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, float]:

@@ -43,6 +43,10 @@ class AskedInstruments(Instruments, Protocol):
     def attend(self) -> None:
         """Called while nothing is asked of them: KeyboardInterrupt where somebody has asked to stop. Optional."""
 
+    def tell(self, what: str, left_s: float) -> None:
+        """Called every quarter of a second while nothing is asked of them: what the robot does now, and for how long
+        still, s. Optional."""
+
     def save(self) -> None:
         """Ask for the record of the recording that has just ended; `stop` gives it once `ready`."""
 
@@ -66,8 +70,10 @@ def until_ready(instruments: Instruments, wait: Callable[[], object]) -> None:
         wait()
 
 
-def attend(instruments: Instruments | None) -> None:
-    """Let instruments that somebody works hear that person out."""
-    listens = getattr(instruments, "attend", None)
+def attend(instruments: Instruments | None, doing: str = "", left_s: float = 0.0) -> None:
+    """Let instruments that somebody works hear that person out, and tell what the robot is `doing` meanwhile."""
+    listens, tell = (getattr(instruments, name, None) for name in ("attend", "tell"))
     if listens is not None:
         listens()
+    if doing and tell is not None:
+        tell(doing, left_s)

@@ -71,7 +71,8 @@ def record_walk(
     with tape:
         tape.wait(LEAD_S, report=False)
         uno.run()
-        tape.wait(cycles * gait.period_s + LEAD_S)
+        doing = f"The robot walks {cycles} cycle{'' if cycles == 1 else 's'} of {gait.period_s:g} s"
+        tape.wait(cycles * gait.period_s + LEAD_S, doing=doing)
     return RecordedWalk(
         _columns(tape, gait.period_s, cycles), tape.clock, tape.lost_samples, camera_rate(tape.instrument_s)
     )

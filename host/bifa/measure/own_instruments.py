@@ -148,6 +148,10 @@ class OwnInstruments:
         """See AskedInstruments."""
         self._desk.attend()
 
+    def tell(self, what: str, left_s: float) -> None:
+        """See AskedInstruments."""
+        self._desk.count_down(what, left_s)
+
     def save(self) -> None:
         """See AskedInstruments."""
         if self._record is not None:

@@ -36,13 +36,14 @@ def mount(rig: Rig, uno: Uno, experiment: str, **settings: Any) -> None:
     until_ready(instruments, lambda: idle(rig, uno, _PIECE_S))
 
 
-def idle(rig: Rig, uno: Uno, duration_s: float) -> None:
-    """Let time pass without letting the Uno think that the host has gone."""
+def idle(rig: Rig, uno: Uno, duration_s: float, doing: str = "") -> None:
+    """Let time pass without letting the Uno think that the host has gone; `doing`: what the robot does meanwhile, for
+    whoever works the instruments."""
     until_s = rig.clock.now() + duration_s
     while (left_s := until_s - rig.clock.now()) > 0:
+        attend(rig.instruments, doing, left_s)
         rig.clock.sleep(min(left_s, _PIECE_S))
         uno.keep_alive()
-        attend(rig.instruments)
 
 
 class Recording:
@@ -79,12 +80,13 @@ class Recording:
         if kind is None:
             self._line_up()
 
-    def wait(self, duration_s: float, report: bool = True) -> None:
-        """Let `duration_s` pass, and keep what the Uno says meanwhile; report: how far that is, as progress."""
+    def wait(self, duration_s: float, report: bool = True, doing: str = "") -> None:
+        """Let `duration_s` pass, and keep what the Uno says meanwhile; report: how far that is, as progress;
+        `doing`: as in `idle`."""
         begun_s = self._rig.clock.now()
         while (left_s := begun_s + duration_s - self._rig.clock.now()) > 0:
+            attend(self._instruments, doing, left_s)
             self.samples += self._uno.samples(min(left_s, _PIECE_S))
-            attend(self._instruments)
             if report:
                 self._on_progress(1.0 - max(left_s, 0.0) / duration_s)
 

@@ -5,8 +5,8 @@ import time
 
 import serial
 
-from bifa.computer import PORT_QUESTIONS
 from bifa.link.transport import PortGoneError
+from bifa.rig.unopened import why_unopened
 
 BAUD = 250_000
 RESET_PULSE_S = 0.05
@@ -21,7 +21,7 @@ class SerialTransport:
         try:
             self._port = serial.Serial(device, BAUD, timeout=0, write_timeout=2.0, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise PortGoneError(f"cannot open {device}: {error}; {PORT_QUESTIONS}") from error
+            raise PortGoneError(why_unopened(device, error)) from error
 
     def write(self, data: bytes) -> None:
         """See Transport."""

@@ -1,13 +1,12 @@
 """Build the image and write it to the board, through PlatformIO."""
 
-import errno
 from collections.abc import Callable
 from pathlib import Path
 
 import serial
 
-from bifa.computer import PORT_BUSY, PORT_QUESTIONS, PORT_REFUSED
 from bifa.rig import find_port
+from bifa.rig.unopened import why_unopened
 from bifa.toolchain.errors import ToolchainError
 from bifa.toolchain.project import ENVIRONMENT, image_path, platformio_program
 from bifa.toolchain.run import run
@@ -25,13 +24,7 @@ def _open_once(port: str) -> None:
     try:
         serial.Serial(port, exclusive=True).close()
     except (serial.SerialException, OSError) as error:
-        reason = {
-            errno.ENOENT: f"there is no port {port}; `bifa doctor` lists the ports",
-            errno.EACCES: PORT_REFUSED.format(port=port),
-            errno.EBUSY: PORT_BUSY.format(port=port),
-            errno.EAGAIN: PORT_BUSY.format(port=port),
-        }.get(getattr(error, "errno", None) or 0)
-        raise ToolchainError(reason or f"{port} does not open: {error}; {PORT_QUESTIONS}") from error
+        raise ToolchainError(why_unopened(port, error)) from error
 
 
 def build_image(project: Path, on_line: Callable[[str], None]) -> Path:

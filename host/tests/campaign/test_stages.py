@@ -236,11 +236,35 @@ def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, 
     log = []
     with pytest.raises(KeyboardInterrupt):
         run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
-    with pytest.raises(StageError, match=r"\.measure-unfinished was begun with quick = True, not False.*or delete"):
+    with pytest.raises(StageError, match=r"\.measure-unfinished was begun with quick = True, not False.*both are kept"):
         run_stages(tmp_path, [stopping(log, {"quick": False}, by_hand=True)])
     monkeypatch.setattr("bifa.__version__", "9.9")
     run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
     assert log == [[], ["trial_1"]]
+
+
+def test_settings_that_differ_are_refused_with_what_would_be_lost_and_what_would_not(tmp_path):
+    """Nobody is told to delete trials of hours."""
+
+    def run(inputs, outputs):
+        for trial in range(16):
+            file = outputs / "measured.partial" / f"step_{trial}.csv"
+            file.parent.mkdir(exist_ok=True)
+            file.write_text("time_s\n0\n")
+        raise KeyboardInterrupt
+
+    def stage(quick):
+        return Stage("measure", "m", (), ("measured",), run, {"quick": quick}, resumes=True, by_hand=True)
+
+    with pytest.raises(KeyboardInterrupt):
+        run_stages(tmp_path, [stage(False)])
+    with pytest.raises(StageError) as refused:
+        run_stages(tmp_path, [stage(True)])
+    assert str(refused.value) == (
+        f"{tmp_path / '.measure-unfinished'} holds 16 trials of the stage measure, begun with quick = False, not True: "
+        "go on there with what it was begun with, or name another folder for a new campaign; both are kept then"
+    )
+    assert len(list((tmp_path / ".measure-unfinished").rglob("*.csv"))) == 16
 
 
 def test_another_input_of_what_was_begun_by_hand_is_named(tmp_path):

@@ -33,9 +33,19 @@ class Bench:
         class Attended(Desk):
             def answer(self):
                 bench.lab.look()
+                bench.spoken_s.append(bench.rig.clock.now())  # the question stands
                 return super().answer()
 
-        ByHand(Attended(self.said.append, self.watch), self.watch).equip(self.rig)
+        self.counted, self.spoken_s = [], []
+        ByHand(Attended(self.said.append, self.watch, self), self.watch).equip(self.rig)
+
+    def show(self, what, left_s):
+        """As `Countdown`."""
+        self.counted.append((what, left_s))
+        self.spoken_s.append(self.rig.clock.now())
+
+    def close(self):
+        """As `Countdown`."""
 
     def run(self, folder, plan):
         return run_session(self.rig, folder, plan, name="a day", known={}, provenance={"by": "a test"})
@@ -88,6 +98,26 @@ def test_each_trial_is_announced_shown_and_kept_with_its_files(bench, tmp_path):
     assert raw.read_text().startswith("time_s,displacement_mm,force_N")
     assert raw.with_suffix(".sync.csv").exists()
     assert not (here.watch / "next.toml").exists()
+
+
+def test_whatever_takes_its_time_is_counted_down_with_what_the_robot_does(bench, tmp_path):
+    here = bench()
+    here.run(tmp_path / "day", PLAN)
+    assert np.diff(here.spoken_s).max() < 1.0, "nobody waits in silence"
+    counted = {}
+    for what, left_s in here.counted:
+        counted.setdefault(what, []).append(left_s)
+    assert list(counted) == [
+        "The head is held at 4 psi until the pressure has settled",
+        "The head is evacuated until it rests, contracted",
+        "The head steps to 8.5 psi and back to vacuum",
+        "The head is held at 8.5 psi until the pressure has settled",
+        f"The robot walks 1 cycle of {BRISK.period_s:g} s",
+    ]
+    for left_s in counted.values():
+        assert max(left_s) > 2.0
+        assert left_s == sorted(left_s, reverse=True)
+        assert left_s[-1] < 0.5
 
 
 def test_what_looks_wrong_is_said_and_the_trial_repeated_on_request(bench, tmp_path):
