@@ -27,9 +27,9 @@ import numpy as np
 
 from benchmarks import records as lines
 from bifa.campaign.bench import Bench
-from bifa.campaign.loop import EDGE_CYCLES, Effort, campaign, found_gait
+from bifa.campaign.loop import Effort, campaign, found_gait
 from bifa.campaign.stages import Stage, run_stages
-from bifa.campaign.walks import foretold, measure_walks, speeds
+from bifa.campaign.walks import foretold, measure_walks, planned_cycles, speeds
 from bifa.data import read_dataset
 from bifa.gait import SearchError
 from bifa.gait.prediction import FELL
@@ -109,13 +109,15 @@ def walked(folder: Path, bench: Bench, effort: Effort) -> dict[str, Walked]:
 def _walk_base(folder: Path, name: str, naive: bool, bench: Bench, effort: Effort, stage: int) -> None:
     if (folder / f"walks-{name}").exists():
         return
+    model = load_model(folder / "model-base.toml")
     try:
-        gait = found_gait(load_model(folder / "model-base.toml"), bench.seed, None, lambda *_: None, naive).gait
+        gait = found_gait(model, bench.seed, None, lambda *_: None, naive).gait
     except SearchError:
         gait = BASELINE
     save_gait(folder / f"gait-{name}.toml", gait, {"made_by": "benchmarks.loop"})
+    cycles = planned_cycles(model, gait, effort.cycles)
     with bench.open(stage) as rig:
-        measure_walks(rig, folder / f"walks-{name}", {name: gait}, EDGE_CYCLES, effort.repeats, probe=True)
+        measure_walks(rig, folder / f"walks-{name}", {name: gait}, cycles, effort.repeats)
 
 
 def _walked(walks: Path, model: Path, name: str) -> Walked:

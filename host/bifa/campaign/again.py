@@ -92,11 +92,11 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 @dataclass(frozen=True)
 class Trades:
     """What a round is made of: a diagnosis of all data gives the completed model and what it names, an optimiser its
-    gait, and the robot walks it into a data set; walk(number, gait, folder) numbers the rounds from 2 on."""
+    gait, and the robot walks it into a data set; walk(number, model, gait, folder) numbers the rounds from 2 on."""
 
     complete: Callable[[Dataset], tuple[Model, tuple[str, ...]]]
     optimise: Callable[[Model], Gait]
-    walk: Callable[[int, Gait, Path], Dataset]
+    walk: Callable[[int, Model, Gait, Path], Dataset]
 
 
 def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool = False) -> Round:
@@ -144,8 +144,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
 
     `dataset`: all that informed model-completed.toml, less the walks in `inputs`, whose last gait is the first round's.
     Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), the last round's model and the fastest gait.
-    Rounds
-    that an interrupted run has walked there are not walked again.
+    Rounds that an interrupted run has walked there are not walked again.
     """
     model, gait = load_model(inputs / "model-completed.toml"), load_gait(inputs / "gait-completed.toml")
     walks = read_dataset(inputs / "walks-completed")
@@ -160,7 +159,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
             model, effects = trades.complete(dataset)
         found.append(trades.optimise(model))
         folder = outputs / "rounds" / f"walks-{number}"
-        walks = read_dataset(folder) if folder.exists() else trades.walk(number, found[-1], folder)
+        walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)
         rounds.append(judged(model, effects, walks, at_edge=True))
     rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)

@@ -14,7 +14,7 @@ from bifa.campaign.prediction_error import prediction_errors
 from bifa.campaign.residuals import residuals
 from bifa.campaign.resolve import joined, resolve
 from bifa.campaign.stages import Stage
-from bifa.campaign.walks import measure_walks
+from bifa.campaign.walks import measure_walks, planned_cycles
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.data.dataset import labels_of
 from bifa.gait import Optimum, SearchError, Settings, optimise, simulations
@@ -36,7 +36,6 @@ from lacuna.diagnosis.record import as_record
 
 Part = Callable[[str, float], None]
 
-EDGE_CYCLES = 12  # transients near the edge last up to so many, and a walk that has not settled is walked again
 _AT_EDGE = 0.05  # of the robots that may fall off
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
@@ -61,10 +60,10 @@ def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
         *([_measure_once(bench, effort, part), _declare(bench)] if bench.is_kept else [_measure(bench, effort, part)]),
         _fit(bench, part),
         _optimise("base", bench, part),
-        _walk("walk-base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
+        _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
         _diagnose(bench, part),
         _optimise("completed", bench, part),
-        _walk("walk-completed", {"completed": "gait-completed.toml"}, 2, bench, effort, part),
+        _walk("completed", {"completed": "gait-completed.toml"}, 2, bench, effort, part),
         _again(bench, effort, part),
     ]
     if bench.is_virtual:
@@ -158,15 +157,18 @@ def found_gait(robot: Model, seed: int, spread: float | None, part: Part, naive:
         return optimise(robot, runs, settings, lambda what, share, _: part(what, share))
 
 
-def _walk(name: str, gaits: dict[str, str | None], number: int, bench: Bench, effort: Effort, part: Part) -> Stage:
-    walks = f"walks-{name.removeprefix('walk-')}"
+def _walk(which: str, gaits: dict[str, str | None], number: int, bench: Bench, effort: Effort, part: Part) -> Stage:
+    """Walk gaits for as long as the model `which` takes to settle with them."""
+    name, walks, model = f"walk-{which}", f"walks-{which}", f"model-{which}.toml"
 
     def run(inputs: Path, outputs: Path) -> None:
         loaded = {key: load_gait(inputs / file) if file else BASELINE for key, file in gaits.items()}
+        robot = load_model(inputs / model)
+        cycles = {key: planned_cycles(robot, gait, effort.cycles) for key, gait in loaded.items()}
         with bench.open(number) as rig:
-            measure_walks(rig, outputs / walks, loaded, effort.cycles, effort.repeats, _told(bench, part))
+            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, _told(bench, part))
 
-    needs = tuple(file for file in gaits.values() if file)
+    needs = (model, *(file for file in gaits.values() if file))
     settings = bench.settings(number) | {"effort": asdict(effort)}
     title, kept = f"walk: {' and '.join(gaits)}", bench.is_kept
     return Stage(name, title, needs, (walks,), run, settings, resumes=kept, by_hand=kept)
@@ -207,11 +209,10 @@ def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
         found = _diagnosed(dataset, bench, part)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
-    def walk(number: int, gait: Gait, folder: Path) -> Dataset:
+    def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
+        cycles = planned_cycles(model, gait, effort.cycles)
         with bench.open(_FURTHER + number) as rig:
-            told = _told(bench, part)
-            gaits = {f"round-{number}": gait}
-            return measure_walks(rig, folder, gaits, EDGE_CYCLES, effort.repeats, told, probe=True)
+            return measure_walks(rig, folder, {f"round-{number}": gait}, cycles, effort.repeats, _told(bench, part))
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")

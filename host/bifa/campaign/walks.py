@@ -13,7 +13,7 @@ from bifa.campaign.stages import Stage
 from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.gait.prediction import Prediction, predict_speed
-from bifa.gait.settling import LEAST, MOST_CYCLES, PROBE_CYCLES, STANDING_MM_S, Walking
+from bifa.gait.settling import LEAST, MOST_CYCLES, Walking
 from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
 from bifa.measure.experiments import record_columns
@@ -32,25 +32,24 @@ def measure_walks(
     rig: Rig,
     folder: Path,
     gaits: Mapping[str, Gait],
-    cycles: int,
+    cycles: int | Mapping[str, int],
     repeats: int = 1,
     on_progress: Progress = lambda what, share: None,
-    probe: bool = False,
 ) -> Dataset:
-    """Walk every gait `repeats` times on the rig, into the data set `folder` of trials named after the gaits; walks
-    that an interrupted run has left there are not walked again.
+    """Walk every gait `repeats` times on the rig for as many `cycles`, or for its own, into the data set `folder` of
+    trials named after the gaits; walks that an interrupted run has left there are not walked again.
 
-    On a rig that needs nobody a walk of `cycles` that has not settled is walked again for twice as long, up to
-    `MOST_CYCLES`; with `probe` every walk is tried for two cycles first, and that is all where it stands still.
+    On a rig that needs nobody a walk that has not settled is walked again for twice as long, up to `MOST_CYCLES`.
     """
-    record = getattr(rig, "recorder", None) or (_probed if probe else _settled)
+    record = getattr(rig, "recorder", None) or _settled
+    each = cycles if isinstance(cycles, Mapping) else dict.fromkeys(gaits, cycles)
     total = len(gaits) * repeats
     with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
         hello = uno.connect()
         uno.clear()
         writer = DatasetWriter(folder, "walks", {}, {"firmware": hello.firmware}, resume=True)
         for number, (name, repeat) in enumerate(itertools.product(gaits, range(1, repeats + 1)), start=1):
-            planned = PlannedTrial("locomotion", gait=gaits[name], cycles=cycles, repeat=repeat)
+            planned = PlannedTrial("locomotion", gait=gaits[name], cycles=each[name], repeat=repeat)
             if writer.has(planned.as_trial()):
                 continue
 
@@ -68,12 +67,6 @@ def _walk(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[floa
     return planned.as_trial(columns, extra=extra)
 
 
-def _probed(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The same of gaits with which the robot may stand still: two cycles tell."""
-    trial = _walk(rig, uno, replace(planned, cycles=PROBE_CYCLES), on_progress)
-    return trial if stands_still(trial) else _settled(rig, uno, planned, on_progress)
-
-
 def _settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
     """The same until the walk has settled, or has had time enough for that."""
     while True:
@@ -84,11 +77,10 @@ def _settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[f
         planned = replace(planned, cycles=min(2 * planned.cycles, MOST_CYCLES))
 
 
-def stands_still(trial: Trial) -> bool:
-    """Whether the second of two cycles advanced no further."""
-    period_s = trial.walked["period_s"]
-    at_mm = np.interp([period_s, 2.0 * period_s], trial.time_s, trial.columns["displacement_head_mm"])
-    return bool(abs(at_mm[1] - at_mm[0]) < STANDING_MM_S * period_s)
+def planned_cycles(model: Model, gait: Gait, least: int) -> int:
+    """For how many cycles to walk: near the edge a robot may stand nearly still for several before it walks, so that
+    the first ones tell nothing; the model foretells how many."""
+    return int(np.clip(predict_speed(model, spread_of(model), gait).cycles, least, MOST_CYCLES))
 
 
 def speed_of(trial: Trial) -> MeasuredSpeed:
@@ -122,8 +114,6 @@ def predict(model: Model, trial: Trial) -> dict[str, Any]:
 
 def predicted_speed(model: Model, trial: Trial) -> float:
     """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
-    if trial.time_s[-1] - trial.time_s[0] < LEAST * trial.walked["period_s"]:  # stopped: the robot stood still
-        return foretold(model, trial).speed_mm_s
     columns = predict(model, trial)
     return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.walked["period_s"], 0.0).mean_mm_s
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.errors import BifaError
-from bifa.gait.settling import CAMERA_MM, LEAST, PROBE_CYCLES, STANDING_MM_S, Walking, settling, walking
+from bifa.gait.settling import CAMERA_MM, LEAST, Walking, settling, walking
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,13 @@ def measured_speed(
     The displacement at a cycle's boundary is read off the record by linear interpolation; `noise_mm`, the standard
     deviation of a displacement (0 of a simulated one), enters a cycle's speed as sqrt(2) `noise_mm` / period.
 
-    A walk that was stopped after two cycles because it stood still has that speed. Raises BifaError where the record
-    does not hold the `LEAST` cycles that it takes to see whether it has settled.
+    Raises BifaError where the record does not hold the `LEAST` cycles that it takes to see whether it has settled.
     """
     start_s = time_s[0]
-    lasts = (time_s[-1] - start_s) / period_s
-    is_probe = abs(lasts - PROBE_CYCLES) < 0.05  # whose last samples the clocks may have cut off
-    complete = PROBE_CYCLES if is_probe else int(np.floor(lasts + 1e-6))
+    complete = int(np.floor((time_s[-1] - start_s) / period_s + 1e-6))
     boundaries_s = start_s + period_s * np.arange(complete + 1)
     advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
-    stood = is_probe and abs(advance_mm[-1]) < STANDING_MM_S * period_s
-    if complete < LEAST and not stood:
+    if complete < LEAST:
         raise BifaError(
             f"the walk holds {complete} complete cycle(s) of {period_s:g} s, and whether it has settled takes {LEAST}: "
             "record a longer walk"

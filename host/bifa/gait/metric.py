@@ -37,7 +37,8 @@ class Metric:
     cycles: simulated, from rest. judged: the last so many must agree within `periodic` (of the advance, which counts
     as at least 1 mm) and slip less than `slip_m` each. Slip is travel while both ends slide. tolerance_m: of the
     integrator, a step. direction: -1 to count backward walking. inclination_deg: of the pipe, uphill positive.
-    clock: seconds that pass in one of the Uno's, by which gaits and speeds are meant.
+    clock: seconds that pass in one of the Uno's, by which gaits and speeds are meant. dead_time_s: of the Uno's, in
+    which a chamber is vented between the supplies.
     """
 
     cycles: int = 10
@@ -48,6 +49,7 @@ class Metric:
     direction: int = 1
     inclination_deg: float = 0.0
     clock: float = 1.0
+    dead_time_s: float = 0.0
 
     @property
     def is_plain(self) -> bool:
@@ -86,6 +88,7 @@ class Passage:
     tolerance_m: float = 1e-5
     inclination_deg: float = 0.0
     clock: float = 1.0
+    dead_time_s: float = 0.0
 
     @property
     def terrain(self) -> np.ndarray:

@@ -42,7 +42,8 @@ class Simulations:
 def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Progress:
     place: dict[str, Any] = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
     real = gaits * np.array([metric.clock, 1.0, 1.0, 1.0, 1.0, 1.0])
-    progress = speeds(plants, real, metric.cycles, metric.tolerance_m, **place, workers=1)
+    dead_time_s = metric.dead_time_s * metric.clock
+    progress = speeds(plants, real, metric.cycles, metric.tolerance_m, **place, dead_time_s=dead_time_s, workers=1)
     return replace(progress, period_s=gaits[:, 0])
 
 

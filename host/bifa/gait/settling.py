@@ -10,7 +10,6 @@ import numpy as np
 WITHIN = 1e-3  # of the advance (at least 1 mm): by what settled cycles differ
 LEAST = 3  # settled cycles that are wanted
 MOST_CYCLES = 24  # that a walk is given to settle in
-PROBE_CYCLES = 2  # that show whether a robot stands still
 STANDING_MM_S = 1.0  # slower is standing still
 CAMERA_MM = 0.1  # standard deviation of a place that a motion capture tells
 _SURE = 3.5  # standard deviations

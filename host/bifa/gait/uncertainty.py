@@ -42,14 +42,14 @@ class Knowledge:
     @property
     def naive(self) -> Knowledge:
         """The covariance alone, as if the model were true and every run the same."""
-        return replace(self, scatter=Scatter(clock=self.scatter.clock), text=f"{self.text.split(';')[0]} alone")
+        return replace(self, scatter=self.scatter.timing, text=f"{self.text.split(';')[0]} alone")
 
     def plants(self, model: Model, count: int, seed: int) -> list[Plant]:
         """`count` robots, flat. A draw beyond a parameter's bounds is put on the bound.
 
         Drawn as a scrambled Sobol sequence, so that few draws already cover the spread; numbers differ by seed.
         """
-        own, moves = _own_values(model), _MOVES if self.scatter != Scatter(clock=self.scatter.clock) else ()
+        own, moves = _own_values(model), _MOVES if self.scatter != self.scatter.timing else ()
         size = len(self.names) + len(moves) + len(own)
         power = max(0, int(np.ceil(np.log2(count))))
         unit = qmc.Sobol(size, scramble=True, rng=np.random.default_rng([seed, 4])).random_base2(power)[:count]
@@ -86,7 +86,8 @@ def spread_of(model: Model, relative: float | None = None) -> Knowledge:
     names = tuple(BASE_PARAMETERS)
     factor = np.diag([share * abs(model[name]) for name in names])
     text = f"{100 * share:g} % standard deviation of {len(names)} parameters, independent"
-    return Knowledge(names, factor, text if relative is not None else f"{text}: a guess, without data", is_guess=True)
+    text = text if relative is not None else f"{text}: a guess, without data"
+    return Knowledge(names, factor, text, (model.scatter or Scatter()).timing, is_guess=True)
 
 
 def _words(scatter: Scatter) -> str:

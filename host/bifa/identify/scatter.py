@@ -34,13 +34,18 @@ def scatter_of(fit: Fit) -> Scatter:
         "speed": _speed(fit),
     }
     rounded = {name: float(f"{value:.4g}") for name, value in found.items()}
-    return Scatter(**rounded, clock=_clock(cast(RobotSystem, fit.structure.system)))
+    return replace(_timing(cast(RobotSystem, fit.structure.system)), **rounded)
 
 
-def _clock(system: RobotSystem) -> float:
-    """That of the walks, in the mean: near the edge a quarter of a per cent decides."""
-    rates = [seconds_per_uno_s(trial) for trial in system.dataset.trials if trial.experiment == WALK]
-    return round(float(np.mean(rates)), 6) if rates else 1.0
+def _timing(system: RobotSystem) -> Scatter:
+    """That of the walks, in the mean: near the edge a quarter of a per cent of the period decides, and a few
+    milliseconds do."""
+    walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]
+    if not walks:
+        return Scatter()
+    clock = float(np.mean([seconds_per_uno_s(trial) for trial in walks]))
+    dead_time_s = float(np.mean([trial.extra.get("dead_time_s", 0.0) for trial in walks]))
+    return Scatter(clock=round(clock, 6), dead_time_s=round(dead_time_s, 6))
 
 
 def _between_runs(fit: Fit) -> float:

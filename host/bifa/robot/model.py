@@ -15,6 +15,7 @@ from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParamete
 from bifa.robot.stiffness import StiffnessCurve
 
 GRAVITY_M_S2 = 9.80665
+MOST_DEAD_TIME_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,9 @@ class Scatter:
     """What walks differ from the model by beyond the covariance of its values.
 
     friction: relative standard deviation of the friction from run to run. pressure_psi, force_N: RMS of what the model
-    leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative. clock:
-    seconds that pass in one of the Uno's, whose cycles are shorter or longer by that.
+    leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative. And how
+    the Uno keeps time, which is no scatter but moves the edge all the same: clock, seconds that pass in one of its own;
+    dead_time_s, of its own, in which a chamber is vented between the supplies.
     """
 
     friction: float = 0.0
@@ -48,6 +50,12 @@ class Scatter:
     force_N: float = 0.0
     speed: float = 0.0
     clock: float = 1.0
+    dead_time_s: float = 0.0
+
+    @property
+    def timing(self) -> Scatter:
+        """How the Uno keeps time, and nothing else."""
+        return Scatter(clock=self.clock, dead_time_s=self.dead_time_s)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -55,6 +63,8 @@ class Scatter:
                 raise ModelParameterError(f"scatter.{name} = {value:g} must be a number not below 0")
         if not 0.9 <= self.clock <= 1.1:
             raise ModelParameterError(f"scatter.clock = {self.clock:g} must be a clock's, within 0.9 to 1.1")
+        if self.dead_time_s > MOST_DEAD_TIME_S:
+            raise ModelParameterError(f"scatter.dead_time_s = {self.dead_time_s:g} must be at most {MOST_DEAD_TIME_S}")
 
 
 @dataclass(frozen=True)

@@ -60,9 +60,11 @@ def speeds(
     *,
     inclination_deg: float = 0.0,
     terrain: np.ndarray = rigs.CLEAR,
+    dead_time_s: float = 0.0,
     workers: int | None = None,
 ) -> Progress:
-    """Many gaits (n, 6) with one model, or with n models one each; shapes (n, cycles).
+    """Many gaits (n, 6) with one model, or with n models one each; shapes (n, cycles). `dead_time_s`: for so long the
+    Uno vents a chamber between its supplies.
 
     Runs in threads without the GIL: `workers`, or one a core. Rows are dealt out in small pieces, since gaits differ
     in cost. Angles need not be within 0-360.
@@ -72,7 +74,7 @@ def speeds(
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
     ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
     ends = gaits[:, :1] * np.arange(1, cycles + 1)
-    switches = [(t.time_s, t.chamber, t.command) for t in gait_switches(gaits, ends[:, -1])]
+    switches = [(t.time_s, t.chamber, t.command) for t in gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)]
     advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
 
     def run(piece: np.ndarray) -> None:

@@ -149,8 +149,11 @@ def recorded_commands(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.array([columns[f"command_{chamber}"] for chamber in cpg.CHAMBERS], dtype=float)
 
 
-def gait_switches(gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: float = 0.0) -> list[Timeline]:
-    """The timelines of settled gaits, rows (period, psi12, psi13 in degrees, three duties), for as long each."""
+def gait_switches(
+    gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: float = 0.0, dead_time_s: float = 0.0
+) -> list[Timeline]:
+    """The timelines of settled gaits, rows (period, psi12, psi13 in degrees, three duties), for as long each; between
+    the supplies chambers are vented as `vented_between` has it."""
     period, duty = gaits[:, :1], gaits[:, 3:]
     phase = first_phase_rad / _TWO_PI + np.pad(gaits[:, 1:3], ((0, 0), (1, 0))) / 360.0
     phase = phase - np.floor(phase)
@@ -167,11 +170,17 @@ def gait_switches(gaits: np.ndarray, duration_s: np.ndarray, first_phase_rad: fl
     for one, real_one, begins in zip(time.reshape(len(gaits), -1), real.reshape(len(gaits), -1), first, strict=True):
         kept = np.flatnonzero(real_one)
         kept = kept[np.argsort(one[kept], kind="stable")]
+        time_s, whose, told = one[kept], chamber[kept], command[kept]
+        if dead_time_s > 0.0:
+            time_s = np.concatenate([time_s, time_s + dead_time_s])
+            order = np.argsort(time_s, kind="stable")
+            time_s, whose = time_s[order], np.tile(whose, 2)[order]
+            told = np.concatenate([np.full_like(told, OFF), told])[order]
         found.append(
             Timeline(
-                np.concatenate([np.zeros(3), one[kept]]),
-                np.concatenate([np.arange(3), chamber[kept]]),
-                np.concatenate([begins.astype(np.int64), command[kept]]),
+                np.concatenate([np.zeros(3), time_s]),
+                np.concatenate([np.arange(3), whose]),
+                np.concatenate([begins.astype(np.int64), told]),
             )
         )
     return found

@@ -40,6 +40,7 @@ def folder(tmp_path):
     columns = walk(ROBOT, BASELINE, time_s=np.arange(0.0, 6.0, 0.01)).columns
     day = Trial("walk_1.csv", "locomotion", columns=columns, gait=BASELINE.as_dict(), repeat=1, session_order=1)
     write_dataset(folder / "bench", Dataset(None, "day", {}, (day,), {}))
+    save_model(folder / "model-base.toml", ROBOT)
     save_model(folder / "model-completed.toml", SLIPPERY)
     save_gait(folder / "gait-base.toml", BRISK)
     save_gait(folder / "gait-completed.toml", FAST)

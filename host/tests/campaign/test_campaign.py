@@ -26,9 +26,17 @@ def test_the_demo_names_the_sealed_effect_and_predicts_what_is_then_measured(tmp
     assert error["before"]["held_out"] > 1.5 * error["noise_floor"]["held_out"]
     assert error["after"]["held_out"] < 1.2 * error["noise_floor"]["held_out"]
     speeds = {gait["gait"]: gait for gait in summary["gaits"]}
-    for name in ("baseline", "base", "completed"):  # at the edge the robot may fall, which is told and fed back
-        assert speeds[name]["completed_model"] == pytest.approx(speeds[name]["measured"], rel=0.03)
+    assert list(speeds) == ["baseline", "base", "completed", "edge"]
+    for one in speeds.values():
+        assert one["completed_model"] == pytest.approx(one["measured"], rel=0.03)
+    for name in ("baseline", "completed", "edge"):  # each with an interval by a model that knows the robot
+        low, high = speeds[name]["interval_90_mm_s"]
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        # one speed in ten lies outside of it, and hardly one in a million beyond three times as far
+        assert abs(speeds[name]["measured"] - middle) < 3.0 * half
+        assert speeds[name]["walks_probability"] > 0.9
     assert speeds["completed"]["measured"] > 1.5 * speeds["baseline"]["measured"]
+    assert speeds["edge"]["measured"] > 1.02 * speeds["completed"]["measured"]
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "src=" not in page.split("<script>")[0], "nothing is fetched"
     assert (folder / "walk.svg").read_text().count("@keyframes") == 10

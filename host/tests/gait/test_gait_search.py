@@ -11,7 +11,7 @@ from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
 from bifa.gait.search import VERIFYING_DRAWS, _robustly
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, nominal
-from bifa.simulate import gait_rows
+from bifa.simulate import gait_rows, plant
 
 ROBUST = np.array([[2.7, 193.0, 325.0, 0.655, 0.428, 0.428]])
 
@@ -81,6 +81,17 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     assert np.quantile(after, 0.1) > 0.95 * speed > 20.0
 
 
+def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(runs):
+    """Nearly all robots were as fast as the model there, which was not walking either."""
+    settings, spread = Settings(spread=0.001), spread_of(nominal(), 0.001)
+    fallen = settings.space.slower(settings.space.point(library.load("fast").gait)[None], -0.02)
+    rows = gait_rows(settings.space.gaits(fallen))
+    assert distribution(runs, [plant(nominal())], rows, Metric())[0, 0] < 2.0
+    found = Found(fallen, np.ones(1))
+    _, speed = _robustly(nominal(), runs, spread, found, found, settings, lambda *_: None)
+    assert speed > 20.0
+
+
 @pytest.mark.slow
 def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
     """Half the robots of a 20 % spread cannot walk at such speeds: no error, and not just any gait."""
@@ -136,8 +147,6 @@ def test_a_dask_cluster_gives_the_same_gait():
 
 
 def distributed_sample(pool, settings):
-    from bifa.simulate import plant
-
     points = np.random.default_rng(settings.seed).random((24, 5))
     objective = NominalSpeed(pool, plant(nominal()), settings.space, settings.metric)
     return objective(points)

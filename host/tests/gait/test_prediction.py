@@ -1,18 +1,19 @@
 """Predictions: an interval, a probability of walking, and what both are drawn from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bifa.gait import library
 from bifa.gait.prediction import Prediction, predict_speed
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Covariance, nominal
 from bifa.robot.model import Scatter
-from bifa.simulate import layout
+from bifa.simulate import layout, of_gait, vented_between, walk
 
 
 def known(scatter=None, sd=1e-6, **changes):
-    from dataclasses import replace
-
     model = nominal().with_values(changes, Covariance(("mu_k",), np.array([[sd**2]])))
     return replace(model, scatter=scatter)
 
@@ -89,6 +90,26 @@ def test_cycles_of_a_slow_clock_are_longer():
     assert slow.speed_mm_s == pytest.approx(fast.speed_mm_s, rel=5e-3)
 
 
+def test_what_is_foretold_is_what_the_uno_does_which_vents_between_the_supplies():
+    """At the edge 4 ms decide: with this gait the robot walks because of the vent."""
+    edge = library.load("fast").gait
+    edge = replace(edge, period_s=0.999 * edge.period_s)
+    as_the_uno, without = known(Scatter(dead_time_s=0.004)), known(Scatter())
+    foretold, other = (predict_speed(m, spread_of(m), edge, draws=4).speed_mm_s for m in (as_the_uno, without))
+    end_s = 16 * edge.period_s
+    commands = vented_between(of_gait(edge, end_s), 0.004)
+    way_mm = walk(nominal(), commands=commands, time_s=np.linspace(0.0, end_s, 17))["displacement_head_mm"]
+    assert foretold == pytest.approx((way_mm[-1] - way_mm[-2]) / edge.period_s, abs=0.1)
+    assert foretold > 20.0
+    assert other < 2.0
+
+
+def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
+    timing = Scatter(dead_time_s=0.004, clock=0.998)
+    model = known(replace(timing, friction=0.01))
+    assert spread_of(model, 0.02).scatter == spread_of(model).naive.scatter == timing
+
+
 def test_the_search_knows_the_clock():
     """Of a gait sought without it 0.95 of the robots were to walk, and 0.79 did on a clock that was 0.23 % fast."""
     from bifa.gait import Metric, simulations
@@ -106,5 +127,23 @@ def test_robots_that_fall_behind_count_for_the_probability_and_not_for_the_inter
     prediction = Prediction(np.array([*[23.0] * 95, *[1.0] * 5]), 5)
     assert prediction.walks_probability == pytest.approx(96 / 102)
     assert prediction.interval_90_mm_s == (23.0, 23.0)
-    assert "walks with probability 0.94" in prediction.text
+    assert prediction.text.endswith("if it walks, with probability 0.94")
     assert Prediction(np.zeros(10), 5).speed_mm_s == 0.0
+
+
+@pytest.mark.parametrize("falling", [0.02, 0.4, 0.57, 0.95])
+def test_the_interval_is_that_of_the_robots_that_walk_even_where_most_fall(falling):
+    """Friction by direction, 300: 1.00 to 23.80 mm/s with probability 0.43, from the median of the fallen."""
+    draw = np.random.default_rng(3)
+    fall = int(falling * 1000)
+    speeds = np.concatenate([draw.normal(1.1, 0.1, fall), draw.normal(23.8, 0.02, 1000 - fall)])
+    prediction = Prediction(speeds, 5)
+    assert prediction.walks_probability == pytest.approx(1.0 - falling, abs=0.002)
+    assert prediction.interval_90_mm_s == pytest.approx((23.767, 23.833), abs=0.015)
+    assert prediction.holds(23.79)
+
+
+def test_robots_that_differ_much_but_do_not_fall_all_walk():
+    speeds = np.random.default_rng(1).normal(20.0, 1.5, 256)
+    assert Prediction(speeds, 5).walks.sum() >= 254
+    assert Prediction(np.array([*[20.0] * 255, 30.0]), 5).walks.all(), "one that is faster is no measure"

@@ -1,11 +1,14 @@
 """What repeats share, and no noise."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from bifa.data import Dataset, Trial
 from bifa.errors import BifaError
-from bifa.identify.scatter import shared_square
-from bifa.robot import load_model, nominal, save_model
+from bifa.identify.scatter import _timing, shared_square
+from bifa.robot import BASELINE, load_model, nominal, save_model
 from bifa.robot.model import Scatter
 
 
@@ -18,15 +21,27 @@ def test_noise_averages_out_of_what_repeats_share():
     assert shared_square(repeats[:1]) > 0.9  # a single repeat: noise cannot be told from what is unexplained
 
 
+def test_the_scatter_says_how_the_uno_keeps_time():
+    gait = BASELINE.as_dict()
+    trials = [
+        Trial(f"walk_{k}.csv", "locomotion", columns={}, gait=gait, repeat=k, extra=extra)
+        for k, extra in enumerate([{"clock_rate": 1.004, "dead_time_s": 0.004}, {"clock_rate": 1.002}], start=1)
+    ]
+    timing = _timing(SimpleNamespace(dataset=Dataset(None, "day", {}, tuple(trials), {})))
+    assert timing == Scatter(clock=0.99701, dead_time_s=0.002)
+
+
 def test_a_model_file_keeps_the_scatter(tmp_path):
     from dataclasses import replace
 
-    model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001))
+    model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004))
     save_model(tmp_path / "m.toml", model)
     assert load_model(tmp_path / "m.toml").scatter == model.scatter
 
 
-@pytest.mark.parametrize("line", ["friction = -0.1", 'friction = "much"', "friction = nan", "wind = 1.0"])
+@pytest.mark.parametrize(
+    "line", ["friction = -0.1", 'friction = "much"', "friction = nan", "dead_time_s = 0.2", "wind = 1.0"]
+)
 def test_a_scatter_that_is_none_is_refused(tmp_path, line):
     save_model(tmp_path / "m.toml", nominal())
     with (tmp_path / "m.toml").open("a") as file:

@@ -6,6 +6,7 @@ import pytest
 from bifa import simulate
 from bifa.robot import Gait, cpg
 from bifa.simulate import TimelineError
+from bifa.simulate.timeline import gait_switches
 
 GAITS = [Gait(2.7, 250.0, 80.0, 0.62, 0.45, 0.5), Gait(5.7, 0.0, 359.0, 0.5, 0.0, 1.0)]
 
@@ -36,6 +37,15 @@ def test_switches_are_found_well_within_a_sample(clock):
     found = simulate.refine(simulate.of_samples(sample, seen), gait, 0.01)
     late = true.time_s[true.time_s * clock < 37.99]
     np.testing.assert_allclose(found.time_s[3:], late[3:] * clock, atol=1e-3)
+
+
+def test_many_gaits_at_once_are_vented_between_the_supplies_as_one_is():
+    gait = Gait(2.5, 172.5, 315.1, 0.63, 0.375, 0.375)
+    rows = np.array([[*gait.as_dict().values()]])
+    (line,) = gait_switches(rows, np.array([20.0]), dead_time_s=0.004)
+    one = simulate.vented_between(simulate.of_gait(gait, 20.0), 0.004)
+    np.testing.assert_allclose(line.time_s, one.time_s, atol=1e-12)
+    np.testing.assert_array_equal(line.at(np.arange(0.0, 20.0, 1e-3)), one.at(np.arange(0.0, 20.0, 1e-3)))
 
 
 def test_off_is_vented_and_nan_in_a_record():
