@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks import records as lines
-from bifa.campaign.bench import Bench
 from bifa.campaign.loop import Effort, campaign, found_gait
+from bifa.campaign.setup import Setup
 from bifa.campaign.stages import Stage, run_stages
 from bifa.campaign.walks import foretold, measure_walks, planned_cycles, speeds
 from bifa.data import read_dataset
@@ -80,11 +80,11 @@ def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) ->
     """Run the campaign on the robot with `effect` at its full size, or what is left of it, and walk its gaits."""
     values = EFFECTS[effect].at(1.0, np.random.default_rng([seed, 0x100]))
     options = {"sealed": seed, "sealed_kind": "none", "effects": {effect: values}, "profile": "realistic"}
-    bench, folder = Bench("virtual", seed, options), out / f"{effect}-{seed}"
-    stages = campaign(bench, effort or Effort(), lambda what, share: None)
+    setup, folder = Setup("virtual", seed, options), out / f"{effect}-{seed}"
+    stages = campaign(setup, effort or Effort(), lambda what, share: None)
     run_stages(folder, stages, on_start=_begun)
     summary = json.loads((folder / "summary.json").read_text())
-    gaits = walked(folder, bench, effort or Effort())
+    gaits = walked(folder, setup, effort or Effort())
     print("\r" + " " * 60, end="\r")
     return Gain(effect, seed, tuple(found["name"] for found in summary["effects"]), gaits)
 
@@ -93,7 +93,7 @@ def _begun(stage: Stage) -> None:
     print(f"\r{stage.title:60}", end="", flush=True)
 
 
-def walked(folder: Path, bench: Bench, effort: Effort) -> dict[str, Walked]:
+def walked(folder: Path, setup: Setup, effort: Effort) -> dict[str, Walked]:
     """The gaits of a finished campaign in `folder`; those of the base model at its edge are found and walked here."""
     found = {"baseline": "walks-base", "robust": "walks-completed"}
     rounds = json.loads((folder / "rounds.json").read_text())
@@ -101,22 +101,22 @@ def walked(folder: Path, bench: Bench, effort: Effort) -> dict[str, Walked]:
         found["edge"] = f"rounds/walks-{len(rounds)}"
     models = dict.fromkeys(("baseline", "robust"), "model-completed.toml") | {"edge": "model-last.toml"}
     for number, (name, naive) in enumerate({"naive": True, "fair": False}.items()):
-        _walk_base(folder, name, naive, bench, effort, _STAGE + number)
+        _walk_base(folder, name, naive, setup, effort, _STAGE + number)
         found[name], models[name] = f"walks-{name}", "model-base.toml"
     return {name: _walked(folder / found[name], folder / models[name], name) for name in GAITS if name in found}
 
 
-def _walk_base(folder: Path, name: str, naive: bool, bench: Bench, effort: Effort, stage: int) -> None:
+def _walk_base(folder: Path, name: str, naive: bool, setup: Setup, effort: Effort, stage: int) -> None:
     if (folder / f"walks-{name}").exists():
         return
     model = load_model(folder / "model-base.toml")
     try:
-        gait = found_gait(model, bench.seed, None, lambda *_: None, naive).gait
+        gait = found_gait(model, setup.seed, None, lambda *_: None, naive).gait
     except SearchError:
         gait = BASELINE
     save_gait(folder / f"gait-{name}.toml", gait, {"made_by": "benchmarks.loop"})
     cycles = planned_cycles(model, gait, effort.cycles)
-    with bench.open(stage) as rig:
+    with setup.open(stage) as rig:
         measure_walks(rig, folder / f"walks-{name}", {name: gait}, cycles, effort.repeats)
 
 

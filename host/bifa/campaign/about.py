@@ -3,7 +3,7 @@
 import shlex
 from typing import TYPE_CHECKING
 
-from bifa.campaign.bench import Bench
+from bifa.campaign.setup import Setup
 
 if TYPE_CHECKING:
     from bifa.campaign.loop import Effort
@@ -11,19 +11,19 @@ if TYPE_CHECKING:
 Pairs = list[tuple[str, str]]
 
 
-def about(bench: Bench, effort: "Effort") -> tuple[str, Pairs]:
+def about(setup: Setup, effort: "Effort") -> tuple[str, Pairs]:
     """The robot in words, and how the campaign was made; the same for the same settings."""
-    words = ["bifa", "campaign", "--port", bench.port]
-    if bench.is_virtual:
-        words += ["--seed", str(bench.seed)]
-    if "profile" in bench.options:
-        words += ["--profile", str(bench.options["profile"])]
+    words = ["bifa", "campaign", "--port", setup.port]
+    if setup.is_virtual:
+        words += ["--seed", str(setup.seed)]
+    if "profile" in setup.options:
+        words += ["--profile", str(setup.options["profile"])]
     if effort.quick:
         words.append("--quick")
-    for name, value in bench.known.items():
+    for name, value in setup.known.items():
         words += ["--known", f"{name}={value!r}"]
-    robot = f"virtual robot {bench.seed}" if bench.is_virtual else f"robot on {bench.port}"
+    robot = f"virtual robot {setup.seed}" if setup.is_virtual else f"robot on {setup.port}"
     made = [("robot", robot), ("command", shlex.join(words))]
-    if bench.is_virtual:
-        made.append(("seed", str(bench.seed)))
+    if setup.is_virtual:
+        made.append(("seed", str(setup.seed)))
     return robot, made

@@ -8,12 +8,12 @@ from typing import Any
 
 from bifa.campaign.about import about
 from bifa.campaign.again import Trades, again
-from bifa.campaign.bench import Bench
-from bifa.campaign.compare import compare
 from bifa.campaign.prediction_error import prediction_errors
 from bifa.campaign.residuals import residuals
 from bifa.campaign.resolve import joined, resolve
-from bifa.campaign.stages import Stage
+from bifa.campaign.setup import Setup
+from bifa.campaign.stages import OnProgress, Stage
+from bifa.campaign.summary import summarize
 from bifa.campaign.walks import measure_walks, planned_cycles
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.data.dataset import labels_of
@@ -34,8 +34,6 @@ from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
-Part = Callable[[str, float], None]
-
 _AT_EDGE = 0.05  # of the robots that may fall off
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
@@ -50,114 +48,124 @@ class Effort:
     repeats: int = 3
 
 
-def campaign(bench: Bench, effort: Effort, part: Part) -> list[Stage]:
-    """The stages of a campaign on `bench`; `part(what, share)` is told how the running stage is getting on.
+def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
+    """The stages of a campaign on `setup`; `on_progress(what, share)` is told how the running stage is getting on.
 
     By hand, only the stages that measure need the robot: a diagnosis there names the experiment that would separate
     what it cannot tell apart, and the person decides.
     """
     stages = [
-        *([_measure_once(bench, effort, part), _declare(bench)] if bench.is_kept else [_measure(bench, effort, part)]),
-        _fit(bench, part),
-        _optimise("base", bench, part),
-        _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, bench, effort, part),
-        _diagnose(bench, part),
-        _optimise("completed", bench, part),
-        _walk("completed", {"completed": "gait-completed.toml"}, 2, bench, effort, part),
-        _again(bench, effort, part),
+        *_characterize(setup, effort, on_progress),
+        _fit(setup, on_progress),
+        _optimise("base", setup, on_progress),
+        _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, setup, effort, on_progress),
+        _diagnose(setup, on_progress),
+        _optimise("completed", setup, on_progress),
+        _walk("completed", {"completed": "gait-completed.toml"}, 2, setup, effort, on_progress),
+        _again(setup, effort, on_progress),
     ]
-    if bench.is_virtual:
-        stages.append(_unseal(bench))
-    stages.append(compare(bench.is_virtual, *about(bench, effort)))
+    if setup.is_virtual:
+        stages.append(_unseal(setup))
+    stages.append(summarize(setup.is_virtual, *about(setup, effort)))
     return stages
 
 
-def _measure(bench: Bench, effort: Effort, part: Part) -> Stage:
-    run, _ = _session(bench, effort, part, "bench", "campaign: characterisation", bench.known)
+def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
+    if setup.is_kept:
+        return [_measure_once(setup, effort, on_progress), _declare(setup)]
+    return [_measure(setup, effort, on_progress)]
+
+
+def _measure(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
+    run, _ = _session(setup, effort, on_progress, "bench", "campaign: characterisation", setup.known)
     title = "characterise the robot on its bench"
-    settings = bench.settings(0) | {"effort": asdict(effort), "known": dict(bench.known)}
+    settings = setup.settings(0) | {"effort": asdict(effort), "known": dict(setup.known)}
     return Stage("measure", title, (), ("bench",), run, settings, resumes=True)
 
 
-def _measure_once(bench: Bench, effort: Effort, part: Part) -> Stage:
+def _measure_once(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     """A real robot, without the known values that the person gives: to correct one is no reason to measure again."""
-    run, trials = _session(bench, effort, part, "measured", "campaign", {})
+    run, trials = _session(setup, effort, on_progress, "measured", "campaign", {})
     title = f"characterise the robot: {trials} trials"
-    settings = bench.settings(0) | {"effort": asdict(effort)}
+    settings = setup.settings(0) | {"effort": asdict(effort)}
     return Stage("measure", title, (), ("measured",), run, settings, resumes=True, by_hand=True)
 
 
 def _session(
-    bench: Bench, effort: Effort, part: Part, data: str, name: str, known: Mapping[str, float]
+    setup: Setup, effort: Effort, on_progress: OnProgress, data: str, name: str, known: Mapping[str, float]
 ) -> tuple[Callable[[Path, Path], None], int]:
     """What records the characterisation into the data set `data`, named `name`, and of how many trials it is."""
-    trials, told = plan.session(quick=effort.quick), _told(bench, part)
+    trials, told = plan.session(quick=effort.quick), _told(setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
-        with bench.open(0) as rig:
+        with setup.open(0) as rig:
             run_session(
                 rig,
                 outputs / data,
                 trials,
                 name=name,
                 known=known_of(rig, known),
-                provenance=bench.settings(0),
+                provenance=setup.settings(0),
                 on_event=lambda e: told(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
 
     return run, len(trials)
 
 
-def _declare(bench: Bench) -> Stage:
+def _declare(setup: Setup) -> Stage:
     """What the person knows goes before what the rig declares."""
 
     def run(inputs: Path, outputs: Path) -> None:
         measured = read_dataset(inputs / "measured")
-        known = {**measured.known, **bench.known}
+        known = {**measured.known, **setup.known}
         write_dataset(outputs / "bench", replace(measured, name="campaign: characterisation", known=known))
 
-    return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(bench.known)})
+    return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(setup.known)})
 
 
-def _fit(bench: Bench, part: Part) -> Stage:
+def _fit(setup: Setup, on_progress: OnProgress) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
-        found = identify(read_dataset(inputs / "bench"), progress=lambda what: part(what, 0.0))
+        found = identify(read_dataset(inputs / "bench"), on_progress=lambda what: on_progress(what, 0.0))
         save_model(outputs / "model-base.toml", found.model)
 
     return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run)
 
 
-def _optimise(which: str, bench: Bench, part: Part) -> Stage:
+def _optimise(which: str, setup: Setup, on_progress: OnProgress) -> Stage:
     """The gait of the base or of the completed model."""
     model, gait = f"model-{which}.toml", f"gait-{which}.toml"
 
     def run(inputs: Path, outputs: Path) -> None:
-        save_gait(outputs / gait, *_gait_of(load_model(inputs / model), bench, part))
+        save_gait(outputs / gait, *_gait_of(load_model(inputs / model), setup, on_progress))
 
-    settings = {"seed": bench.seed, "spread": SPREAD}
+    settings = {"seed": setup.seed, "spread": SPREAD}
     return Stage(f"optimise-{which}", f"gait from the {which} model", (model,), (gait,), run, settings)
 
 
-def _gait_of(robot: Model, bench: Bench, part: Part, spread: float | None = SPREAD) -> tuple[Gait, dict[str, Any]]:
+def _gait_of(
+    robot: Model, setup: Setup, on_progress: OnProgress, spread: float | None = SPREAD
+) -> tuple[Gait, dict[str, Any]]:
     """The gait found with a model, robust against `spread` or, None, against what is known, and where it comes from. A
     base model that lacks much may have none that walks, and neither may a robot whose bench shakes it: that ends no
     campaign, and the baseline stands in."""
     try:
-        best = found_gait(robot, bench.seed, spread, part)
+        best = found_gait(robot, setup.seed, spread, on_progress)
     except SearchError as error:
         return BASELINE, {"made_by": "bifa campaign", "instead_of": f"a gait of {robot.name}: {error}"}
     return best.gait, provenance(best, robot.name, "bifa campaign")
 
 
-def found_gait(robot: Model, seed: int, spread: float | None, part: Part, naive: bool = False) -> Optimum:
+def found_gait(robot: Model, seed: int, spread: float | None, on_progress: OnProgress, naive: bool = False) -> Optimum:
     """The gait that 19 of 20 robots of what is known walk with (`spread` None), or nine of ten of a spread."""
     share = QUANTILE if spread is not None else _AT_EDGE
     with simulations() as runs:
         settings = Settings(seed=seed, spread=spread, naive=naive, share=share)
-        return optimise(robot, runs, settings, lambda what, share, _: part(what, share))
+        return optimise(robot, runs, settings, lambda what, share, _: on_progress(what, share))
 
 
-def _walk(which: str, gaits: dict[str, str | None], number: int, bench: Bench, effort: Effort, part: Part) -> Stage:
+def _walk(
+    which: str, gaits: dict[str, str | None], number: int, setup: Setup, effort: Effort, on_progress: OnProgress
+) -> Stage:
     """Walk gaits for as long as the model `which` takes to settle with them."""
     name, walks, model = f"walk-{which}", f"walks-{which}", f"model-{which}.toml"
 
@@ -165,31 +173,31 @@ def _walk(which: str, gaits: dict[str, str | None], number: int, bench: Bench, e
         loaded = {key: load_gait(inputs / file) if file else BASELINE for key, file in gaits.items()}
         robot = load_model(inputs / model)
         cycles = {key: planned_cycles(robot, gait, effort.cycles) for key, gait in loaded.items()}
-        with bench.open(number) as rig:
-            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, _told(bench, part))
+        with setup.open(number) as rig:
+            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, _told(setup, on_progress))
 
     needs = (model, *(file for file in gaits.values() if file))
-    settings = bench.settings(number) | {"effort": asdict(effort)}
-    title, kept = f"walk: {' and '.join(gaits)}", bench.is_kept
+    settings = setup.settings(number) | {"effort": asdict(effort)}
+    title, kept = f"walk: {' and '.join(gaits)}", setup.is_kept
     return Stage(name, title, needs, (walks,), run, settings, resumes=kept, by_hand=kept)
 
 
-def _diagnosed(dataset: Dataset, bench: Bench, part: Part) -> Diagnosis:
-    return diagnose(prepare(dataset), seed=bench.seed, progress=lambda what: part(spoken(what), 0.0))
+def _diagnosed(dataset: Dataset, setup: Setup, on_progress: OnProgress) -> Diagnosis:
+    return diagnose(prepare(dataset), seed=setup.seed, progress=lambda what: on_progress(spoken(what), 0.0))
 
 
-def _diagnose(bench: Bench, part: Part) -> Stage:
+def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
     def diagnosed(dataset: Dataset) -> Diagnosis:
-        return _diagnosed(dataset, bench, part)
+        return _diagnosed(dataset, setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
         found = diagnosed(dataset)
         (outputs / "separating").mkdir()
         ran: tuple[NextExperiment, ...] = ()
-        if not bench.is_by_hand:
+        if not setup.is_by_hand:
             dataset, found, ran = resolve(
-                dataset, found, diagnosed, lambda n: bench.open(_SEPARATING + n), outputs / "separating", part
+                dataset, found, diagnosed, lambda n: setup.open(_SEPARATING + n), outputs / "separating", on_progress
             )
         record = as_record(found) | {"separated_by": [asdict(experiment) for experiment in ran]}
         del record["seconds"]  # the same seed gives the same bytes
@@ -199,46 +207,48 @@ def _diagnose(bench: Bench, part: Part) -> Stage:
         save_model(outputs / "model-completed.toml", completed_model(found.final))
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
-    settings = bench.settings(_SEPARATING)
-    measures = bench.is_kept and not bench.is_by_hand  # the separating experiments, on a rig that needs nobody
+    settings = setup.settings(_SEPARATING)
+    measures = setup.is_kept and not setup.is_by_hand  # the separating experiments, on a rig that needs nobody
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
 
 
-def _again(bench: Bench, effort: Effort, part: Part) -> Stage:
+def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     def complete(dataset: Dataset) -> tuple[Model, tuple[str, ...]]:
-        found = _diagnosed(dataset, bench, part)
+        found = _diagnosed(dataset, setup, on_progress)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
-        with bench.open(_FURTHER + number) as rig:
-            return measure_walks(rig, folder, {f"round-{number}": gait}, cycles, effort.repeats, _told(bench, part))
+        with setup.open(_FURTHER + number) as rig:
+            return measure_walks(
+                rig, folder, {f"round-{number}": gait}, cycles, effort.repeats, _told(setup, on_progress)
+            )
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
         for folder in sorted((inputs / "separating").iterdir()):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
         named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
-        trades = Trades(complete, lambda robot: _gait_of(robot, bench, part, None)[0], walk)
+        trades = Trades(complete, lambda robot: _gait_of(robot, setup, on_progress, None)[0], walk)
         again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
 
     walked = ("walks-base", "walks-completed")
     needs = ("bench", "separating", *walked, "diagnosis.json", "model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
-    settings = bench.settings(_FURTHER) | {"effort": asdict(effort)}
-    kept = bench.is_kept
+    settings = setup.settings(_FURTHER) | {"effort": asdict(effort)}
+    kept = setup.is_kept
     return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
 
 
-def _told(bench: Bench, part: Part) -> Part:
+def _told(setup: Setup, on_progress: OnProgress) -> OnProgress:
     """Who hears how a walk is getting on: nobody where a person at the bench is asked things meanwhile."""
-    return (lambda what, share: None) if bench.is_by_hand else part
+    return (lambda what, share: None) if setup.is_by_hand else on_progress
 
 
-def _unseal(bench: Bench) -> Stage:
+def _unseal(setup: Setup) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
-        virtual: Any = bench.open(0)
+        virtual: Any = setup.open(0)
         with virtual as rig:
             (outputs / "truth.json").write_text(json.dumps(rig.open_seal(), indent=1) + "\n")
 
-    return Stage("unseal", "open the seal", ("diagnosis.json",), ("truth.json",), run, bench.settings(0))
+    return Stage("unseal", "open the seal", ("diagnosis.json",), ("truth.json",), run, setup.settings(0))

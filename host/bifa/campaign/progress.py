@@ -13,7 +13,7 @@ _TITLE = 35  # characters: the longest title of a stage
 
 
 class StageProgress:
-    """Hand `start` and `end` to `run_stages`, `part` to what happens inside a stage.
+    """Hand `start` and `end` to `run_stages`, `update` to what happens inside a stage.
 
     While a person measures there is no bar, which would redraw itself over questions and answers: `close` it before.
     """
@@ -44,7 +44,7 @@ class StageProgress:
         bars.start()
         return bars
 
-    def part(self, what: str, share: float) -> None:
+    def update(self, what: str, share: float) -> None:
         """`what` inside the running stage is done to `share`, 0 to 1."""
         bars = self._bars or self._begin()
         bars.update(self._task, total=1.0, completed=min(share, 0.999), what=what)

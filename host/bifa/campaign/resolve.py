@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, DatasetError, read_dataset
 from bifa.measure.plan import REPEATS, PlannedTrial
 from bifa.measure.session import run_session
@@ -22,7 +23,6 @@ _WALK_CYCLES = 4
 
 OpenRig = Callable[[int], AbstractContextManager[Rig]]
 Diagnose = Callable[[Dataset], Diagnosis]
-Progress = Callable[[str, float], None]
 
 
 def resolve(
@@ -31,7 +31,7 @@ def resolve(
     diagnose: Diagnose,
     open_rig: OpenRig,
     folder: Path,
-    progress: Progress = lambda what, share: None,
+    on_progress: OnProgress = lambda what, share: None,
 ) -> tuple[Dataset, Diagnosis, tuple[NextExperiment, ...]]:
     """As long as `found` names an experiment that separates what it confuses, run that and diagnose again: until the
     set is one, nothing on offer separates it, or after `ROUNDS` experiments.
@@ -52,7 +52,7 @@ def resolve(
                 name=f"to tell {' and '.join(found.next.separates)} apart",
                 known=dataset.known,
                 provenance=dataset.provenance,
-                on_event=lambda e: progress(e.planned.title, (e.number - 1 + e.share) / e.total),
+                on_event=lambda e: on_progress(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
         dataset = joined(dataset, read_dataset(folder / f"separate-{number}"), f"separate-{number}_")
         ran.append(found.next)

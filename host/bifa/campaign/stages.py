@@ -21,6 +21,8 @@ from bifa.files import is_stray, write_text
 from bifa.lock import locked
 from bifa.toml import parse_toml
 
+OnProgress = Callable[[str, float], None]  # what the running stage is at, and the share of that done, 0 to 1
+
 PROVENANCE = "provenance.json"
 _SCRATCH = ".scratch"
 _ASKED = "asked.json"  # in the scratch: what the stage was begun with, and what it made once it has ended

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bifa.campaign.stages import Stage
+from bifa.campaign.stages import OnProgress, Stage
 from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.gait.prediction import Prediction, predict_speed
@@ -25,8 +25,6 @@ from bifa.robot import Model
 from bifa.robot.gait import Gait
 from bifa.simulate import of_gait, walk
 
-Progress = Callable[[str, float], None]
-
 
 def measure_walks(
     rig: Rig,
@@ -34,7 +32,7 @@ def measure_walks(
     gaits: Mapping[str, Gait],
     cycles: int | Mapping[str, int],
     repeats: int = 1,
-    on_progress: Progress = lambda what, share: None,
+    on_progress: OnProgress = lambda what, share: None,
 ) -> Dataset:
     """Walk every gait `repeats` times on the rig for as many `cycles`, or for its own, into the data set `folder` of
     trials named after the gaits; walks that an interrupted run has left there are not walked again.
@@ -124,7 +122,7 @@ def walks_stage(
     cycles: int,
     model: Model,
     settings: Mapping[str, object],
-    on_progress: Progress,
+    on_progress: OnProgress,
 ) -> Stage:
     """The stage that makes `walks` (data set), `walks.png` and `walks.json` (speeds).
 

@@ -46,10 +46,10 @@ def gait_names(incomplete: str = "") -> list[str]:
 
 def stages(incomplete: str = "") -> list[str]:
     """Stages of a campaign, for completion."""
-    from bifa.campaign.bench import Bench
     from bifa.campaign.loop import Effort, campaign
+    from bifa.campaign.setup import Setup
 
-    names = [stage.name for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None)]
+    names = [stage.name for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)]
     return [name for name in names if name.startswith(incomplete)]
 
 

@@ -10,7 +10,7 @@ from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option
 from bifa.computer import EXAMPLE_PORT
 
 if TYPE_CHECKING:
-    from bifa.campaign.bench import Bench
+    from bifa.campaign.setup import Setup
     from bifa.measure.by_hand import ByHand
     from bifa.measure.desk import Desk
     from bifa.screen import Console
@@ -77,14 +77,14 @@ def run_campaign(
 
     from rich.text import Text
 
-    from bifa.campaign.bench import Bench
+    from bifa.campaign.setup import Setup
     from bifa.screen import Console
 
     console = Console()
-    bench = Bench(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
+    setup = Setup(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
     with stoppable(lambda: f"{_kept(out)}. The same command resumes there"):
-        if bench.is_by_hand:
-            bench = _attended(console, bench, watch, bench_file)
+        if setup.is_by_hand:
+            setup = _attended(console, setup, watch, bench_file)
 
         with console.status("starting"):  # slow to import: the person is asked first
             from bifa.campaign.loop import Effort, campaign
@@ -96,9 +96,9 @@ def run_campaign(
             from bifa.report.words import effect_words
 
         with stage_progress(console) as progress:
-            if bench.hands is not None:
-                bench.hands.before = progress.close
-            stages = campaign(bench, Effort(quick), progress.part)
+            if setup.hands is not None:
+                setup.hands.before = progress.close
+            stages = campaign(setup, Effort(quick), progress.update)
             run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
 
     summary = json.loads((out / "summary.json").read_text())
@@ -132,15 +132,15 @@ def _check(out: Path, port: str) -> None:
     check_port(port)
 
 
-def _attended(console: "Console", bench: "Bench", watch: Path | None, bench_file: Path | None) -> "Bench":
-    """The bench with somebody at its desk, and what is known of it."""
+def _attended(console: "Console", setup: "Setup", watch: Path | None, bench_file: Path | None) -> "Setup":
+    """The setup with somebody at the desk, and what is known of it."""
     from dataclasses import replace
 
     from bifa.measure.bench_file import known_on
 
     desk, hands = at_desk(console, watch, bench_file)
-    known = {**(known_on(bench_file, desk) if bench_file else {}), **bench.known}
-    return replace(bench, known=known, hands=hands)
+    known = {**(known_on(bench_file, desk) if bench_file else {}), **setup.known}
+    return replace(setup, known=known, hands=hands)
 
 
 def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = None) -> "tuple[Desk, ByHand]":

@@ -66,7 +66,7 @@ def _walk_two_gaits(out: Path, seed: int, rerun: list[str]) -> None:
             QUICK_CYCLES,
             nominal(),
             {"port": "virtual", "seed": seed},
-            progress.part,
+            progress.update,
         )
         run_stages(out, [stage], rerun=rerun, on_start=progress.start, on_end=progress.end)
 

@@ -56,7 +56,7 @@ def fit(
             measured,
             load_model(model) if model else None,
             date=date.today().isoformat(),
-            progress=lambda stage: progress.update(task, description=stage),
+            on_progress=lambda stage: progress.update(task, description=stage),
         )
     save_model(out, found.model)
     print_sections(console, parameters_and_remarks(found))

@@ -87,17 +87,17 @@ def identify(
     model: Model | None = None,
     *,
     date: str = "",
-    progress: Callable[[str], None] = lambda stage: None,
+    on_progress: Callable[[str], None] = lambda stage: None,
 ) -> Identification:
     """Identify the robot of `dataset` from `model` (the nominal one) on: what static loadings, rests and sensors say by
     themselves, then all experiments together. `date`: of the fit, for the model's provenance.
 
     Raises UndeterminedError where nothing at all can be fitted. Deterministic.
     """
-    system = prepare(dataset, model, progress)
-    progress("all experiments together, pressures included")
+    system = prepare(dataset, model, on_progress)
+    on_progress("all experiments together, pressures included")
     fit = fit_base(system, system.trials)
-    progress("final steps and uncertainty")
+    on_progress("final steps and uncertainty")
     fit = settle(fit)
     known = uncertainty(fit, confidence=CONFIDENCE)
     intervals = _intervals(system, fit, known)

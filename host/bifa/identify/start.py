@@ -23,19 +23,20 @@ from bifa.robot import Model, ModelParameterError
 _ACTUATORS = {"large": "body", "small": "small"}
 _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supply
 
-Progress = Callable[[str], None]
+OnProgress = Callable[[str], None]
 
 
-def prepare(dataset: Dataset, model: Model | None = None, progress: Progress = lambda stage: None) -> RobotSystem:
+def prepare(dataset: Dataset, model: Model | None = None, on_progress: OnProgress = lambda stage: None) -> RobotSystem:
     """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
     stand where the static stage leaves them, and the rest is as in `model` (default: nominal).
 
-    `progress` is told the stage's name. Raises UndeterminedError where the data set holds nothing that can be fitted.
+    `on_progress` is told the stage's name. Raises UndeterminedError where the data set holds nothing that can be
+    fitted.
     """
     if not dataset.trials:
         raise UndeterminedError("the data set holds no trials: nothing can be fitted")
     model = model or robot.nominal()
-    progress("static loading: stiffness and area")
+    on_progress("static loading: stiffness and area")
     statics = fit_statics(dataset)
     values = _known(dataset, model) | _supplies(dataset, model)
     values |= {f"{_ACTUATORS[a]}_area_N_psi": fit.area_N_psi.value for a, fit in statics.items() if fit.area_N_psi}

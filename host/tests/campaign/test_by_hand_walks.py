@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bifa.campaign import loop
-from bifa.campaign.bench import Bench
 from bifa.campaign.loop import Effort, campaign
+from bifa.campaign.setup import Setup
 from bifa.campaign.stages import run_stages
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.data.layout import RAW
@@ -57,8 +57,8 @@ def walks(lab, folder, said, stop_at=None):
         if stop_at is not None and stop_at in text:
             raise KeyboardInterrupt
 
-    bench = Bench(str(link), hands=ByHand(Desk(say, files), files))
-    stages = [s for s in campaign(bench, EFFORT, lambda *_: None) if s.name in ("walk-base", "walk-completed", "again")]
+    setup = Setup(str(link), hands=ByHand(Desk(say, files), files))
+    stages = [s for s in campaign(setup, EFFORT, lambda *_: None) if s.name in ("walk-base", "walk-completed", "again")]
     assert [stage.by_hand for stage in stages] == [True, True, True]
     run_stages(folder, stages)
 
@@ -66,7 +66,7 @@ def walks(lab, folder, said, stop_at=None):
 def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
     fed = []
 
-    def diagnosed(dataset, bench, part):
+    def diagnosed(dataset, setup, on_progress):
         fed.append({trial.file for trial in dataset.trials})
         return SimpleNamespace(effects=[SimpleNamespace(name="stribeck")], final=ROBOT)
 

@@ -27,7 +27,7 @@ MAKEFILE = (ROOT / "Makefile").read_text("utf-8")
 
 # The tests that run a command with a robot, a board or data of their own.
 RUN_BY = {
-    "campaign": "campaign/test_campaign_bench.py",
+    "campaign": "campaign/test_setup.py",
     "check": "check/test_recordings.py",
     "compare": "campaign/test_campaign.py",
     "console": "link/test_interactive.py",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -162,7 +163,10 @@ def _rows_for(jobs: np.ndarray, columns: int) -> list[np.ndarray]:
 
 @cache
 def kernels() -> tuple[Kernel, Kernel] | None:
-    """One with this processor's lanes and one with a single lane; None where no compiler is at hand, said once."""
+    """One with this processor's lanes and one with a single lane. None where BIFA_LANES is 0 or no compiler is at hand,
+    which is said once."""
+    if os.environ.get("BIFA_LANES") == "0":
+        return None
     try:
         found = Kernel(build.library(build.target())), Kernel(build.library(build.single()))
     except build.NoCompilerError as e:

@@ -8,7 +8,7 @@ from bifa.rig import Rig, is_offered, open_rig
 
 
 @dataclass(frozen=True)
-class Bench:
+class Setup:
     """`port` as for `--port`; `options` go to a virtual rig. Every stage draws its own noise.
 
     `known`: what the person has measured directly, in place of what the rig declares (`bifa.measure.known`).
@@ -28,7 +28,7 @@ class Bench:
 
     @property
     def is_virtual(self) -> bool:
-        """Whether the bench is simulated, so that it has seeds and a seal."""
+        """Whether the robot is simulated, so that it has seeds and a seal."""
         return self.port == "virtual"
 
     @property

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-import bifa.campaign.bench
+import bifa.campaign.setup
 from bifa.campaign import loop
 from bifa.campaign.about import about
-from bifa.campaign.bench import Bench
-from bifa.campaign.compare import _with_stand_in
 from bifa.campaign.loop import Effort, campaign
+from bifa.campaign.setup import Setup
 from bifa.campaign.stages import StageError, run_stages
+from bifa.campaign.summary import _with_stand_in
 from bifa.cli.campaign import _kept
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
@@ -79,7 +79,7 @@ def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
     columns = {"time_s": [0.0, 0.02], "displacement_mm": [0.0, 1.0], "force_N": [0.0, 1.0], "pressure_psi": [0.0, 0.0]}
 
     def stages(port, mass):
-        measure, declare, *_ = campaign(Bench(port, known={"head_mass_kg": mass}), Effort(), lambda what, share: None)
+        measure, declare, *_ = campaign(Setup(port, known={"head_mass_kg": mass}), Effort(), lambda what, share: None)
         return measure, declare
 
     def measured(inputs, outputs):
@@ -93,15 +93,15 @@ def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
 
 
 def test_by_hand_only_measuring_stages_are_measured_by_hand():
-    stages = campaign(Bench("/dev/ttyACM0"), Effort(), lambda what, share: None)
+    stages = campaign(Setup("/dev/ttyACM0"), Effort(), lambda what, share: None)
     assert [stage.name for stage in stages if stage.by_hand] == ["measure", "walk-base", "walk-completed", "again"]
-    assert not any(stage.by_hand for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None))
+    assert not any(stage.by_hand for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None))
 
 
 @pytest.fixture
 def own_driver(monkeypatch):
     """A rig of one's own, by its name; what it records is written by `recording`."""
-    monkeypatch.setattr(bifa.campaign.bench, "is_offered", lambda port: port in ("virtual", "my-lab"))
+    monkeypatch.setattr(bifa.campaign.setup, "is_offered", lambda port: port in ("virtual", "my-lab"))
     return "my-lab"
 
 
@@ -117,8 +117,8 @@ def recording(stage, known):
 
 def test_what_an_own_driver_measured_is_not_measured_again_unasked(own_driver, tmp_path, monkeypatch):
     def stages(given, quick=False):
-        bench = Bench(own_driver, known=given)
-        measure, declare, *_ = campaign(bench, Effort(quick), lambda what, share: None)
+        setup = Setup(own_driver, known=given)
+        measure, declare, *_ = campaign(setup, Effort(quick), lambda what, share: None)
         return [measure, declare]
 
     measure, declare = stages({"head_mass_kg": 0.18})
@@ -134,14 +134,14 @@ def test_what_an_own_driver_measured_is_not_measured_again_unasked(own_driver, t
 
 
 def test_every_stage_that_measures_with_an_own_driver_keeps_what_it_measured(own_driver):
-    stages = campaign(Bench(own_driver), Effort(), lambda what, share: None)
+    stages = campaign(Setup(own_driver), Effort(), lambda what, share: None)
     kept = [stage.name for stage in stages if stage.by_hand]
     assert kept == ["measure", "walk-base", "diagnose", "walk-completed", "again"]
 
 
 def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path):
     (tmp_path / ".measure-unfinished" / "measured").mkdir(parents=True)
-    measure, *_ = campaign(Bench("/dev/nowhere"), Effort(), lambda what, share: None)
+    measure, *_ = campaign(Setup("/dev/nowhere"), Effort(), lambda what, share: None)
     run_stages(tmp_path, [measure])  # no such port: nothing is opened
     assert (tmp_path / "measured").is_dir()
 
@@ -154,7 +154,7 @@ def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
         raise SearchError("none walks")
 
     monkeypatch.setattr(loop, "found_gait", nothing_walks)
-    stages = {stage.name: stage for stage in campaign(Bench("virtual"), Effort(), lambda what, share: None)}
+    stages = {stage.name: stage for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)}
     save_model(tmp_path / f"model-{model}.toml", nominal())
     stages[f"optimise-{model}"].run(tmp_path, tmp_path)
     assert load_gait(tmp_path / f"gait-{model}.toml") == BASELINE
@@ -170,8 +170,8 @@ def test_a_baseline_that_stands_in_is_told_under_both_names():
 
 
 def test_what_to_type_for_the_same_campaign_again_has_all_that_decides_it():
-    bench = Bench("virtual", 3, {"sealed": 3, "profile": "worn"}, {"head_mass_kg": 0.18234567})
-    _, made = about(bench, Effort(quick=True))
+    setup = Setup("virtual", 3, {"sealed": 3, "profile": "worn"}, {"head_mass_kg": 0.18234567})
+    _, made = about(setup, Effort(quick=True))
     expected = "bifa campaign --port virtual --seed 3 --profile worn --quick --known head_mass_kg=0.18234567"
     assert dict(made)["command"] == expected
 

@@ -1,4 +1,4 @@
-"""What a campaign comes to: speeds predicted and measured, errors before and after, and the report."""
+"""What a campaign comes to: speeds predicted and measured, errors before and after, report (the stage `compare`)."""
 
 import json
 import platform
@@ -55,7 +55,7 @@ class GaitResult:
     walks_probability: float = 0.0
 
 
-def compare(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
+def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
     """The stage that makes `summary.json`, `report.html`, its two main figures and the walk that moves.
 
     robot: in words; made: how the campaign was made, for the report."""
