@@ -11,9 +11,10 @@ from scipy.stats import qmc
 
 from bifa.effects import library
 from bifa.errors import BifaError
-from bifa.robot.model import Model, Scatter
+from bifa.gait.drawn import Draws
+from bifa.robot.model import LEARNT, STIFFNESS, Model, Scatter
 from bifa.robot.parameters import BASE_PARAMETERS
-from bifa.simulate import Plant, plant
+from bifa.simulate import Plant
 
 SPREAD = 0.02  # relative standard deviation where the model has no covariance
 _RUNS = Scatter(friction=0.01)  # of a fit that does not say how its runs differ
@@ -25,8 +26,9 @@ class UncertaintyError(BifaError):
 
 @dataclass(frozen=True)
 class Knowledge:
-    """How a robot in its next walk may differ from the model: `names`, and `factor` (n, n) with covariance = factor @
-    factor.T, of its parameters; `scatter`: what differs from run to run, and what the model leaves unexplained.
+    """How a robot in its next walk may differ from the model: `names`, and `factor` (n, k) with covariance = factor @
+    factor.T, of its values, those of its curves included; `scatter`: what differs from run to run, and what the model
+    leaves unexplained.
 
     Every draw is a robot in a walk of its own: also of its own are the values that an effect has in each trial, such as
     a ripple's phase. What is unexplained of pressures lies on both supplies, of forces on what the body's air exerts.
@@ -50,20 +52,21 @@ class Knowledge:
         Drawn as a scrambled Sobol sequence, so that few draws already cover the spread; numbers differ by seed.
         """
         own, moves = _own_values(model), _MOVES if self.scatter != self.scatter.timing else ()
-        size = len(self.names) + len(moves) + len(own)
+        ways = self.factor.shape[1]
+        size = ways + len(moves) + len(own)
         power = max(0, int(np.ceil(np.log2(count))))
         unit = qmc.Sobol(size, scramble=True, rng=np.random.default_rng([seed, 4])).random_base2(power)[:count]
         normal = ndtri(np.clip(unit, 1e-6, 1.0 - 1e-6))
-        drawn = np.array([model[name] for name in self.names]) + normal[:, : len(self.names)] @ self.factor.T
-        robots = []
-        for values, amounts, turns in zip(drawn, normal[:, len(self.names) :], unit[:, size - len(own) :], strict=True):
-            robot = {name: model[name] for name in _MOVED} | dict(zip(self.names, values.tolist(), strict=True))
+        draws, robots = Draws(model, self.names), []
+        drawn = normal[:, :ways] @ self.factor.T
+        for off, amounts, turns in zip(drawn, normal[:, ways:], unit[:, size - len(own) :], strict=True):
+            robot = {name: model[name] for name in _MOVED} | draws.plain(off)
             for move, amount in zip(moves, amounts, strict=False):
                 move(robot, self.scatter, float(amount))
             robot |= {
                 name: low + share * (high - low) for (name, (low, high)), share in zip(own.items(), turns, strict=True)
             }
-            robots.append(plant(model.with_values({n: _within(model, n, v) for n, v in robot.items()})))
+            robots.append(draws.plant({n: _within(model, n, v) for n, v in robot.items()}, off))
         return robots
 
 
@@ -71,15 +74,21 @@ def spread_of(model: Model, relative: float | None = None) -> Knowledge:
     """From the covariance of the model's fit and its scatter where it has them; otherwise, or where `relative` is
     given, that relative standard deviation (2 % by default) on each of the base parameters, independently."""
     if model.covariance is not None and relative is None:
-        values, vectors = np.linalg.eigh(model.covariance.matrix)
-        if values.min() < -1e-9 * max(values.max(), 1e-300):
+        sd = np.sqrt(np.maximum(np.diag(model.covariance.matrix), 1e-300))
+        values, vectors = np.linalg.eigh(model.covariance.matrix / np.outer(sd, sd))
+        if values.min() < -1e-9 * values.max():
             raise UncertaintyError(
                 f"the covariance of model {model.name!r} is not positive semidefinite; fit the model again, "
                 "or give a relative spread"
             )
-        factor = vectors * np.sqrt(np.maximum(values, 0.0))
+        # The widest first, which a Sobol sequence covers best; of a curve there are more values than it was fitted by.
+        kept = np.flatnonzero(values > 1e-12 * values.max())[::-1]
+        factor = sd[:, None] * vectors[:, kept] * np.sqrt(values[kept])
         names, scatter = model.covariance.names, model.scatter or _RUNS
-        return Knowledge(names, factor, f"the fit's covariance of {len(names)} parameters; {_words(scatter)}", scatter)
+        curves = len({name.rsplit(".", 1)[0] for name in names if name.split(".")[0] in (*STIFFNESS, LEARNT)})
+        plain = sum(name.split(".")[0] not in (*STIFFNESS, LEARNT) for name in names)
+        what = f"{plain} parameters" + (f" and {curves} curves" if curves else "")
+        return Knowledge(names, factor, f"the fit's covariance of {what}; {_words(scatter)}", scatter)
     share = SPREAD if relative is None else relative
     if not 0.0 < share <= 0.5:
         raise UncertaintyError(f"spread = {share:g} must be above 0 and at most 0.5")

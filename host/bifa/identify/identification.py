@@ -149,9 +149,9 @@ def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, 
 def _model(
     system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, IntervalEstimate], date: str
 ) -> Model:
-    """The identified model: fitted values with their sd, and the covariance of those that are determined."""
+    """The identified model: fitted values with their sd, and the covariance of what is determined."""
     sd = {name: interval.sd for name, interval in intervals.items()}
-    model = with_scatter(with_uncertainty(system.model_at(fit.theta), known, sd), fit)
+    model = with_scatter(with_uncertainty(system.model_at(fit.theta), fit, known, sd), fit)
     return labelled(model, system, "bifa fit", date)
 
 

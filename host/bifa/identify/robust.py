@@ -4,25 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from bifa.pipe_robot.system import RobotSystem
 from bifa.robot import Model
-from bifa.robot.model import Covariance
+from bifa.robot.model import LEARNT, Covariance
+from lacuna.estimation.clustered import clustered_covariance
+from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import Uncertainty
 
 
-def with_uncertainty(model: Model, known: Uncertainty, sd: Mapping[str, float]) -> Model:
-    """The model with standard deviations for the values named in `sd`, and their covariance, correlated as `known`."""
-    if not sd:
+def with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[str, float] | None = None) -> Model:
+    """`model`, fitted by `fit`, with standard deviations and the covariance of all its values that the data determine,
+    the curves' too, correlated as `known`: each by `sd`, else by how well it is known and by what the conditions of the
+    data contradict one another, whichever is more."""
+    moves, between = _moves(model, fit), np.sqrt(np.diag(clustered_covariance(fit)))
+    chosen = [k for k, e in enumerate(known.estimates) if e.determined and e.name in moves]
+    if not chosen:
         return model
-    chosen = [k for k, e in enumerate(known.estimates) if e.name in sd]
-    names = tuple(known.estimates[k].name for k in chosen)
+    widths = {known.estimates[k].name: max(known.estimates[k].sd, float(between[k])) for k in chosen} | dict(sd or {})
+    fitted = [known.estimates[k].name for k in chosen]
     matrix = known.covariance[np.ix_(chosen, chosen)]
-    stretch = np.array([sd[name] for name in names]) / np.sqrt(np.diag(matrix))
-    parameters = {name: replace(p, sd=sd[name]) if name in sd else p for name, p in model.parameters.items()}
-    return replace(model, parameters=parameters, covariance=Covariance(names, matrix * np.outer(stretch, stretch)))
+    stretch = np.array([widths[name] for name in fitted]) / np.sqrt(np.diag(matrix))
+    names = tuple(dict.fromkeys(value for name in fitted for value in moves[name]))
+    ways = np.array([[moves[name].get(value, 0.0) for name in fitted] for value in names]) * stretch
+    parameters = {name: replace(p, sd=widths[name]) if name in widths else p for name, p in model.parameters.items()}
+    return replace(model, parameters=parameters, covariance=Covariance(names, ways @ matrix @ ways.T))
+
+
+def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
+    """By each of the fit's parameters the values of `model` that it moves, by how much: itself, or those of a curve."""
+    structure = fit.structure
+    system = cast(RobotSystem, structure.system)
+    own = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
+    found = {name: {name: 1.0} for name in own}
+    for curve in system.curves.values():
+        found |= curve.changes
+    for site, learnt in model.learnt.items():
+        knots = system.correction_sites[site].knots
+        each = (learnt.values.shape[1] - 1) // (knots - 1)
+        for row in range(len(learnt.values)):
+            for knot in range(knots):
+                found[f"{LEARNT}.{site}.{row}_{knot}"] = {f"{LEARNT}.{site}.{row}.{knot * each}": 1.0}
+    return found
 
 
 def labelled(model: Model, system: RobotSystem, command: str, date: str = "") -> Model:

@@ -1,4 +1,5 @@
-"""What walks will differ from a fitted model by beyond its covariance: from run to run, and what is unexplained."""
+"""What walks will differ from a fitted model by beyond its covariance: from run to run, over a session, and what is
+unexplained."""
 
 from __future__ import annotations
 
@@ -33,8 +34,27 @@ def scatter_of(fit: Fit) -> Scatter:
         "force_N": _unexplained(fit, (STATIC, ANCHOR), lambda residual: _joined(residual, "force")),
         "speed": _speed(fit),
     }
+    for name, drift in _drifts(fit).items():
+        found[name] = float(np.hypot(found[name], drift))
     rounded = {name: float(f"{value:.4g}") for name, value in found.items()}
     return replace(_timing(cast(RobotSystem, fit.structure.system)), **rounded)
+
+
+def _drifts(fit: Fit) -> dict[str, float]:
+    """RMS over the session of what was learnt to drift, by the scatter that it adds to: the next walk is at a place in
+    another session, which nobody knows."""
+    learnt = {c.site: float(np.sqrt(np.mean(c.table**2))) for c in fit.structure.corrections(fit.theta)}
+    push_N = fit.theta.get("body_area_N_psi", 0.0) * _supply_psi(fit)
+    found = {
+        "friction": learnt.get("friction_of_the_day", 0.0),
+        "pressure_psi": learnt.get("vacuum_of_the_day", 0.0),
+        "force_N": learnt.get("area_of_the_day", 0.0) * push_N,
+    }
+    return {name: drift for name, drift in found.items() if drift > 0.0}
+
+
+def _supply_psi(fit: Fit) -> float:
+    return fit.theta.get("supply_positive_psi", cast(RobotSystem, fit.structure.system).model["supply_positive_psi"])
 
 
 def _timing(system: RobotSystem) -> Scatter:

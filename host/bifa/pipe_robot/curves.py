@@ -68,9 +68,21 @@ class FittedCurve:
     def tables(self) -> Family:
         """The curves that the shapes make, as the simulator reads them."""
         none = np.zeros(len(self.shapes))
-        ways = [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]
         ends = self.fit.lower_m, self.fit.upper_m
-        return Family(self.curve(tuple(none)), [StiffnessCurve(tuple(way), *ends) for way in ways])
+        return Family(self.curve(tuple(none)), [StiffnessCurve(tuple(way), *ends) for way in self._ways])
+
+    @cached_property
+    def changes(self) -> dict[str, dict[str, float]]:
+        """Of each shape by how much it changes the coefficients of the model's curve, by their names in a model."""
+        return {
+            name: {f"{self.prefix}_stiffness.{power}": float(change) for power, change in enumerate(way)}
+            for name, way in zip(self.names, self._ways, strict=True)
+        }
+
+    @cached_property
+    def _ways(self) -> list[np.ndarray]:
+        """The shapes in powers of the normalised coordinate."""
+        return [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]
 
     def _sizes(self, shapes: np.ndarray) -> np.ndarray:
         """By how many N each shape changes K where it changes it most."""

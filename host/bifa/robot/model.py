@@ -16,6 +16,7 @@ from bifa.robot.stiffness import StiffnessCurve
 
 GRAVITY_M_S2 = 9.80665
 MOST_DEAD_TIME_S = 0.1
+STIFFNESS, LEARNT = ("body_stiffness", "small_stiffness"), "learnt"
 
 
 @dataclass(frozen=True)
@@ -101,14 +102,25 @@ class Model:
                 self[name]
 
     def __getitem__(self, name: str) -> float:
-        """A value by its name: `mu_k`, or `hysteresis.force_N` for an active effect's."""
+        """A value by its name: `mu_k`, or `hysteresis.force_N` for an active effect's; of the curves, as a covariance
+        names them, `body_stiffness.3`, a coefficient, and `learnt.filling.0.64`, a value by row and place."""
         if name in self.parameters:
             return self.parameters[name].value
-        effect, _, parameter = name.partition(".")
+        owner, *rest = name.split(".")
         try:
-            return self.effects[effect][parameter]
-        except KeyError:
+            if owner in STIFFNESS:
+                (power,) = map(int, rest)
+                return float(self.stiffness(owner).coefficients[power])
+            if owner == LEARNT:
+                site, row, place = rest
+                return float(self.learnt[site].values[int(row), int(place)])
+            return self.effects[owner][".".join(rest)]
+        except (KeyError, IndexError, ValueError):
             raise ModelParameterError(f"model {self.name!r} has no parameter {name!r}") from None
+
+    def stiffness(self, name: str) -> StiffnessCurve:
+        """One of the two curves, by its name in `STIFFNESS`."""
+        return self.body_stiffness if name == "body_stiffness" else self.small_stiffness
 
     @property
     def values(self) -> dict[str, float]:

@@ -1,11 +1,15 @@
 """Draws of the robot: the stated spread, a fit's covariance, bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bifa.gait import UncertaintyError, spread_of
 from bifa.robot import BASE_PARAMETERS, Covariance, nominal
-from bifa.simulate import layout
+from bifa.robot.learnt import LearntCurve
+from bifa.robot.parameters import ModelParameterError
+from bifa.simulate import layout, learnt, plant
 
 
 def values(plants, name):
@@ -52,3 +56,58 @@ def test_a_covariance_that_is_none_is_refused():
     model = nominal().with_values({}, Covariance(("mu_k", "mu_s"), np.array([[1.0, 2.0], [2.0, 1.0]])))
     with pytest.raises(UncertaintyError, match="not positive semidefinite"):
         spread_of(model)
+
+
+def forces(plants, at=0.5):
+    """K in N halfway along each plant's table of the body's spring."""
+    return np.array([plant.body_curve[1 + int(at * (len(plant.body_curve) - 1)), 0] for plant in plants])
+
+
+def test_the_springs_curves_are_drawn_with_the_parameters():
+    """A softer spring and a smaller area push alike: apart they would say much more than the data leave open."""
+    names = ("body_area_N_psi", "body_stiffness.0")  # whose value at z = 0 is K's, halfway along the range
+    sd = np.array([0.05, 0.4])
+    matrix = np.outer(sd, sd) * np.array([[1.0, 0.9], [0.9, 1.0]])
+    model = nominal().with_values({}, Covariance(names, matrix))
+    plants = spread_of(model).naive.plants(model, 1024, seed=3)
+    drawn = np.cov(values(plants, "body_area_N_psi"), forces(plants))
+    np.testing.assert_allclose(drawn, matrix, rtol=0.08)
+    assert "1 parameters and 1 curves" in spread_of(model).text
+    assert np.ptp([plant.small_curve for plant in plants], axis=0).max() == 0.0
+
+
+def test_a_drawn_robot_is_the_one_that_its_curves_make():
+    model = nominal().with_values({}, Covariance(("body_stiffness.2", "mu_k"), np.diag([0.25, 1e-8])))
+    (drawn,) = spread_of(model).naive.plants(model, 1, seed=0)
+    coefficients = np.array(model.body_stiffness.coefficients)
+    off = forces([drawn], 0.75)[0] - forces([plant(model)], 0.75)[0]
+    coefficients[2] += off / 0.5**2
+    made = plant(replace(model, body_stiffness=replace(model.body_stiffness, coefficients=tuple(coefficients))))
+    np.testing.assert_allclose(drawn.body_curve, made.body_curve, atol=1e-9)
+    same = [n for n in range(len(drawn.q)) if n != layout.index("mu_k")]
+    np.testing.assert_allclose(drawn.q[same], made.q[same], rtol=1e-9, atol=1e-9)
+
+
+def test_a_spring_that_is_not_bistable_is_no_robots():
+    model = nominal().with_values({}, Covariance(("body_stiffness.0",), np.array([[1e4]])))
+    own = plant(model).body_curve
+    plants = spread_of(model).plants(model, 64, seed=1)
+    kept = [np.allclose(one.body_curve, own) for one in plants]
+    assert 32 < sum(kept) < 64
+
+
+def test_learnt_curves_are_drawn_as_the_splines_that_they_were_fitted_as():
+    curve = LearntCurve(-14.5, 14.5, np.zeros((2, 65)))
+    knots = tuple(f"learnt.filling.0.{8 * k}" for k in range(9))
+    model = replace(nominal(), learnt={"filling": curve}, covariance=Covariance(knots, 0.04 * np.eye(9)))
+    plants = spread_of(model).naive.plants(model, 256, seed=3)
+    filling, emptying = (np.array([one.learnt[row, 2:] for one in plants]) for row in (learnt.FILLING, learnt.EMPTYING))
+    assert np.std(filling[:, 256]) == pytest.approx(0.2, rel=0.1)
+    assert np.abs(np.diff(filling, axis=1)).max() < 0.1, "no kinks"
+    assert np.ptp(emptying) == 0.0
+
+
+@pytest.mark.parametrize("name", ["body_stiffness.16", "body_stiffness.a", "learnt.filling.0.8", "neck_stiffness.0"])
+def test_a_covariance_of_values_that_a_model_does_not_have_is_refused(name):
+    with pytest.raises(ModelParameterError, match=f"has no parameter '{name}'"):
+        nominal().with_values({}, Covariance((name,), np.eye(1)))
