@@ -4,8 +4,11 @@ Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, s
 """
 
 import importlib
+import inspect
 import io
 import pkgutil
+import re
+import shutil
 import sys
 from typing import Annotated, Any
 
@@ -28,13 +31,15 @@ class _Commands(typer.core.TyperGroup):
             raise typer.Exit(130) from None
 
 
+_PANELS = 80  # columns: narrower, the panels' columns would cut names off
+
 app = typer.Typer(
     name="bifa",
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Drive a soft in-pipe robot from an Arduino Uno and learn from data how it really behaves.",
     no_args_is_help=True,
-    rich_markup_mode="rich",
+    rich_markup_mode="rich" if shutil.get_terminal_size().columns >= _PANELS else None,
     pretty_exceptions_enable=False,
 )
 
@@ -56,6 +61,9 @@ def _commands(
 
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name[0] != "_"):
     importlib.import_module(f"{__name__}.{_module}").register(app)
+for _command in app.registered_commands:  # a paragraph fills the terminal, however the docstring is broken
+    _command.help = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(_command.callback) or "")
+    _command.short_help = re.split(r"(?<=\.)\s", _command.help)[0]  # its first sentence, not 45 characters of it
 
 
 def main() -> None:

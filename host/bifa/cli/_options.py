@@ -78,6 +78,11 @@ PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
 
 
+def examples(*commands: str) -> str:
+    """What stands at the end of a command's help, one to a line."""
+    return "\n\n".join(("Examples:", *commands))
+
+
 @contextmanager
 def stoppable(kept: Callable[[], str]) -> Iterator[None]:
     """Ctrl-C inside ends the command with status 130 and a line that says what `kept()` says was kept."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option, stoppable
+from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, examples, port_option, stoppable
 from bifa.computer import EXAMPLE_PORT
 
 if TYPE_CHECKING:
@@ -16,10 +16,13 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = f"""Examples:  bifa campaign --port virtual --seed 3   |   bifa campaign --quick   |
-bifa campaign --rerun diagnose   |
-bifa campaign --port {EXAMPLE_PORT} --watch records --out out/monday   |
-bifa campaign --port {EXAMPLE_PORT} --known head_mass_kg=0.182 --out out/monday"""
+EPILOG = examples(
+    "bifa campaign --port virtual --seed 3",
+    "bifa campaign --quick",
+    "bifa campaign --rerun diagnose",
+    f"bifa campaign --port {EXAMPLE_PORT} --watch records --out out/monday",
+    f"bifa campaign --port {EXAMPLE_PORT} --known head_mass_kg=0.182 --out out/monday",
+)
 
 
 def register(app: typer.Typer) -> None:

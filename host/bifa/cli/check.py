@@ -1,12 +1,11 @@
 """`bifa check`: what is in a data set, pictures of it, and what looks wrong."""
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import DATASET, PICTURES
+from bifa.cli._options import DATASET, PICTURES, examples
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,16 +15,10 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-_MOST_ALIKE = 3  # warnings that say the same of other files, but for their numbers
-_NUMBER = re.compile(r"-?\d+(\.\d+)?")
-
-
 def register(app: typer.Typer) -> None:
     """Offer the command `check`."""
 
-    @app.command(
-        epilog="Examples:  bifa check bench-2026-11-21   |   bifa check bench-2026-11-21 --pictures out/pictures"
-    )
+    @app.command(epilog=examples("bifa check bench-2026-11-21", "bifa check bench-2026-11-21 --pictures out/pictures"))
     def check(
         dataset: Annotated[Path, DATASET],
         pictures: Annotated[Path | None, PICTURES] = None,
@@ -73,18 +66,12 @@ def warn_of_units(console: "Console", dataset: "Dataset") -> None:
 def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
     from rich.text import Text
 
-    alike: dict[tuple[object, ...], list[Finding]] = {}
-    for finding in findings:
-        apart = finding if finding.file is None or finding.line is not None else None
-        key = (finding.kind, finding.column, _NUMBER.sub("", finding.text), apart)
-        alike.setdefault(key, []).append(finding)
-    for first, *others in alike.values():
-        shown, named = ([first], others) if len(others) >= _MOST_ALIKE else ([first, *others], [])
-        for finding in shown:
-            console.print(Text.assemble(("warning", "yellow"), f" [{finding.kind}] {finding}"), highlight=False)
-        if named:
-            files = ", ".join(finding.file or "" for finding in named)
-            console.print(Text(f"  likewise in {len(named)} more: {files}"), highlight=False)
+    from bifa.check.alike import gathered
+
+    for found in gathered(findings):
+        console.print(Text.assemble(("warning", "yellow"), f" [{found.kind}] {found.text}"), highlight=False)
+        if found.places:
+            console.print(Text(f"  {'; '.join(found.places)}"), highlight=False)
 
 
 def _print_contents(console: "Console", dataset: "Dataset") -> None:

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-EPILOG = """Examples:  bifa compare out/monday out/tuesday   |   bifa compare out/* --report compare.html"""
+from bifa.cli._options import examples
+
+EPILOG = examples("bifa compare out/monday out/tuesday", "bifa compare out/* --report compare.html")
 
 
 def register(app: typer.Typer) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import PORT
+from bifa.cli._options import PORT, examples
 from bifa.computer import EXAMPLE_PORT
 
 if TYPE_CHECKING:
@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from bifa.rig import Rig
 
 
-EPILOG = f"""Examples:  bifa console   |   bifa console --port virtual   |
-echo show | bifa console --port {EXAMPLE_PORT}"""
+EPILOG = examples("bifa console", "bifa console --port virtual", f"echo show | bifa console --port {EXAMPLE_PORT}")
 
 _LOOK_S = 0.2
 

@@ -5,10 +5,9 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PROFILE, RERUN, Profile, stoppable
+from bifa.cli._options import PROFILE, RERUN, Profile, examples, stoppable
 
-EPILOG = """Examples:  bifa demo   |   bifa demo --seed 3 --out out/three   |   bifa demo --quick   |
-bifa demo --rerun diagnose"""
+EPILOG = examples("bifa demo", "bifa demo --seed 3 --out out/three", "bifa demo --quick", "bifa demo --rerun diagnose")
 QUICK_CYCLES = 6
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bifa import cluster
-from bifa.cli._options import DATASET, WATCH, file_option, port_option
+from bifa.cli._options import DATASET, WATCH, examples, file_option, port_option
 from bifa.cli.check import warn_of_units
 
 if TYPE_CHECKING:
@@ -28,10 +28,13 @@ if TYPE_CHECKING:
 def register(app: typer.Typer) -> None:
     """Offer the command `diagnose`."""
     app.command(
-        epilog="Examples:  bifa diagnose out/bench --json verdict.json   |   "
-        "bifa diagnose out/bench --out model.toml --report report.html   |   "
-        "bifa diagnose out/bench --matters displacement_mm=0.5   |   "
-        "bifa diagnose out/bench --port virtual --resolve   |   bifa diagnose out/bench --dask tcp://scheduler:8786"
+        epilog=examples(
+            "bifa diagnose out/bench --json verdict.json",
+            "bifa diagnose out/bench --out model.toml --report report.html",
+            "bifa diagnose out/bench --matters displacement_mm=0.5",
+            "bifa diagnose out/bench --port virtual --resolve",
+            "bifa diagnose out/bench --dask tcp://scheduler:8786",
+        )
     )(diagnose)
 
 

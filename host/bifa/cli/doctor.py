@@ -4,10 +4,10 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import port_option
+from bifa.cli._options import examples, port_option
 from bifa.computer import EXAMPLE_PORT
 
-EXAMPLES = f"Examples:  bifa doctor   |   bifa doctor --port {EXAMPLE_PORT}   |   bifa doctor --port virtual"
+EXAMPLES = examples("bifa doctor", f"bifa doctor --port {EXAMPLE_PORT}", "bifa doctor --port virtual")
 
 
 def register(app: typer.Typer) -> None:

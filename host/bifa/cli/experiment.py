@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, file_option, stoppable
+from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, examples, file_option, stoppable
 from bifa.computer import EXAMPLE_PORT
 
 if TYPE_CHECKING:
@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = f"""Examples:  bifa experiment all --port virtual --out out/bench   |
-bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static   |
-bifa experiment locomotion --inclination 10 --port virtual --out out/uphill   |
-bifa experiment step_response --port {EXAMPLE_PORT} --watch records --out out/steps   |
-bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 8.5 --out out/pull"""
+EPILOG = examples(
+    "bifa experiment all --port virtual --out out/bench",
+    "bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static",
+    "bifa experiment locomotion --inclination 10 --port virtual --out out/uphill",
+    f"bifa experiment step_response --port {EXAMPLE_PORT} --watch records --out out/steps",
+    "bifa experiment anchor_pull --instrument pull.csv --telemetry out/telemetry --pressure 8.5 --out out/pull",
+)
 
 
 class Experiment(StrEnum):
@@ -34,6 +36,24 @@ class Experiment(StrEnum):
     ANCHOR_PULL = "anchor_pull"
     LOCOMOTION = "locomotion"
     ALL = "all"
+
+
+def _named(text: str) -> str:
+    if text not in list(Experiment):
+        raise typer.BadParameter(f"{text!r} is none of {', '.join(Experiment)}")
+    return text
+
+
+def _begun(incomplete: str) -> list[str]:
+    return [name for name in Experiment if name.startswith(incomplete)]
+
+
+WHICH = typer.Argument(
+    help=f"{', '.join(list(Experiment)[:-1])}, or all: the paper's section IV, and walks.",
+    callback=_named,  # an enumeration's own help is one word that no narrow terminal can break
+    autocompletion=_begun,
+    metavar="EXPERIMENT",
+)
 
 
 class Actuator(StrEnum):
@@ -49,7 +69,7 @@ def register(app: typer.Typer) -> None:
 
 
 def experiment(
-    name: Annotated[Experiment, typer.Argument(help="Which experiment; `all`: the paper's section IV, and walks.")],
+    name: Annotated[str, WHICH],
     out: Annotated[Path, typer.Option(help="Folder of the data set: a new one, or that of an interrupted session.")],
     port: Annotated[str | None, PORT] = None,
     actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
@@ -108,10 +128,10 @@ def experiment(
     if rate is not None and not math.isfinite(rate):
         raise typer.BadParameter(f"--rate is a finite number of mm/s, not {rate:g}")
     if inclination and name not in (Experiment.LOCOMOTION, Experiment.ALL):
-        raise typer.BadParameter(f"--inclination is of walks; leave it out, or run locomotion instead of {name.value}")
+        raise typer.BadParameter(f"--inclination is of walks; leave it out, or run locomotion instead of {name}")
     gaits = [_load(path) for path in gait] if gait else [BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
-        plan.EXPERIMENTS if name is Experiment.ALL else (name.value,),
+        plan.EXPERIMENTS if name == Experiment.ALL else (name,),
         actuators=(actuator.value,) if actuator else plan.ACTUATORS,
         repeats=repeats,
         pressures_psi=pressure or None,
@@ -126,7 +146,7 @@ def experiment(
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {_kept(out)}; run the same command to resume"):
-        _run(console, port, options, out, trials, name.value, parse_known(known), watch, bench)
+        _run(console, port, options, out, trials, name, parse_known(known), watch, bench)
 
 
 def _check_within(option: str, value: float, low: float, high: float, unit: str) -> None:

@@ -5,11 +5,13 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import DATASET, PICTURES, file_option
+from bifa.cli._options import DATASET, PICTURES, examples, file_option
 from bifa.cli.check import warn_of_units
 
-EPILOG = """Examples:  bifa fit out/bench --out model.toml   |
-bifa fit out/bench --out model.toml --report fit.html --pictures out/pictures"""
+EPILOG = examples(
+    "bifa fit out/bench --out model.toml",
+    "bifa fit out/bench --out model.toml --report fit.html --pictures out/pictures",
+)
 
 
 def register(app: typer.Typer) -> None:

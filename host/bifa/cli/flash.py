@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import port_option
+from bifa.cli._options import examples, port_option
 from bifa.computer import EXAMPLE_PORT
 
-EXAMPLES = f"Examples:  bifa flash   |   bifa flash --port {EXAMPLE_PORT}   |   bifa flash --build-only"
+EXAMPLES = examples("bifa flash", f"bifa flash --port {EXAMPLE_PORT}", "bifa flash --build-only")
 
 
 def register(app: typer.Typer) -> None:

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import file_option, gait_names, stoppable
+from bifa.cli._options import examples, file_option, gait_names, stoppable
 
 if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = """Examples:  bifa gaits   |   bifa gaits --make   |   bifa gaits --make --model mine.toml --out my-gaits"""
+EPILOG = examples("bifa gaits", "bifa gaits --make", "bifa gaits --make --model mine.toml --out my-gaits")
 
 
 def register(app: typer.Typer) -> None:

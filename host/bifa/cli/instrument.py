@@ -5,13 +5,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bifa.cli._options import examples
+
 if TYPE_CHECKING:
     from bifa.data.export import Export
     from bifa.measure.propose import Look
     from bifa.screen import Console
 
-EPILOG = """Examples:  bifa instrument export.csv   |   bifa instrument trial.TRA --role machine   |
-bifa instrument take.csv --role camera --bench monday.toml   |   bifa instrument --presets"""
+EPILOG = examples(
+    "bifa instrument export.csv",
+    "bifa instrument trial.TRA --role machine",
+    "bifa instrument take.csv --role camera --bench monday.toml",
+    "bifa instrument --presets",
+)
 _ROLES = {"machine": "the testing machine (static loadings, pulls)", "camera": "the camera (steps, walks)"}
 _MOST_PLOTS = 8
 

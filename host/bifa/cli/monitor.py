@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import PORT, file_option
+from bifa.cli._options import PORT, examples, file_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,8 +18,12 @@ if TYPE_CHECKING:
 
 _WEB_PORT = 8765
 
-EPILOG = """Examples:  bifa monitor   |   bifa monitor --run   |   bifa monitor --port virtual --run --seconds 20   |
-bifa monitor --web --model out/demo/model-completed.toml"""
+EPILOG = examples(
+    "bifa monitor",
+    "bifa monitor --run",
+    "bifa monitor --port virtual --run --seconds 20",
+    "bifa monitor --web --model out/demo/model-completed.toml",
+)
 
 
 def register(app: typer.Typer) -> None:

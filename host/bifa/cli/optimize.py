@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bifa import cluster
-from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
+from bifa.cli._options import NO_PICTURES, PICTURES, Method, examples, file_option
 from bifa.files import named
 
 if TYPE_CHECKING:
@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = """Examples:  bifa optimize --model MODEL.toml --out GAIT.toml   |
-bifa optimize --out fast.toml --nominal --method de   |
-bifa optimize --out paper.toml --nominal --method bo --evaluations 200   |
-bifa optimize --out GAIT.toml --dask tcp://scheduler:8786"""
+EPILOG = examples(
+    "bifa optimize --model MODEL.toml --out GAIT.toml",
+    "bifa optimize --out fast.toml --nominal --method de",
+    "bifa optimize --out paper.toml --nominal --method bo --evaluations 200",
+    "bifa optimize --out GAIT.toml --dask tcp://scheduler:8786",
+)
 
 
 def register(app: typer.Typer) -> None:

@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT, file_option, stoppable
+from bifa.cli._options import PORT, examples, file_option, stoppable
 
-EPILOG = """Examples:  bifa record --out out/walks --port virtual --gait gait.toml --cycles 10   |
-bifa record --out out/telemetry --seconds 60"""
+EPILOG = examples(
+    "bifa record --out out/walks --port virtual --gait gait.toml --cycles 10",
+    "bifa record --out out/telemetry --seconds 60",
+)
 
 
 def register(app: typer.Typer) -> None:

@@ -6,19 +6,15 @@ from typing import Annotated, Any
 
 import typer
 
-from bifa.cli._options import PROFILE, Profile, effects
+from bifa.cli._options import PROFILE, Profile, effects, examples
 from bifa.errors import BifaError
 
-EPILOG = """[bold]Examples[/bold]
-
-bifa rig                              offer a pty and print its path; Ctrl-C ends
-
-bifa rig --link /tmp/uno              the same under a fixed name
-
-bifa console --port /tmp/uno          in another terminal (or picocom -b 250000 /tmp/uno)
-
-bifa rig --profile realistic --effect hysteresis:force_N=4 --effect leak:rate_per_s=0.05
-"""
+EPILOG = examples(
+    "bifa rig",
+    "bifa rig --link /tmp/uno",
+    "bifa console --port /tmp/uno (in another terminal; or picocom -b 250000 /tmp/uno)",
+    "bifa rig --profile realistic --effect hysteresis:force_N=4 --effect leak:rate_per_s=0.05",
+)
 
 
 class RigOptionError(BifaError):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bifa.cli._options import PICTURES, Obstacle, file_option
+from bifa.cli._options import PICTURES, Obstacle, examples, file_option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,9 +21,13 @@ if TYPE_CHECKING:
 _CYCLES, _BUCKLING_N = 10, 27.0
 
 _RED = ("red", "red")
-EPILOG = """Examples:  bifa simulate   |   bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk   |
-bifa simulate --inclination 90 --payload 0.1   |   bifa simulate --obstacle tunnel --gait fast.toml   |
-bifa simulate --paper"""
+EPILOG = examples(
+    "bifa simulate",
+    "bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk",
+    "bifa simulate --inclination 90 --payload 0.1",
+    "bifa simulate --obstacle tunnel --gait fast.toml",
+    "bifa simulate --paper",
+)
 
 
 def register(app: typer.Typer) -> None:

@@ -3,6 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
+from bifa.check import Finding
+from bifa.check.alike import gathered
 from bifa.cli import app
 from bifa.data import write_dataset
 
@@ -36,10 +38,35 @@ def test_the_same_in_many_files_is_said_once(shown):
     files = [f"anchor_{psi}psi_{repeat}.csv" for psi in ("0", "5", "8.5") for repeat in (1, 2, 3)]
     _, output = shown(*files)
     assert output.count("warning") == 1
-    assert f"likewise in 8 more: {', '.join(files[1:])}" in output
+    assert "warning [sign] 9 trials, force_N: -" in output
+    assert f"  {'; '.join(files)}\n" in output
 
 
 def test_a_sound_day_is_said_to_be_one(shown):
     status, output = shown()
     assert status == 0
     assert "Nothing looks wrong." in output
+
+
+def clipped(trial: int, psi: float) -> Finding:
+    text = f"{psi:g} psi in 7 samples of pull-2.csv"
+    return Finding("clipped", text, f"step_{trial}.csv", 10 + trial, "pressure_psi")
+
+
+def test_numbers_that_differ_are_said_from_the_lowest_to_the_highest():
+    (found,) = gathered([clipped(1, 9.5), clipped(2, -10), clipped(3, 0.25)])
+    assert found.text == "3 trials, pressure_psi: -10 to 9.5 psi in 7 samples of pull-2.csv"
+    assert found.places == ("step_1.csv, line 11", "step_2.csv, line 12", "step_3.csv, line 13")
+
+
+def test_a_few_are_said_one_by_one_and_so_is_what_concerns_the_whole_data_set():
+    two = [clipped(1, 9.5), clipped(2, 10)]
+    assert [found.text for found in gathered(two)] == [str(finding) for finding in two]
+    assert [found.places for found in gathered([Finding("order", f"{n} of it") for n in (1, 2, 3)])] == [()] * 3
+
+
+def test_conditions_that_lack_a_repeat_are_gathered():
+    lonely = [Finding("missing repeats", "repeat 2, 3 is missing", condition=f"static, {n} psi") for n in (0, 2, 4)]
+    (found,) = gathered(lonely)
+    assert found.text == "3 conditions: repeat 2, 3 is missing"
+    assert found.places == ("static, 0 psi", "static, 2 psi", "static, 4 psi")
