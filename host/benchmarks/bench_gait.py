@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from benchmarks import regret
-from bifa.gait import Settings, optimise, simulations
+from bifa.gait import Settings, optimize, simulations
 from bifa.robot import nominal
 from bifa.simulate import cores
 
@@ -31,7 +31,7 @@ def run() -> dict[str, float]:
             speeds, seconds, processor = [], [], []
             for seed in SEEDS:
                 start, used = time.perf_counter(), time.process_time()
-                optimum = optimise(model, runs, Settings(robust=robust, seed=seed))
+                optimum = optimize(model, runs, Settings(robust=robust, seed=seed))
                 seconds.append(time.perf_counter() - start)
                 processor.append(time.process_time() - used)
                 speeds.append(optimum.quantile_mm_s if robust else optimum.nominal_mm_s)

@@ -45,9 +45,9 @@ def wilson(hits: int, of: int) -> tuple[float, float]:
     if of == 0:
         return 0.0, 1.0
     z, share = 1.96, hits / of
-    centre = (share + z * z / (2 * of)) / (1 + z * z / of)
+    center = (share + z * z / (2 * of)) / (1 + z * z / of)
     half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
-    return max(centre - half, 0.0), min(centre + half, 1.0)
+    return max(center - half, 0.0), min(center + half, 1.0)
 
 
 def rates(records: Sequence[dict], truth: str) -> dict[str, list[bool]]:

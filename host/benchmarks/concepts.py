@@ -91,12 +91,12 @@ def held_out(palette: Palette) -> tuple[Any, str]:
     trials = diagnosis.split.known + diagnosis.split.unseen
     figure, axis = plt.subplots(figsize=WIDE, layout="constrained")
     places, says = np.arange(len(conditions)), []
-    for (effects, colour), marker in zip(shown.items(), "osD", strict=True):
+    for (effects, color), marker in zip(shown.items(), "osD", strict=True):
         left = _residuals(tried[effects].fitted, trials)
         runs = [[left[t.name] for t in trials if (t.experiment, t.condition) == c] for c in conditions]
         errors = [float(np.sqrt(np.mean(np.square(members)))) for members in runs]
         label = f"with {_words(effects)}" if effects else "the model as it is"
-        axis.plot(places, errors, marker, color=colour, markeredgecolor=palette.ink, markersize=7, label=label)
+        axis.plot(places, errors, marker, color=color, markeredgecolor=palette.ink, markersize=7, label=label)
         says.append(f"{label} {', '.join(f'{e:.2f}' for e in errors)} mm")
     sd = np.mean([noise.sd for noise in diagnosis.search.floor.channels.values()])
     axis.axhline(sd, color=palette.ink, linestyle=":", label="floor")

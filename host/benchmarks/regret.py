@@ -23,7 +23,7 @@ from scipy.optimize import direct
 
 from benchmarks import records as lines
 from bifa import effects
-from bifa.gait import SearchError, Settings, optimise, simulations
+from bifa.gait import SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import SCENARIOS
 from bifa.gait.objectives import NominalSpeed
 from bifa.gait.uncertainty import SPREAD
@@ -77,7 +77,7 @@ def searched(model: Model, settings: Settings, seeds: Sequence[int], long: int, 
 
 def _speed(model: Model, settings: Settings, runs) -> float:
     try:
-        found = optimise(model, runs, settings)
+        found = optimize(model, runs, settings)
     except SearchError:
         return 0.0
     return found.quantile_mm_s if settings.robust else found.nominal_mm_s

@@ -65,13 +65,13 @@ class Robot:
 
         return Robot(completed_model(verdict.diagnosis.final))
 
-    def optimise(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None) -> Optimum:
+    def optimize(self, *, robust: bool = True, seed: int = 0, evaluations: int | None = None) -> Optimum:
         """The fastest gait on this robot, or (robust) on nine in ten like it: a `bifa.gait.Optimum`, with `gait`."""
-        from bifa.gait import Settings, optimise, simulations
+        from bifa.gait import Settings, optimize, simulations
 
         settings = Settings(robust=robust, seed=seed, evaluations=evaluations)
         with simulations() as runs:
-            return optimise(self.model, runs, settings)
+            return optimize(self.model, runs, settings)
 
     def save(self, path: str | Path) -> None:
         """Write the model file."""

@@ -66,7 +66,7 @@ class Lab:
     force_noise: float = 0.12
     displacement_noise_mm: float = 0.05
     pressure_noise: float = 0.03
-    colour: float = 0.5
+    color: float = 0.5
     friction_wobble: float = 0.0
     seed: int = 0
     rng: np.random.Generator = field(default=None, compare=False)
@@ -80,7 +80,7 @@ class Lab:
         out = np.empty(n + 50)
         out[0] = white[0]
         for i in range(1, n + 50):
-            out[i] = self.colour * out[i - 1] + np.sqrt(1 - self.colour**2) * white[i]
+            out[i] = self.color * out[i - 1] + np.sqrt(1 - self.color**2) * white[i]
         return sd * out[50:]
 
     def sensor(self, pressure: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ HOST = Path(__file__).resolve().parent.parent
 def test_every_name_at_the_front_doors_has_a_type(tmp_path):
     script = tmp_path / "theirs.py"
     names = [*(f"bifa.{name}" for name in bifa.__all__), *(f"lacuna.{name}" for name in lacuna.__all__)]
-    answers = ["bifa.Robot().diagnose(bifa.load_dataset(''))", "bifa.Robot().optimise().gait"]
+    answers = ["bifa.Robot().diagnose(bifa.load_dataset(''))", "bifa.Robot().optimize().gait"]
     asked = "".join(f"reveal_type({name})\n" for name in (*names, *answers))
     script.write_text(f"import bifa\nimport lacuna\n\n{asked}", encoding="utf-8")
     done = subprocess.run(

@@ -29,7 +29,7 @@ def _supplied(time_s, held, supplied, at_s):
 
 
 @njit(_RUN, nogil=True, cache=True)
-def modelled(rates, reading, time_s, held, start, p, delay_s, step_s):
+def modeled(rates, reading, time_s, held, start, p, delay_s, step_s):
     """Classical Runge and Kutta; a late input is averaged over each step, so that the delay has a derivative."""
     n, states = len(time_s), len(start)
     found, x, supplied = np.empty(n), start.copy(), np.zeros(n)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from benchmarks.small.integrate import modelled, true
+from benchmarks.small.integrate import modeled, true
 from lacuna import Effect, Parameter
 
 
@@ -82,7 +82,7 @@ class Kind:
         p = np.array([values.get(name, self.off[name]) for name in self.names])
         delay_s = values.get(f"{self.delay}.delay_s", 0.0) if self.delay else 0.0
         start = self._start(self.states)
-        return modelled(self.rates, self.reading, time_s, applied, start, p, delay_s, self.step_s)
+        return modeled(self.rates, self.reading, time_s, applied, start, p, delay_s, self.step_s)
 
     def truth(self, time_s: np.ndarray, applied: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
         """What really happens; forms without values are not there."""

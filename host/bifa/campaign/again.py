@@ -95,7 +95,7 @@ class Trades:
     gait, and the robot walks it into a data set; walk(number, model, gait, folder) numbers the rounds from 2 on."""
 
     complete: Callable[[Dataset], tuple[Model, tuple[str, ...]]]
-    optimise: Callable[[Model], Gait]
+    optimize: Callable[[Model], Gait]
     walk: Callable[[int, Model, Gait, Path], Dataset]
 
 
@@ -157,7 +157,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         if not rounds[-1].is_predicted:
             model, effects = trades.complete(dataset)
-        found.append(trades.optimise(model))
+        found.append(trades.optimize(model))
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)
         rounds.append(judged(model, effects, walks, at_edge=True))

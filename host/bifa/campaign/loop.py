@@ -17,7 +17,7 @@ from bifa.campaign.summary import summarize
 from bifa.campaign.walks import measure_walks, planned_cycles
 from bifa.data import Dataset, read_dataset, write_dataset
 from bifa.data.dataset import labels_of
-from bifa.gait import Optimum, SearchError, Settings, optimise, simulations
+from bifa.gait import Optimum, SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import provenance
 from bifa.gait.objectives import QUANTILE
 from bifa.gait.uncertainty import SPREAD
@@ -57,10 +57,10 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
     stages = [
         *_characterize(setup, effort, on_progress),
         _fit(setup, on_progress),
-        _optimise("base", setup, on_progress),
+        _optimize("base", setup, on_progress),
         _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, setup, effort, on_progress),
         _diagnose(setup, on_progress),
-        _optimise("completed", setup, on_progress),
+        _optimize("completed", setup, on_progress),
         _walk("completed", {"completed": "gait-completed.toml"}, 2, setup, effort, on_progress),
         _again(setup, effort, on_progress),
     ]
@@ -131,7 +131,7 @@ def _fit(setup: Setup, on_progress: OnProgress) -> Stage:
     return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run)
 
 
-def _optimise(which: str, setup: Setup, on_progress: OnProgress) -> Stage:
+def _optimize(which: str, setup: Setup, on_progress: OnProgress) -> Stage:
     """The gait of the base or of the completed model."""
     model, gait = f"model-{which}.toml", f"gait-{which}.toml"
 
@@ -160,7 +160,7 @@ def found_gait(robot: Model, seed: int, spread: float | None, on_progress: OnPro
     share = QUANTILE if spread is not None else _AT_EDGE
     with simulations() as runs:
         settings = Settings(seed=seed, spread=spread, naive=naive, share=share)
-        return optimise(robot, runs, settings, lambda what, share, _: on_progress(what, share))
+        return optimize(robot, runs, settings, lambda what, share, _: on_progress(what, share))
 
 
 def _walk(

@@ -27,12 +27,12 @@ def doctor(
     from bifa.screen import Console
     from bifa.toolchain.checks import MISSING, run_checks
 
-    colours = {"ok": "green", "missing": "red", "optional": "yellow"}
+    colors = {"ok": "green", "missing": "red", "optional": "yellow"}
     console = Console(highlight=False)
     missing = False
     for finding in run_checks(port):
         missing |= finding.state == MISSING
-        console.print(Text.assemble((f"{finding.state:9}", colours[finding.state]), f" {finding.what:22} "), end="")
+        console.print(Text.assemble((f"{finding.state:9}", colors[finding.state]), f" {finding.what:22} "), end="")
         console.out(finding.found)
         if finding.remedy:
             console.out(f"{'':10}fix: {finding.remedy}")

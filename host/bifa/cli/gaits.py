@@ -74,7 +74,7 @@ def _make(console: "Console", model_path: Path | None, folder: Path, names: list
     from dataclasses import replace
 
     from bifa.cli.optimize import search_progress
-    from bifa.gait import optimise, simulations
+    from bifa.gait import optimize, simulations
     from bifa.gait.library import scenarios
     from bifa.robot import load_model, nominal
 
@@ -83,7 +83,7 @@ def _make(console: "Console", model_path: Path | None, folder: Path, names: list
     with simulations() as runs, search_progress(console) as progress:
         for scenario in map(scenarios.load_scenario, names):
             settings = replace(scenario.settings, seed=seed)
-            optimum = optimise(model, runs, settings, progress(scenario.name))
+            optimum = optimize(model, runs, settings, progress(scenario.name))
             path = scenarios.save(folder, scenario, optimum, model.name)
             console.print(
                 f"{scenario.name}: {optimum.nominal_mm_s:.2f} mm/s, 10th percentile {optimum.quantile_mm_s:.2f} "

@@ -102,13 +102,13 @@ def _beside(out: Path) -> Path:
 
 def _best(console: "Console", robot: "Model", pool: "Simulations", settings: "list[Settings]") -> "Optimum":
     """The best optimum of one search after another, each with its line."""
-    from bifa.gait import optimise
+    from bifa.gait import optimize
     from bifa.screen import warning
 
     optima = []
     for one in settings:
         with search_progress(console) as progress:
-            optima.append(optimise(robot, pool, one, progress(f"seed {one.seed}")))
+            optima.append(optimize(robot, pool, one, progress(f"seed {one.seed}")))
         console.print(_line(optima[-1]), highlight=False)
         if optima[-1].doubt:
             console.print(warning(str(optima[-1].doubt)), highlight=False)
@@ -129,7 +129,7 @@ def _explain(console: "Console", robot: "Model", pool: "Simulations", best: "Opt
 
 @contextmanager
 def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[str, float, float], None]]]:
-    """Gives a function: title -> what `optimise` reports progress to."""
+    """Gives a function: title -> what `optimize` reports progress to."""
     from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
     from bifa.screen import words
@@ -176,7 +176,7 @@ def _summary(optimum: "Optimum") -> "Table":
 
 
 def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: Path) -> list[str]:
-    from bifa.gait import Settings, library, optimise
+    from bifa.gait import Settings, library, optimize
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
     from bifa.gait.sensitivity import front, sensitivity
@@ -194,7 +194,7 @@ def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: P
     if settings.robust:
         robust = optimum.gait
         quick = Settings(robust=False, seed=settings.seed, evaluations=1500, space=settings.space)
-        fast = optimise(robot, pool, quick).gait
+        fast = optimize(robot, pool, quick).gait
         other = {"fastest on the model": fast}
     else:
         robust, fast = library.load("robust").gait, optimum.gait

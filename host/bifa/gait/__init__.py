@@ -1,8 +1,8 @@
 """Gaits: what counts as speed, the search for the fastest and for the most robust, a library for scenarios.
 
-from bifa.gait import Settings, optimise, simulations
+from bifa.gait import Settings, optimize, simulations
 with simulations() as runs:
-    optimum = optimise(model, runs, Settings(robust=True, seed=1))
+    optimum = optimize(model, runs, Settings(robust=True, seed=1))
 
 Names are loaded when they are used: the library of gaits is read without the seconds that the search takes to import.
 """
@@ -21,7 +21,7 @@ _PLACES = {
     "Settings": "search",
     "SpaceError": "space",
     "UncertaintyError": "uncertainty",
-    "optimise": "search",
+    "optimize": "search",
     "measured_speed": "measured",
     "paper_space": "space",
     "predict_speed": "prediction",
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from bifa.gait.search import Optimum as Optimum
     from bifa.gait.search import SearchError as SearchError
     from bifa.gait.search import Settings as Settings
-    from bifa.gait.search import optimise as optimise
+    from bifa.gait.search import optimize as optimize
     from bifa.gait.space import SearchSpace as SearchSpace
     from bifa.gait.space import SpaceError as SpaceError
     from bifa.gait.space import paper_space as paper_space

@@ -123,7 +123,7 @@ class Optimum:
         )
 
 
-def optimise(
+def optimize(
     model: Model, runs: Simulations, settings: Settings | None = None, on_progress: OnProgress | None = None
 ) -> Optimum:
     """Find the gait that maximises the settled speed, of the model or robustly. Deterministic for a seed.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from bifa.identify.robust import labelled, with_uncertainty
+from bifa.identify.robust import labeled, with_uncertainty
 from bifa.identify.scatter import with_scatter
 from bifa.pipe_robot.sites import learnt_curves
 from bifa.pipe_robot.system import RobotSystem
@@ -23,4 +23,4 @@ def completed_model(fit: Fit, date: str = "") -> Model:
     model = system.model_at(fit.theta, structure.effects)
     model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
     model = with_scatter(with_uncertainty(model, fit, uncertainty(fit)), fit)
-    return labelled(model, system, "bifa diagnose", date)
+    return labeled(model, system, "bifa diagnose", date)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bifa.data import Dataset
 from bifa.identify.estimate import IntervalEstimate
-from bifa.identify.robust import labelled, with_uncertainty
+from bifa.identify.robust import labeled, with_uncertainty
 from bifa.identify.scatter import with_scatter
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import StaticFit
@@ -152,7 +152,7 @@ def _model(
     """The identified model: fitted values with their sd, and the covariance of what is determined."""
     sd = {name: interval.sd for name, interval in intervals.items()}
     model = with_scatter(with_uncertainty(system.model_at(fit.theta), fit, known, sd), fit)
-    return labelled(model, system, "bifa fit", date)
+    return labeled(model, system, "bifa fit", date)
 
 
 _TOLD = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before

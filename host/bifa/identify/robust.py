@@ -51,7 +51,7 @@ def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
     return found
 
 
-def labelled(model: Model, system: RobotSystem, command: str, date: str = "") -> Model:
+def labeled(model: Model, system: RobotSystem, command: str, date: str = "") -> Model:
     """`model`, fitted to the data set of `system`, with its name, its provenance and the source of each value.
 
     date: of the fit; left out where the same data have to give the same bytes.

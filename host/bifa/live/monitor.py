@@ -18,7 +18,7 @@ from bifa.screen import Console
 
 REFRESH_S = 0.1
 _WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters of the trace, and of what stands beside it
-COLOURS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
+COLORS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
 
 
 def dial(phase_rad: float, width: int = 10) -> str:
@@ -57,7 +57,7 @@ class Monitor:
                 name,
                 f"{sample.pressure_psi[i]:+7.3f}",
                 f"{self._trace.sparkline(i, width):{width}}",
-                Text(connected, COLOURS[connected]),
+                Text(connected, COLORS[connected]),
                 dial(sample.phase_rad[i]),
             )
         state = f"{sample.state}  {sample.time_us / 1e6:.1f} s" if sample else "no telemetry yet"

@@ -219,13 +219,13 @@ def _solve_monotone(information: np.ndarray, target: np.ndarray, slopes: np.ndar
         return free
     root = np.linalg.cholesky(information)  # whitened, the problem is round
     inverse = np.linalg.inv(root.T)
-    centre = root.T @ free
+    center = root.T @ free
     turned = slopes @ inverse
     scale = np.abs(turned).max()
     solution = minimize(
-        lambda y: 0.5 * np.sum((y - centre) ** 2),
-        centre,
-        jac=lambda y: y - centre,
+        lambda y: 0.5 * np.sum((y - center) ** 2),
+        center,
+        jac=lambda y: y - center,
         constraints=LinearConstraint(turned / scale, 0.0, np.inf),
         method="SLSQP",
         options={"maxiter": 200, "ftol": 1e-12},

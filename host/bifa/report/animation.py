@@ -68,7 +68,7 @@ def animate_walks(
     rules.append(_keyframes("walk-clock", _clock_moves(clock, width), seconds))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}">'
-        f"<title>{escape(title)}</title><style>{_colours() if standalone else ''}{_look(zoom)}{''.join(rules)}"
+        f"<title>{escape(title)}</title><style>{_colors() if standalone else ''}{_look(zoom)}{''.join(rules)}"
         "@media (prefers-reduced-motion: reduce) { [class^=walk] { animation-play-state: paused } }</style>"
         f"{_ground() if standalone else ''}{''.join(drawn)}</svg>"
     )
@@ -147,8 +147,8 @@ def _clock_moves(y: float, width: float) -> list[str]:
     return [f"translate({x:.1f}px,{y:.0f}px)" for x in (_MARGIN_MM, width - _MARGIN_MM)]
 
 
-def _colours() -> str:
-    light, dark = (";".join(f"--{k}:{v}" for k, v in p.colours().items()) for p in (LIGHT, DARK))
+def _colors() -> str:
+    light, dark = (";".join(f"--{k}:{v}" for k, v in p.colors().items()) for p in (LIGHT, DARK))
     return f"svg{{{light}}}@media (prefers-color-scheme: dark){{svg{{{dark}}}}}"
 
 

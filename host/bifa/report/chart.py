@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Series:
-    """Values y over x, arrays of shape (n,). `colour`: a role of the palette (`style.Palette.colours`).
+    """Values y over x, arrays of shape (n,). `color`: a role of the palette (`style.Palette.colors`).
 
     keys: the entries of the legend that it belongs to; it is drawn while all of them are switched on.
     style: "line", "dashed", "dotted", "dots", "steps" (each y holds until the next) or "area"
@@ -21,7 +21,7 @@ class Series:
     keys: tuple[str, ...]
     x: np.ndarray
     y: np.ndarray
-    colour: str
+    color: str
     style: str = "line"
     base: float = 0.0
 
@@ -61,7 +61,7 @@ class Key:
     """An entry of the legend."""
 
     label: str
-    colour: str
+    color: str
     style: str = "line"
 
 

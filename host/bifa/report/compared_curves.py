@@ -53,9 +53,9 @@ def _column(trial: Record, predictions: Mapping[str, Channels], label: str) -> C
             continue
         measured = np.asarray(trial.channels[channel])
         both, off = [Series((MEASURED,), *thinned(x, measured, _MOST), "measured")], []
-        for model, modelled in ((model, channels[channel]) for model, channels in predictions.items()):
-            both.append(Series((model,), *thinned(x, modelled, _MOST), *_LOOKS[model]))
-            off.append(Series((model,), *thinned(x, measured - modelled, _MOST), _LOOKS[model][0]))
+        for model, modeled in ((model, channels[channel]) for model, channels in predictions.items()):
+            both.append(Series((model,), *thinned(x, modeled, _MOST), *_LOOKS[model]))
+            off.append(Series((model,), *thinned(x, measured - modeled, _MOST), _LOOKS[model][0]))
         unit = unit_of(channel)
         panels.append(Panel(both, over, Axis(f"{_short(channel)}, {unit}")))
         panels.append(Panel(off, over, Axis(f"off, {unit}"), height=0.55))

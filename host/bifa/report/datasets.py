@@ -49,7 +49,7 @@ def condition_chart(group: Sequence[Trial]) -> Chart:
                 keys.setdefault(key.label, key)
                 x, y = thinned(trial.columns[abscissa], trial.columns[name], _MAX_POINTS)
                 lifted, style = (y + _APART * row, "steps") if is_command(name) else (y, "line")
-                series.append(Series((key.label,), x, lifted, key.colour, style))
+                series.append(Series((key.label,), x, lifted, key.color, style))
         panels.append(Panel(series, Axis(_axis(abscissa)), _upward(what, names)))
     title = f"{first.label} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
     return Chart([Column(panels)], list(keys.values()), title, title=title, across=1, height=160)

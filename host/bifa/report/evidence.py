@@ -67,17 +67,17 @@ def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | No
 def learnt_chart(curve: Mapping[str, Any]) -> Chart:
     """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
     # Neither of the chambers' colours nor of the models': a row is a direction.
-    colours = ("ink", "after", "before", "quiet")
+    colors = ("ink", "after", "before", "quiet")
     rows = {row or "learnt": np.asarray(values, float) for row, values in curve["rows"].items()}
     series = [
-        Series((row,), np.linspace(curve["lower"], curve["upper"], len(values)), values, colours[i % 4])
+        Series((row,), np.linspace(curve["lower"], curve["upper"], len(values)), values, colors[i % 4])
         for i, (row, values) in enumerate(rows.items())
     ]
     unit = curve["unit"]
     panel = Panel(
         series, Axis(curve["variable"]), Axis(f"added, {unit}" if unit else "added"), [("y", 0.0, "")], height=1.2
     )
-    keys = [Key(row, colours[i % 4]) for i, row in enumerate(rows)] if len(rows) > 1 else []
+    keys = [Key(row, colors[i % 4]) for i, row in enumerate(rows)] if len(rows) > 1 else []
     return Chart([Column([panel])], keys, f"What was learnt: {curve['term']} over {curve['variable']}", across=1)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from bifa.gait.explain import CYCLES, Anatomy, reasons
 from bifa.gait.search import Optimum
 from bifa.gait.sensitivity import Front, Scan
-from bifa.report.style import CHAMBER_COLOURS, CHAMBERS, Palette, figure_style
+from bifa.report.style import CHAMBER_COLORS, CHAMBERS, Palette, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,16 +54,16 @@ def _draw_gait(axes: np.ndarray, anatomy: Anatomy, horizon_s: float, palette: Pa
     time = record["time_s"][shown] - start
     for row, chamber in enumerate(CHAMBERS):
         on = record[f"command_{chamber}"][shown] == 1
-        colour = CHAMBER_COLOURS[chamber]
-        outputs.fill_between(time, 1.2 * row, 1.2 * row + 0.8 * on, color=colour, alpha=0.6, linewidth=0, step="post")
-        pressures.plot(time, record[f"pressure_{chamber}_psi"][shown], color=colour, label=chamber)
+        color = CHAMBER_COLORS[chamber]
+        outputs.fill_between(time, 1.2 * row, 1.2 * row + 0.8 * on, color=color, alpha=0.6, linewidth=0, step="post")
+        pressures.plot(time, record[f"pressure_{chamber}_psi"][shown], color=color, label=chamber)
     outputs.grid(False)
     for axis in axes:
         _mark_contraction(axis, record["command_body"][shown] == 0, time, palette)
     origin = record["displacement_tail_mm"][shown][0]
     for end, style in (("head", "-"), ("tail", "--")):
         y = record[f"displacement_{end}_mm"][shown] - origin
-        displacement.plot(time, y, style, color=CHAMBER_COLOURS[end], label=end)
+        displacement.plot(time, y, style, color=CHAMBER_COLORS[end], label=end)
     displacement.set_xlabel("time [s]")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from bifa.identify.identification import Identification
 from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
-from bifa.report.style import CHAMBER_COLOURS, Palette, figure_style
+from bifa.report.style import CHAMBER_COLORS, Palette, figure_style
 from lacuna.system import Channels, Record
 
 if TYPE_CHECKING:
@@ -50,11 +50,11 @@ class _Pair:
         below.set(ylabel=f"measured\n- model [{unit}]")
 
     def add(
-        self, x: np.ndarray, measured: np.ndarray, modelled: np.ndarray, colour: Any, label: str | None = None
+        self, x: np.ndarray, measured: np.ndarray, modeled: np.ndarray, color: Any, label: str | None = None
     ) -> None:
-        self.above.plot(x, measured, color=colour, alpha=0.35, lw=2.4)
-        self.above.plot(x, modelled, color=colour, lw=1.0, label=label)
-        self.below.plot(x, measured - modelled, color=colour, alpha=0.6, lw=0.5)
+        self.above.plot(x, measured, color=color, alpha=0.35, lw=2.4)
+        self.above.plot(x, modeled, color=color, lw=1.0, label=label)
+        self.below.plot(x, measured - modeled, color=color, alpha=0.6, lw=0.5)
 
     def legend(self, palette: Palette) -> None:
         """Each label once, and which line is which; beside the curves."""
@@ -101,18 +101,18 @@ def _pressures(pairs: Pairs) -> dict[float, tuple[Any, ...]]:
     import matplotlib
 
     places = sorted({trial.payload.pressure_psi for trial, _ in pairs})
-    colours = matplotlib.colormaps["viridis"](np.linspace(0.1, 0.85, len(places)))
-    return dict(zip(places, map(tuple, colours), strict=True))
+    colors = matplotlib.colormaps["viridis"](np.linspace(0.1, 0.85, len(places)))
+    return dict(zip(places, map(tuple, colors), strict=True))
 
 
 def _stiffness(pairs: Pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes((3.4, 1.3), len(groups))
     for (above, below), (actuator, mine) in zip(axes.T, groups.items(), strict=True):
-        force, colours = _Pair(above, below, "N", palette), _pressures(mine)
+        force, colors = _Pair(above, below, "N", palette), _pressures(mine)
         for trial, prediction in mine:
             x, psi = trial.payload.displacement_m * 1e3, trial.payload.pressure_psi
-            force.add(x, trial.channels["force_N"], prediction["force_N"], colours[psi], f"{psi:.3g} psi")
+            force.add(x, trial.channels["force_N"], prediction["force_N"], colors[psi], f"{psi:.3g} psi")
         above.axhline(0.0, color=palette.quiet, lw=0.6)
         above.set(title=f"{actuator} actuator", ylabel="force [N]")
         below.set(xlabel="displacement [mm]")
@@ -124,7 +124,7 @@ def _steps(pairs: Pairs, palette: Palette, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes((3.0, 1.3, 3.0, 1.3), len(groups))
     for column, (actuator, mine) in zip(axes.T, groups.items(), strict=True):
-        colours = _pressures(mine)
+        colors = _pressures(mine)
         panels = {
             "displacement_mm": _Pair(column[0], column[1], "mm", palette),
             "pressure_psi": _Pair(column[2], column[3], "psi", palette),
@@ -132,7 +132,7 @@ def _steps(pairs: Pairs, palette: Palette, path: Path) -> None:
         for trial, prediction in mine:
             psi = trial.payload.pressure_psi
             for channel, panel in panels.items():
-                panel.add(trial.time_s, trial.channels[channel], prediction[channel], colours[psi], f"{psi:.3g} psi")
+                panel.add(trial.time_s, trial.channels[channel], prediction[channel], colors[psi], f"{psi:.3g} psi")
         column[0].set(title=f"{actuator} actuator", ylabel="displacement [mm]")
         column[2].set(ylabel="pressure [psi]")
         column[3].set(xlabel="time [s]")
@@ -142,10 +142,10 @@ def _steps(pairs: Pairs, palette: Palette, path: Path) -> None:
 
 def _anchor(pairs: Pairs, palette: Palette, path: Path) -> None:
     figure, ((above,), (below,)) = _axes((3.6, 1.3), 1, 7.2)
-    force, colours = _Pair(above, below, "N", palette), _pressures(pairs)
+    force, colors = _Pair(above, below, "N", palette), _pressures(pairs)
     for trial, prediction in pairs:
         psi, pulled_mm = trial.payload.pressure_psi, trial.payload.pulled_s * abs(trial.payload.rate_mm_s)
-        force.add(pulled_mm, trial.channels["force_N"], prediction["force_N"], colours[psi], f"{psi:.3g} psi")
+        force.add(pulled_mm, trial.channels["force_N"], prediction["force_N"], colors[psi], f"{psi:.3g} psi")
     above.set(ylabel="anchoring force [N]")
     below.set(xlabel="pulled distance [mm]")
     force.legend(palette)
@@ -162,8 +162,8 @@ def _walks(pairs: Pairs, palette: Palette, path: Path) -> None:
         path_mm = _Pair(above, below, "mm", palette)
         for end in ("head", "tail"):
             if (channel := f"displacement_{end}_mm") in trial.channels:
-                measured, modelled = trial.channels[channel], prediction[channel]
-                path_mm.add(trial.time_s, measured, modelled, CHAMBER_COLOURS[end], end)
+                measured, modeled = trial.channels[channel], prediction[channel]
+                path_mm.add(trial.time_s, measured, modeled, CHAMBER_COLORS[end], end)
         above.set(title=trial.name.removesuffix(".csv"), ylabel="displacement [mm]")
         below.set(xlabel="time [s]")
         path_mm.legend(palette)

@@ -19,7 +19,7 @@ _SLIDERS = (
 
 def live_page() -> str:
     """One HTML document; what it shows and asks goes to where it came from."""
-    palettes = {"light": LIGHT.colours(), "dark": DARK.colours()}
+    palettes = {"light": LIGHT.colors(), "dark": DARK.colors()}
     return (
         environment()
         .get_template("live.html.jinja")

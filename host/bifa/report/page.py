@@ -51,8 +51,8 @@ def render(page: Page) -> str:
         .render(
             page=page,
             numbers=iter(range(len(plots))),
-            palettes={"light": LIGHT.colours(), "dark": DARK.colours()},
-            data=_embedded({"plots": plots, "light": LIGHT.colours(), "dark": DARK.colours()}),
+            palettes={"light": LIGHT.colors(), "dark": DARK.colors()},
+            data=_embedded({"plots": plots, "light": LIGHT.colors(), "dark": DARK.colors()}),
             style=page_style(),
             script=template_file("page.js"),
             library=library_script() if plots else "",

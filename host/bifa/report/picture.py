@@ -59,9 +59,9 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
 
 
 def _draw(axis: Axes, panel: Panel, palette: Palette) -> None:
-    colours = palette.colours()
+    colors = palette.colors()
     for series in panel.series:
-        _draw_series(axis, series, colours[series.colour])
+        _draw_series(axis, series, colors[series.color])
     for along, place, label in panel.rules:
         (axis.axvline if along == "x" else axis.axhline)(place, color=palette.ink, linestyle=":", linewidth=1.0)
         where = {"x": (place, 0.97, axis.get_xaxis_transform()), "y": (0.5, place, axis.get_yaxis_transform())}[along]
@@ -71,16 +71,16 @@ def _draw(axis: Axes, panel: Panel, palette: Palette) -> None:
     _scale(axis, "y", panel.y)
 
 
-def _draw_series(axis: Axes, series: Series, colour: str) -> None:
+def _draw_series(axis: Axes, series: Series, color: str) -> None:
     x, y = series.x, series.y
     if series.style == "dots":
-        axis.plot(x, y, "o", color=colour, markersize=7)
+        axis.plot(x, y, "o", color=color, markersize=7)
     elif series.style == "steps":
-        axis.step(x, y, where="post", color=colour)
+        axis.step(x, y, where="post", color=color)
     elif series.style == "area":
-        axis.fill_between(x, series.base, y, step="post", color=colour, linewidth=0)
+        axis.fill_between(x, series.base, y, step="post", color=color, linewidth=0)
     else:
-        axis.plot(x, y, _DASHES.get(series.style, "-"), color=colour)
+        axis.plot(x, y, _DASHES.get(series.style, "-"), color=color)
 
 
 def _scale(axis: Axes, name: Literal["x", "y"], one: Axis) -> None:
@@ -103,10 +103,10 @@ def _handle(key: Key, palette: Palette) -> Artist:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    colour = palette.colours()[key.colour]
+    color = palette.colors()[key.color]
     if key.style == "area":
-        return Patch(color=colour, label=key.label)
+        return Patch(color=color, label=key.label)
     form: dict[str, Any] = (
         {"linestyle": "", "marker": "o"} if key.style == "dots" else {"linestyle": _DASHES.get(key.style, "-")}
     )
-    return Line2D([], [], color=colour, label=key.label, **form)
+    return Line2D([], [], color=color, label=key.label, **form)

@@ -54,7 +54,7 @@ def _curve(series: Series, across: str) -> dict[str, Any]:
         "keys": series.keys,
         "across": across,
         "points": [[x, y] for x, y in zip(_short(series.x), _short(series.y), strict=True)],
-        "colour": series.colour,
+        "colour": series.color,
         "style": series.style,
         "base": series.base,
     }

@@ -36,8 +36,8 @@ def _chart(what: str, traces: Sequence[Mapping[str, Any]]) -> Chart:
 
 def _column(trace: Mapping[str, Any]) -> Column:
     series = [
-        Series((key,), *thinned(trace["time_s"], trace[side], 240), colour)
-        for key, side, colour in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
+        Series((key,), *thinned(trace["time_s"], trace[side], 240), color)
+        for key, side, color in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
     ]
     title = f"{_label(trace)}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
     return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)

@@ -9,7 +9,7 @@ import numpy as np
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
 
 STANDING_MM_S = 0.5  # a robot that is slower slips in place
-_COLOURS = ("quiet", "before", "after")
+_COLORS = ("quiet", "before", "after")
 
 
 def standing_share(speeds: Sequence[float]) -> float:
@@ -20,12 +20,12 @@ def standing_share(speeds: Sequence[float]) -> float:
 def robustness_chart(speeds: Mapping[str, Sequence[float]], titles: Mapping[str, str]) -> Chart:
     """The share of robots on which each gait is slower than a speed. `speeds`: by gait, mm/s, sorted."""
     series, keys = [], []
-    for (name, values), colour in zip(speeds.items(), _COLOURS, strict=False):
+    for (name, values), color in zip(speeds.items(), _COLORS, strict=False):
         share = 100.0 * np.arange(1, len(values) + 1) / len(values)
         label = titles.get(name, name)
         x, y = np.concatenate(([0.0], values)), np.concatenate(([0.0], share))
-        series.append(Series((label,), x, y, colour, "steps"))
-        keys.append(Key(label, colour))
+        series.append(Series((label,), x, y, color, "steps"))
+        keys.append(Key(label, color))
     fastest = max(values[-1] for values in speeds.values())
     panel = Panel(
         series,

@@ -5,12 +5,12 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from lacuna.report.page import COLOURS
+from lacuna.report.page import COLORS
 from lacuna.report.style import LOOK
 
 CHAMBERS = ("body", "head", "tail")
 # Okabe and Ito's palette: distinct for readers with any colour vision, and on paper. Nothing else has these colours.
-CHAMBER_COLOURS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
+CHAMBER_COLORS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,13 @@ class Palette:
     before: str
     after: str
 
-    def colours(self) -> dict[str, str]:
+    def colors(self) -> dict[str, str]:
         """By role, chambers included."""
-        return asdict(self) | CHAMBER_COLOURS
+        return asdict(self) | CHAMBER_COLORS
 
 
-LIGHT = Palette(**COLOURS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
-DARK = Palette(**COLOURS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
+LIGHT = Palette(**COLORS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
+DARK = Palette(**COLORS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
 
 _RC: dict[Any, Any] = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
 

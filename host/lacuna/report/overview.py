@@ -62,8 +62,8 @@ def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
     rows = [*base, *tried] or [{"effects": [], "error": record["error"]["before"]["fitted"]}]
     named = {e["name"] for e in record["effects"]}
     places = np.arange(len(rows))[::-1]
-    colours = [palette.after if named and set(one["effects"]) == named else palette.before for one in rows]
-    axis.barh(places, [one["error"] for one in rows], height=0.6, color=colours)
+    colors = [palette.after if named and set(one["effects"]) == named else palette.before for one in rows]
+    axis.barh(places, [one["error"] for one in rows], height=0.6, color=colors)
     axis.axvline(1.0, color=palette.ink, linestyle=":")
     axis.set_yticks(places, [" + ".join(one["effects"]).replace("_", " ") or "the model as it is" for one in rows])
     axis.set_xscale("log")
@@ -94,8 +94,8 @@ def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple[Any, ...], lege
     left.plot(trial.time_s, after[channel], color=palette.after, linestyle="--", label="completed")
     left.set_title(trial.name, loc="left", fontsize=8)
     left.set_ylabel(channel)
-    for prediction, colour in ((before, palette.before), (after, palette.after)):
-        right.plot(trial.time_s, (trial.channels[channel] - prediction[channel]) / floor, color=colour, linewidth=0.9)
+    for prediction, color in ((before, palette.before), (after, palette.after)):
+        right.plot(trial.time_s, (trial.channels[channel] - prediction[channel]) / floor, color=color, linewidth=0.9)
     right.axhspan(-1, 1, color=palette.quiet, alpha=0.25, linewidth=0)
     right.set_ylabel("residual, floors")
     right.set_xlabel("time, s")

@@ -10,7 +10,7 @@ from io import BytesIO
 import jinja2
 from markupsafe import Markup
 
-COLOURS = {  # by role; what is quiet is still to be read
+COLORS = {  # by role; what is quiet is still to be read
     "light": {"paper": "#ffffff", "ink": "#1d1f23", "quiet": "#5d636d", "grid": "#d9dce1"},
     "dark": {"paper": "#16181c", "ink": "#e6e6e6", "quiet": "#a2a8b2", "grid": "#33373e"},
 }
@@ -92,7 +92,7 @@ def both_palettes(draw: Callable[[BytesIO, bool], None], alt: str, caption: str 
 
 def render(page: Page) -> str:
     """The page as one HTML document; all text is escaped."""
-    return environment().get_template("page.html.jinja").render(page=page, palettes=COLOURS, style=style())
+    return environment().get_template("page.html.jinja").render(page=page, palettes=COLORS, style=style())
 
 
 def environment(*more: jinja2.BaseLoader) -> jinja2.Environment:
@@ -107,7 +107,7 @@ def environment(*more: jinja2.BaseLoader) -> jinja2.Environment:
 
 
 def style() -> Markup:
-    """The rules of every page, which name colours by the roles of `COLOURS`."""
+    """The rules of every page, which name colours by the roles of `COLORS`."""
     return Markup(files("lacuna.report").joinpath("page.css").read_text(encoding="utf-8"))
 
 

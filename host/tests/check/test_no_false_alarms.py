@@ -34,7 +34,7 @@ def test_a_foreign_robot_is_no_mistake(tmp_path, effect):
     assert_nothing_is_found(drawn(tmp_path, 31, "foreign", effect))
 
 
-def test_another_laboratory_with_coloured_noise_makes_none(tmp_path):
+def test_another_laboratory_with_colored_noise_makes_none(tmp_path):
     assert_nothing_is_found(session(IndependentLab().with_seed(1), tmp_path))
 
 

@@ -248,7 +248,7 @@ def test_a_declaration_that_is_wrong_is_named_by_line_and_key(text, said):
     ("text", "unit"),
     [("(mm)", "mm"), ("Load [kN]", "kN"), ("sec", "s"), ("Extension (inch)", "in"), ("Time", None), ("Force", None)],
 )
-def test_units_are_recognised_where_they_are_written(text, unit):
+def test_units_are_recognized_where_they_are_written(text, unit):
     assert unit_in(text) == unit
 
 

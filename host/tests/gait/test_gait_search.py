@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.gait import Metric, SearchError, Settings, library, optimise, paper_space, simulations
+from bifa.gait import Metric, SearchError, Settings, library, optimize, paper_space, simulations
 from bifa.gait.methods import Found
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
 from bifa.gait.search import VERIFYING_DRAWS, _robustly
@@ -24,7 +24,7 @@ def test_the_baseline_has_the_papers_speed(runs, nominal_plant):
 
 
 def test_a_short_nominal_search_doubles_the_baseline_and_stands_verification(runs, nominal_plant):
-    optimum = optimise(nominal(), runs, Settings(method="cma", robust=False, evaluations=900, seed=3))
+    optimum = optimize(nominal(), runs, Settings(method="cma", robust=False, evaluations=900, seed=3))
     assert optimum.nominal_mm_s > 20.0
     fine = replace(Metric(), cycles=30, judged=15, tolerance_m=1e-8)
     again = runs.judged([nominal_plant], np.zeros(1, int), gait_rows([optimum.gait]), fine).counted_mm_s[0]
@@ -62,7 +62,7 @@ def test_a_robot_that_cannot_walk_is_said_so(runs):
     slippery = nominal().with_values({"mu_s": 0.02, "mu_k": 0.02})
     up = Settings(robust=False, evaluations=60, metric=Metric(inclination_deg=90.0))
     with pytest.raises(SearchError, match=r"none of \d+ gaits walks without slipping"):
-        optimise(slippery, runs, up)
+        optimize(slippery, runs, up)
 
 
 @pytest.mark.slow
@@ -112,7 +112,7 @@ def test_slower_copies_keep_to_the_space():
 
 
 def test_a_search_whose_runs_do_not_agree_says_so(runs):
-    optimum = optimise(nominal(), runs, Settings(robust=False, evaluations=200, seed=1))
+    optimum = optimize(nominal(), runs, Settings(robust=False, evaluations=200, seed=1))
     apart = replace(optimum, explored=replace(optimum.explored, ends=(18.71, 10.0, 9.5)))
     assert "best two of 3 runs ended at 18.71 and 10.00 mm/s" in apart.doubt
     assert "--evaluations" in apart.doubt
@@ -121,14 +121,14 @@ def test_a_search_whose_runs_do_not_agree_says_so(runs):
 
 def test_an_unknown_method_is_refused(runs):
     with pytest.raises(SearchError, match="'sgd' is not one of cma, de, bo"):
-        optimise(nominal(), runs, Settings(method="sgd"))
+        optimize(nominal(), runs, Settings(method="sgd"))
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("robust", [False, True])
 def test_five_seeds_agree_and_reach_what_is_required(runs, robust):
     """23.4 mm/s on the model, 21.8 mm/s for nine robots in ten at 2 %; the seeds within 1 %."""
-    optima = [optimise(nominal(), runs, Settings(robust=robust, seed=seed)) for seed in range(5)]
+    optima = [optimize(nominal(), runs, Settings(robust=robust, seed=seed)) for seed in range(5)]
     speeds = np.array([o.quantile_mm_s if robust else o.nominal_mm_s for o in optima])
     assert speeds.min() >= (21.8 if robust else 23.4)
     assert np.ptp(speeds) <= 0.01 * speeds.mean()

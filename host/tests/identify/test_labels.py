@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from bifa.data import Dataset
-from bifa.identify.robust import labelled
+from bifa.identify.robust import labeled
 from bifa.identify.start import prepare
 from harness.independent_lab import Lab
 
@@ -19,7 +19,7 @@ def system():
 
 
 def test_a_fitted_model_says_where_each_value_comes_from(system):
-    model = labelled(system.model, system, "bifa fit", "2026-11-25")
+    model = labeled(system.model, system, "bifa fit", "2026-11-25")
     source = {name: parameter.source for name, parameter in model.parameters.items()}
     assert source["body_area_N_psi"] == "fitted to monday"
     assert source["head_mass_kg"] == "[known] of monday"
@@ -29,6 +29,6 @@ def test_a_fitted_model_says_where_each_value_comes_from(system):
 
 
 def test_a_completed_model_is_named_for_what_was_added(system):
-    model = labelled(system.model.with_effects({"choked_flow": {}}), system, "bifa diagnose")
+    model = labeled(system.model.with_effects({"choked_flow": {}}), system, "bifa diagnose")
     assert model.name == "monday with choked flow"
     assert model.provenance == "bifa diagnose: fitted to 4 trials of monday, completed by choked flow"

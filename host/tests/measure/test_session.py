@@ -98,9 +98,9 @@ def test_valves_switch_when_the_record_of_a_walk_has_them_switch():
     strobes_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index == STROBE_PIN and event.value])
     seen_s = strobes_s[strobes_s > edges_s[0]][0]  # the strobe of the first sample that knows of the run
     edges_s = (edges_s - seen_s + trial.time_s[0] - PRESSURES_AFTER_S) * seconds_per_uno_s(trial)
-    modelled_s = valves_of(walk_timeline(trial), trial).time_s
-    modelled_s = modelled_s[modelled_s < trial.time_s[-1] - 0.1]
-    late_s = np.array([edges_s[np.argmin(np.abs(edges_s - t))] for t in modelled_s]) - modelled_s
+    modeled_s = valves_of(walk_timeline(trial), trial).time_s
+    modeled_s = modeled_s[modeled_s < trial.time_s[-1] - 0.1]
+    late_s = np.array([edges_s[np.argmin(np.abs(edges_s - t))] for t in modeled_s]) - modeled_s
     assert len(late_s) > 40
     assert np.abs(late_s).max() < 0.6e-3
     assert abs(late_s.mean()) < 0.1e-3

@@ -43,7 +43,7 @@ PAGE_S = 0.005  # the step of the page's simulate
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLDERS)
-def test_a_wheel_holds_every_file_of_its_package_and_the_licence(root, built, name):
+def test_a_wheel_holds_every_file_of_its_package_and_the_license(root, built, name):
     folder = FOLDERS[name]
     listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard", folder]
     files = subprocess.run(listed, cwd=root / "host", check=True, capture_output=True, text=True).stdout.split()
@@ -57,7 +57,7 @@ def test_a_wheel_holds_every_file_of_its_package_and_the_licence(root, built, na
 
 
 @pytest.mark.parametrize("folder", ["host", "host/lacuna"])
-def test_the_licence_of_a_package_is_that_of_the_project(root, folder):
+def test_the_license_of_a_package_is_that_of_the_project(root, folder):
     assert (root / folder / "LICENSE").read_text() == (root / "LICENSE").read_text()
 
 

@@ -103,9 +103,9 @@ def test_predictions_have_the_shape_of_the_measurements(system, theta):
 
 
 def test_what_travelled_to_another_process_predicts_the_same(system, theta):
-    travelled = pickle.loads(pickle.dumps(system))
-    for trial, arrived in zip(system.trials, travelled.trials, strict=True):
-        there = travelled.predict(theta, ("hysteresis",), arrived)
+    traveled = pickle.loads(pickle.dumps(system))
+    for trial, arrived in zip(system.trials, traveled.trials, strict=True):
+        there = traveled.predict(theta, ("hysteresis",), arrived)
         for channel, values in system.predict(theta, ("hysteresis",), trial).items():
             assert np.array_equal(values, there[channel])
 

@@ -7,12 +7,12 @@ from bifa.report.datasets import condition_chart
 from tests.report.sample import columns
 
 
-def test_a_walk_s_chambers_have_their_colours_and_commands_rows_of_their_own():
+def test_a_walk_s_chambers_have_their_colors_and_commands_rows_of_their_own():
     gait = {"period_s": 2.0}
     group = [Trial(f"{n}.csv", "locomotion", columns(2.0), gait=gait, repeat=n) for n in (1, 2)]
     chart = condition_chart(group)
     assert chart.title == "walk, period 2 s (2 runs)"
-    assert {key.label: key.colour for key in chart.keys} == {"body": "body", "head": "head", "tail": "tail"}
+    assert {key.label: key.color for key in chart.keys} == {"body": "body", "head": "head", "tail": "tail"}
     (column,) = chart.columns
     assert [panel.y.label for panel in column.panels] == ["displacement, mm", "command", "pressure, psi"]
     commands = column.panels[1]

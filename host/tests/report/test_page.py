@@ -15,7 +15,7 @@ from bifa.report.animation import FRAMES_PER_S, animate_walks
 from bifa.report.diagnosis import diagnosis_page, settings_words, verdict_sentence
 from bifa.report.page import Page, Section, Table, render, write_page
 from bifa.report.residuals import residual_charts
-from bifa.report.style import CHAMBER_COLOURS, DARK, LIGHT
+from bifa.report.style import CHAMBER_COLORS, DARK, LIGHT
 from bifa.report.terminal import print_table
 from bifa.report.words import effect_words, quantity, spoken
 from bifa.robot.gait import BASELINE
@@ -144,10 +144,10 @@ def test_every_plot_is_in_the_page_and_json_cannot_end_its_element(html):
     assert roles <= set(data["light"]) & set(data["dark"])
 
 
-def test_a_chamber_s_colour_is_nobody_else_s():
+def test_a_chamber_s_color_is_nobody_else_s():
     for palette in (LIGHT, DARK):
-        others = {role: colour for role, colour in palette.colours().items() if role not in CHAMBER_COLOURS}
-        assert not set(others.values()) & set(CHAMBER_COLOURS.values())
+        others = {role: color for role, color in palette.colors().items() if role not in CHAMBER_COLORS}
+        assert not set(others.values()) & set(CHAMBER_COLORS.values())
 
 
 def test_residuals_come_by_quantity_the_largest_first():

@@ -18,14 +18,14 @@ def test_without_pressure_nothing_moves():
     assert np.abs(record["pressure_body_psi"]).max() < 1e-9
 
 
-def test_without_friction_the_centre_of_mass_stays():
+def test_without_friction_the_center_of_mass_stays():
     flat = simulate.plant(robot.nominal())
     q = flat.q.copy()
     q[[layout.MU_S, layout.MU_K]] = 0.0
     record = simulate.walk(flat._replace(q=q), robot.BASELINE, 3)
-    centre = record["displacement_head_mm"] + record["displacement_tail_mm"]
+    center = record["displacement_head_mm"] + record["displacement_tail_mm"]
     assert np.ptp(record["displacement_head_mm"]) > 20.0
-    assert np.abs(centre).max() < 1e-6
+    assert np.abs(center).max() < 1e-6
 
 
 def test_an_end_that_sticks_rests_exactly():

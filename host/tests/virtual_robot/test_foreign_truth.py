@@ -8,7 +8,7 @@ import pytest
 from bifa.check import check_dataset
 from bifa.data import read_dataset
 from virtual_robot.gait import BASELINE
-from virtual_robot.instruments.noise import coloured, flicker
+from virtual_robot.instruments.noise import colored, flicker
 from virtual_robot.plant import Curve, Plant
 from virtual_robot.sealed import main
 from virtual_robot.truths.foreign import generate
@@ -220,9 +220,9 @@ def test_kinds_draw_what_they_say():
     assert all(len(set(names)) == 2 for names in drawn["pair"])
 
 
-def test_noise_is_coloured_as_it_says():
+def test_noise_is_colored_as_it_says():
     random = np.random.default_rng(0)
-    noise = coloured(0.2, 0.6, 40000, random)
+    noise = colored(0.2, 0.6, 40000, random)
     assert noise.std() == pytest.approx(0.2, rel=0.03)
     assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.6, abs=0.02)
     power = np.abs(np.fft.rfft(flicker(1.0, 2**16, random))) ** 2

@@ -37,7 +37,7 @@ def test_a_realistic_robot_without_an_effect_has_none():
     assert profile("worn") != NOMINAL
 
 
-def test_realistic_noise_is_coloured_and_ideal_noise_is_white():
+def test_realistic_noise_is_colored_and_ideal_noise_is_white():
     for memory_s, expected in ((0.0, 0.0), (0.008, np.exp(-0.01 / 0.008))):
         noise = Noise(memory_s=memory_s)
         seen = measured(np.zeros(40000), noise.camera_m, np.random.default_rng(1), noise.correlation(0.01))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from virtual_robot.instruments.noise import coloured
+from virtual_robot.instruments.noise import colored
 
 PSI_SPAN = 30.0
 _COUNTS_PER_PSI = 0.8 * 1024 / PSI_SPAN  # ABP: 10-90 % of the supply over +-15 psi; the ADC's step is Vcc / 1024
@@ -38,4 +38,4 @@ def converted_psi(pressure_psi: np.ndarray, noise_psi: float, random: np.random.
 
 def measured(values: np.ndarray, noise: float, random: np.random.Generator, correlation: float = 0.0) -> np.ndarray:
     """`values` with noise of this sd; `correlation` from one sample to the next."""
-    return values + coloured(noise, correlation, len(values), random)
+    return values + colored(noise, correlation, len(values), random)

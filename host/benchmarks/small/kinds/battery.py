@@ -42,12 +42,12 @@ def rest_voltage(charge):
 
 @rate
 def _rates(t, x, u, p, dx):
-    capacity, resistance, polarisation_s, slow_s, turns, loss, leak = (
+    capacity, resistance, polarization_s, slow_s, turns, loss, leak = (
         p[0], 1e-3 * p[1], p[3], p[5], p[7], p[12], p[13],
     )  # fmt: skip
     counted = u if u > 0.0 else u * (1.0 - loss)
     dx[0] = -(counted + leak) / (3600.0 * capacity)
-    dx[1] = (u - x[1]) / polarisation_s
+    dx[1] = (u - x[1]) / polarization_s
     dx[2] = (u - x[2]) / slow_s
     dx[3] = np.abs(u) / (3600.0 * turns) * (np.sign(u) - x[3])
     dx[4] = (KELVIN_W * resistance * u**2 - x[4]) / WARMS_S
@@ -55,11 +55,11 @@ def _rates(t, x, u, p, dx):
 
 @read
 def _reading(t, x, u, p):
-    resistance, polarisation, slow, half, slope, exchange, rise, falls = (
+    resistance, polarization, slow, half, slope, exchange, rise, falls = (
         1e-3 * p[1], 1e-3 * p[2], 1e-3 * p[4], 1e-3 * p[6], 1e-3 * p[8], p[9], p[10], p[11],
     )  # fmt: skip
     resistance *= (1.0 + rise * (1.0 - x[0]) ** 4) / (1.0 + falls * x[4])
-    lost = resistance * u + polarisation * x[1] + slow * x[2] + half * x[3] + slope * np.arcsinh(u / exchange)
+    lost = resistance * u + polarization * x[1] + slow * x[2] + half * x[3] + slope * np.arcsinh(u / exchange)
     return 1e3 * (rest_voltage(x[0]) - lost)
 
 
@@ -71,12 +71,12 @@ TRUE_OFF = {
 
 @rate
 def _true_rates(t, x, u, p, dx):
-    capacity, resistance, polarisation_s, warburg_s, play_Ah, loss, leak = (
+    capacity, resistance, polarization_s, warburg_s, play_Ah, loss, leak = (
         p[0], 1e-3 * p[1], p[3], p[5], p[7], p[12], p[13],
     )  # fmt: skip
     counted = u if u > 0.0 else u * (1.0 - loss * np.sqrt(-u / 3.0))
     dx[0] = -(counted + leak * max(x[0], 0.0) / 0.6) / (3600.0 * capacity)
-    dx[1] = (u - x[1]) / polarisation_s
+    dx[1] = (u - x[1]) / polarization_s
     for k in range(3):  # x[2] to x[4]: the ladder, faster and smaller from step to step
         dx[2 + k] = (u - x[2 + k]) / (1.3 * warburg_s / (2.0 * k + 1.0) ** 2)
     moved = u / (3600.0 * play_Ah)  # x[5]: between the branches, -1 and 1
@@ -86,12 +86,12 @@ def _true_rates(t, x, u, p, dx):
 
 @read
 def _true_reading(t, x, u, p):
-    resistance, polarisation, warburg, play, tafel, tafel_A, knee, arrhenius = (
+    resistance, polarization, warburg, play, tafel, tafel_A, knee, arrhenius = (
         1e-3 * p[1], 1e-3 * p[2], 1e-3 * p[4], 1e-3 * p[6], 1e-3 * p[8], p[9], p[10], p[11],
     )  # fmt: skip
     resistance *= (1.0 + knee * np.exp(-x[0] / 0.16)) * np.exp(-arrhenius * x[6])
     ladder = warburg * 0.87 * (x[2] + x[3] / 9.0 + x[4] / 25.0)
-    lost = resistance * u + polarisation * x[1] + ladder + play * x[5]
+    lost = resistance * u + polarization * x[1] + ladder + play * x[5]
     lost += tafel * np.sign(u) * np.log1p(np.abs(u) / tafel_A)
     return 1e3 * (rest_voltage(x[0]) - lost)
 

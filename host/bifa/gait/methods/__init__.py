@@ -1,10 +1,10 @@
 """Optimisers from well-kept libraries behind one call: maximise a batched objective over the unit cube."""
 
-from .bayesian import bayesian_optimisation
+from .bayesian import bayesian_optimization
 from .cma_es import cma_es
 from .common import Found, Objective, Report
 from .evolution import differential_evolution
 
-METHODS = {"cma": cma_es, "de": differential_evolution, "bo": bayesian_optimisation}
+METHODS = {"cma": cma_es, "de": differential_evolution, "bo": bayesian_optimization}
 
-__all__ = ["METHODS", "Found", "Objective", "Report", "bayesian_optimisation", "cma_es", "differential_evolution"]
+__all__ = ["METHODS", "Found", "Objective", "Report", "bayesian_optimization", "cma_es", "differential_evolution"]

@@ -15,7 +15,7 @@ _REFIT = 10  # evaluations from one fit of the length to the next
 _RANDOM, _CLIMBS = 3000, 2  # points at which the bound is looked at, and how many of the best it is climbed from
 
 
-def bayesian_optimisation(
+def bayesian_optimization(
     objective: Objective,
     wraps: np.ndarray,
     evaluations: int,

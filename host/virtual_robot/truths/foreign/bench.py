@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from virtual_robot.gait import Gait
-from virtual_robot.instruments.noise import coloured, flicker
+from virtual_robot.instruments.noise import colored, flicker
 from virtual_robot.instruments.sensors import converted_psi
 from virtual_robot.truths.foreign.trial import CHAMBERS, Edge, Run, run
 
@@ -196,7 +196,7 @@ class Bench:
     def _camera(self, count: int, random: np.random.Generator) -> np.ndarray:
         i = self.instruments
         noise = i.camera_mm * random.standard_normal(count)
-        slow = coloured(i.wander_mm, 0.997, count, random)
+        slow = colored(i.wander_mm, 0.997, count, random)
         return noise + (slow - slow[0] if random.uniform() < i.wander_share else 0.0)
 
     def _ringing(self, true_s: np.ndarray, commands: list[Any]) -> np.ndarray:
@@ -221,7 +221,7 @@ class Bench:
         if creep is not None:
             force += _lagging(creep["share"] * force, true_s, creep["time_s"])
         count = len(force)
-        noise = coloured(i.force_N, i.force_correlation, count, random) + flicker(0.2 * i.force_N, count, random)
+        noise = colored(i.force_N, i.force_correlation, count, random) + flicker(0.2 * i.force_N, count, random)
         return force + noise
 
     def _pressures(
@@ -241,7 +241,7 @@ class Bench:
         if left and plan.experiment == "locomotion":  # on the stands the other inputs are grounded sensors at rest
             read = (1.0 - left) * read + left * np.roll(read, 1, axis=1)
         noisy = [
-            p + coloured(i.pressure_psi, i.pressure_correlation, count, random) + flicker(0.01, count, random)
+            p + colored(i.pressure_psi, i.pressure_correlation, count, random) + flicker(0.01, count, random)
             for p in read.T
         ]
         psi = [converted_psi(p, 0.0, random) for p in noisy]
