@@ -61,6 +61,11 @@ def measured_speed(
             f"the walk holds {complete} complete cycle(s) of {period_s:g} s, and whether it has settled takes {LEAST}: "
             "record a longer walk"
         )
+    return speed_of_cycles(advance_mm, period_s, noise_mm)
+
+
+def speed_of_cycles(advance_mm: np.ndarray, period_s: float, noise_mm: float = CAMERA_MM) -> MeasuredSpeed:
+    """The same from the advance in each cycle, of `LEAST` cycles or more."""
     found = settling(advance_mm, noise_mm)
     cycles_mm_s = advance_mm[found.begins :] / period_s
     mean_mm_s = float(cycles_mm_s.mean())

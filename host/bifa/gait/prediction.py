@@ -91,31 +91,38 @@ class Prediction:
         return float(np.quantile(walking, share)) if walking.size else 0.0
 
 
-def predict_speed(
-    model: Model,
-    known: Knowledge,
-    gait: Gait,
-    *,
-    draws: int = DRAWS,
-    cycles: int = CYCLES,
-    seed: int = 0,
-    clock_rate: float | None = None,
-    workers: int | None = None,
-) -> Prediction:
-    """Walk `gait` on robots drawn from what is `known` of `model`, by the rule that measured walks are judged by.
+class Predictor:
+    """Foretells one gait after another of the same robots, drawn once from what is `known` of `model`."""
 
-    clock_rate: seconds per second of the Uno, if not what is known of it; speeds are those on the Uno's clock.
-    """
-    robots = known.plants(model, draws, seed + 4_000_037)
-    rate, rows = known.scatter.clock if clock_rate is None else clock_rate, gait_rows([gait] * draws)
-    rows[:, 0] *= rate
-    progress = speeds(robots, rows, cycles, FINE_M, dead_time_s=rate * known.scatter.dead_time_s, workers=workers)
-    advance_mm = 1e3 * progress.advance_m
-    found = [settling(one) for one in advance_mm]
-    means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
-    noise = np.random.default_rng([seed, 5]).standard_normal((2, draws))
-    means = means * (1.0 + known.scatter.speed * noise[0]) + noise[1] * camera_mm_s(gait)
-    return Prediction(np.fmax(np.nan_to_num(means), 0.0), _most(f.begins for f in found if f.is_settled) + LEAST)
+    def __init__(self, model: Model, known: Knowledge, *, draws: int = DRAWS, seed: int = 0):
+        self._timing, self._noise_share = known.scatter.timing, known.scatter.speed
+        self._robots, self._seed = known.plants(model, draws, seed + 4_000_037), seed
+
+    def of(
+        self, gait: Gait, *, cycles: int = CYCLES, clock_rate: float | None = None, workers: int | None = None
+    ) -> Prediction:
+        """Walk `gait` on each robot, by the rule that measured walks are judged by.
+
+        clock_rate: seconds per second of the Uno, if not what is known of it; speeds are those on the Uno's clock.
+        """
+        draws, rate = len(self._robots), self._timing.clock if clock_rate is None else clock_rate
+        rows = gait_rows([gait] * draws)
+        rows[:, 0] *= rate
+        vented_s = rate * self._timing.dead_time_s
+        progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, workers=workers)
+        advance_mm = 1e3 * progress.advance_m
+        found = [settling(one) for one in advance_mm]
+        means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
+        noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
+        means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s(gait)
+        return Prediction(np.fmax(np.nan_to_num(means), 0.0), _most(f.begins for f in found if f.is_settled) + LEAST)
+
+
+def predict_speed(
+    model: Model, known: Knowledge, gait: Gait, *, draws: int = DRAWS, seed: int = 0, clock_rate: float | None = None
+) -> Prediction:
+    """What is foretold of one gait: see `Predictor`."""
+    return Predictor(model, known, draws=draws, seed=seed).of(gait, clock_rate=clock_rate)
 
 
 def camera_mm_s(gait: Gait, cycles: int = LEAST) -> float:

@@ -1,31 +1,41 @@
-"""How fast the robot is: over its own last whole cycle, by its own phase, whatever gait anybody believes it has."""
+"""How fast the robot is, by its own phase, whatever gait anybody believes it has: over its last whole cycle, and over
+those that have settled."""
 
 import math
-from bisect import bisect_left
 from collections import deque
 
-_LONGEST_S = 130.0  # of two of the slowest cycles
+import numpy as np
+
+from bifa.gait.measured import speed_of_cycles
+from bifa.gait.settling import LEAST, MOST_CYCLES
 
 
 class CycleSpeed:
-    """Take a position with every look; `mm_s` is None until there has been a whole cycle of walking."""
+    """Take a position with every look. `mm_s` is None until there has been a whole cycle of walking; `settled` says, as
+    of any measured walk, what its settled cycles come to, and nothing before there are enough of them to tell."""
 
     def __init__(self) -> None:
-        self._path: deque[tuple[float, float, float]] = deque()  # cycles since the start, time, position
+        self._begin()
+
+    def _begin(self) -> None:
+        self._path: deque[tuple[float, float, float]] = deque()  # cycles, time, position: of the last one
+        self._ends: deque[tuple[float, float]] = deque(maxlen=MOST_CYCLES + 1)  # of cycles: time, position
         self._phase_rad: float | None = None
         self._cycles = 0.0
+        self.settled = ""
 
     def take(self, is_walking: bool, time_s: float, phase_rad: float, position_mm: float) -> None:
         """One look: the body's phase and where the head is. A robot that stands, or starts anew, has no cycle."""
         if not is_walking or (self._path and time_s < self._path[-1][1]):
-            self._path.clear()
-            self._phase_rad, self._cycles = None, 0.0
+            self._begin()
             return
-        if self._phase_rad is not None:
-            self._cycles += (phase_rad - self._phase_rad) % (2 * math.pi) / (2 * math.pi)
-        self._phase_rad = phase_rad
+        self._cycles += (phase_rad - (self._phase_rad or 0.0)) % (2 * math.pi) / (2 * math.pi)
+        before, self._phase_rad = self._path[-1] if self._path else None, phase_rad
         self._path.append((self._cycles, time_s, position_mm))
-        while time_s - self._path[0][1] > _LONGEST_S:
+        if before is not None and math.floor(self._cycles) > math.floor(before[0]):
+            self._ends.append(_between(before, self._path[-1], float(math.floor(self._cycles))))
+            self.settled = self._judged()
+        while len(self._path) > 2 and self._path[1][0] <= self._cycles - 1.0:
             self._path.popleft()
 
     @property
@@ -33,10 +43,19 @@ class CycleSpeed:
         """Over the last whole cycle, from where it was a cycle ago between two looks."""
         if not self._path or (began := self._cycles - 1.0) < self._path[0][0]:
             return None
-        path = list(self._path)
-        after = max(1, bisect_left(path, (began,)))
-        (c0, t0, x0), (c1, t1, x1) = path[after - 1], path[after]
-        share = (began - c0) / (c1 - c0) if c1 > c0 else 1.0
-        then_s, then_mm = t0 + share * (t1 - t0), x0 + share * (x1 - x0)
-        _, now_s, now_mm = path[-1]
+        then_s, then_mm = _between(self._path[0], self._path[1], began)
+        _, now_s, now_mm = self._path[-1]
         return (now_mm - then_mm) / (now_s - then_s) if now_s > then_s else None
+
+    def _judged(self) -> str:
+        if len(self._ends) <= LEAST:
+            return ""
+        lasts_s, advance_mm = np.diff(np.array(self._ends), axis=0).T
+        return speed_of_cycles(advance_mm, float(lasts_s.mean())).text
+
+
+def _between(early: tuple[float, float, float], late: tuple[float, float, float], cycles: float) -> tuple[float, float]:
+    """Time and place when so many cycles had passed, between two looks."""
+    (c0, t0, x0), (c1, t1, x1) = early, late
+    share = (cycles - c0) / (c1 - c0) if c1 > c0 else 1.0
+    return t0 + share * (t1 - t0), x0 + share * (x1 - x0)

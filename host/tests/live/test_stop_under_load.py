@@ -1,5 +1,6 @@
 """The page's stop while strangers keep the server busy: within 100 ms at the port, whatever they do."""
 
+import itertools
 import subprocess
 import sys
 import time
@@ -7,6 +8,7 @@ import time
 import pytest
 
 from bifa.link import frames
+from bifa.robot import BASELINE
 from harness.pty_uno import PtyUno
 from harness.web_monitor import Monitor
 from harness.web_socket import WebSocket
@@ -92,19 +94,44 @@ def test_a_stop_is_at_the_port_within_a_tenth_of_a_second(bifa, flood, figure):
     assert bifa.until("running") == "running"
     crowd = Flood(port, FLOODS[flood])
     try:
-        taken = []
-        for _ in range(10):
-            owner.until(lambda state: state["robot"] in ("running", "stopped"))
-            time.sleep(0.1)
-            bifa.uno.stopped_s, asked_s = None, time.monotonic()
-            number = owner.ask("stop")
-            while bifa.uno.stopped_s is None and time.monotonic() < asked_s + 5:
-                time.sleep(0.001)
-            taken.append((bifa.uno.stopped_s or asked_s + 5) - asked_s)
-            assert "confirms" in owner.answer(number)["said"]
+        taken = _stops(bifa, owner)
     finally:
         crowd.close()
         owner.close()
     figure(f"stop at the port, {flood}: worst of {len(taken)} {1e3 * max(taken):.0f} ms")
     assert max(taken) < WITHIN_S
     assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
+
+
+def test_a_stop_does_not_wait_for_what_is_foretold_of_the_sliders(bifa, figure):
+    owner = WebSocket(int(bifa.origin.rpartition(":")[2]), bifa.token)
+    assert bifa.until("running") == "running"
+    drafts = itertools.count()
+
+    def slide() -> None:
+        owner.ask("draft", gait=BASELINE.as_dict() | {"period_s": 5.0 + 0.01 * next(drafts)})
+
+    try:
+        slide()
+        owner.until(lambda state: "foretold" in (state["prediction"] or {}))  # imported, drawn and compiled
+        taken = _stops(bifa, owner, slide)
+    finally:
+        owner.close()
+    figure(f"stop at the port while gaits are foretold: worst of {len(taken)} {1e3 * max(taken):.0f} ms")
+    assert max(taken) < WITHIN_S
+
+
+def _stops(bifa, owner, meanwhile=lambda: None) -> list[float]:
+    """How long each of ten stops took to the port, in s; the robot is asked to stop whether it walks or not."""
+    taken = []
+    for _ in range(10):
+        owner.until(lambda state: state["robot"] in ("running", "stopped"))
+        meanwhile()
+        time.sleep(0.1)
+        bifa.uno.stopped_s, asked_s = None, time.monotonic()
+        number = owner.ask("stop")
+        while bifa.uno.stopped_s is None and time.monotonic() < asked_s + 5:
+            time.sleep(0.001)
+        taken.append((bifa.uno.stopped_s or asked_s + 5) - asked_s)
+        assert "confirms" in owner.answer(number)["said"]
+    return taken

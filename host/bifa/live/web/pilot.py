@@ -295,7 +295,7 @@ class _Flight:
                 position_mm = self._position_mm()
                 is_walking = newest.state == "running"
                 self._speed.take(is_walking, newest.time_us / 1e6, newest.phase_rad[0], position_mm["head"])
-                report |= {"position_mm": position_mm, "speed_mm_s": self._speed.mm_s}
+                report |= {"position_mm": position_mm, "speed_mm_s": self._speed.mm_s, "settled": self._speed.settled}
                 if shown:
                     shown[-1]["mm"] = position_mm["head"]
         return report, shown

@@ -34,13 +34,13 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bifa.errors import BifaError
 from bifa.link import Uno
+from bifa.live.web.foretelling import Foretelling, step_back
 from bifa.live.web.gate import ACCEPTED_AT_ONCE, LARGEST_HEADERS, LARGEST_MESSAGE, Gate
 from bifa.live.web.pilot import MOVING, BusyError, NobodyThereError, Pilot, wall_clock
 from bifa.live.web.state import LiveState
 from bifa.ranges import RANGES
 from bifa.robot import Model
 from bifa.robot.gait import GAIT_NAMES, Gait
-from bifa.simulate import speed
 
 HOST = "127.0.0.1"
 PROTOCOL = "bifa"  # of the websocket; the token is offered beside it
@@ -92,13 +92,14 @@ class LivePage:
 
     def __init__(self, pilot: Pilot, page: str, model: Model) -> None:
         """page: the HTML document; model: what predicts the speeds."""
-        self._pilot, self._page, self._model = pilot, page.encode(), model
+        self._pilot, self._page, self._foretelling = pilot, page.encode(), Foretelling(model)
         self.token = secrets.token_urlsafe(16)
         self.gate = Gate()
         self._pages: set[Page] = set()
         self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._predictor = ThreadPoolExecutor(1, "predictor")
+        self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
+        self._predictor.submit(lambda: self._foretelling.predictor)  # drawn before anybody asks
         self._prediction: asyncio.Task[None] | None = None
         self.state = LiveState(
             robot="connecting",
@@ -167,9 +168,12 @@ class LivePage:
     async def _predict(self) -> None:
         asked = None
         while asked != (asked := self.state.content["draft"]["gait"]):
-            loop = asyncio.get_running_loop()
-            found = await loop.run_in_executor(self._predictor, _predicted, self._model, Gait(**asked))
-            self._change({"prediction": {**found, "gait": asked}})
+            for look in (self._foretelling.at_once, self._foretelling.in_full):
+                loop = asyncio.get_running_loop()
+                found = await loop.run_in_executor(self._predictor, look, Gait(**asked))
+                self._change({"prediction": {**found, "gait": asked}})
+                if asked != self.state.content["draft"]["gait"]:
+                    break
 
     # -- looking ----------------------------------------------------------------------------------------------
 
@@ -337,14 +341,6 @@ def _seen(future: Future[Any]) -> None:
     """Nobody waits for it; the pilot says what went wrong."""
     if not future.cancelled():
         future.exception()
-
-
-def _predicted(model: Model, gait: Gait) -> dict[str, Any]:
-    try:
-        progress = speed(model, gait)
-    except BifaError as error:
-        return {"error": str(error)}
-    return {"speed_mm_s": round(float(progress.speed_mm_s), 2), "slip_mm": round(1e3 * float(progress.slip_m[-1]), 2)}
 
 
 def _gait(asked: Mapping[str, Any]) -> Gait:

@@ -118,7 +118,7 @@
     const differs = robot && live.draft && sliders.some(({ name }) => Math.abs(live.draft.gait[name] - robot[name]) > 6e-4);
     tell(unsent, live.is_pending ? "The robot takes its new gait at its next cycle." : differs ? "Not sent: the robot walks another gait than the sliders show." : robot ? "The sliders show the robot's gait." : "");
     const found = live.prediction;
-    if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.speed_mm_s.toFixed(2)} mm/s, with ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
+    if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.foretold || `${found.speed_mm_s.toFixed(2)} mm/s`}, with ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
     const there = Object.keys(live.presets || {});
     if (there.join() !== [...presets.options].map((option) => option.value).join()) presets.replaceChildren(...there.map((name) => new Option(name)));
     return differs;
@@ -148,7 +148,7 @@
       row.querySelector("progress").value = now.phase_rad / (2 * Math.PI);
     }
     if (live.position_mm) {
-      const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "not for a cycle yet" : `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
+      const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "not for a cycle yet" : live.settled || `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
       tell(speedBox, `${fast}, at ${live.position_mm.head.toFixed(0)} mm`);
       document.getElementById("path-key").hidden = false;
     }

@@ -1,0 +1,52 @@
+"""What the page foretells of the gait on its sliders: the model's own speed at once, then the interval."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from functools import cached_property, lru_cache
+from typing import Any
+
+from bifa.errors import BifaError
+from bifa.gait.prediction import Predictor
+from bifa.gait.uncertainty import spread_of
+from bifa.robot import Model
+from bifa.robot.gait import Gait
+from bifa.simulate import speed
+
+_DRAWS = 128  # half a second of one core
+_REMEMBERED = 32
+
+
+def step_back() -> None:
+    """Let all other threads go first from now on, which on Linux a single thread can do."""
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
+
+
+class Foretelling:
+    """Of a model, drawn once. For a thread of its own: it computes without holding up the others."""
+
+    def __init__(self, model: Model):
+        self._model = model
+        self.in_full = lru_cache(_REMEMBERED)(self._in_full)
+
+    def at_once(self, gait: Gait) -> dict[str, Any]:
+        """By the model itself."""
+        try:
+            progress = speed(self._model, gait)
+        except BifaError as error:
+            return {"error": str(error)}
+        slip_mm = round(1e3 * float(progress.slip_m[-1]), 2)
+        return {"speed_mm_s": round(float(progress.speed_mm_s), 2), "slip_mm": slip_mm}
+
+    def _in_full(self, gait: Gait) -> dict[str, Any]:
+        """The same with what is foretold by all that is known of the robot, in words."""
+        found = self.at_once(gait)
+        return found if "error" in found else found | {"foretold": self.predictor.of(gait, workers=1).text}
+
+    @cached_property
+    def predictor(self) -> Predictor:
+        """With its robots drawn."""
+        return Predictor(self._model, spread_of(self._model), draws=_DRAWS)
