@@ -22,13 +22,14 @@ help:
 	echo "make mutation  does a test miss each line of the safety code? (ARGS='--help')"
 	echo "make portability  the numerical tests as on other machines: linear algebra, locale, home... (ARGS='--help')"
 	echo "make blind    diagnosis of sealed data sets: rates against what is required and baselines (ARGS='--help', ARGS='systems --help')"
+	echo "make notebooks  run the notebooks of docs/ and keep them with what they give (ARGS=NAME for one)"
 	echo "make lint     formatters and static checks; make format applies the formatters"
 	echo "make wheels   sdists and wheels of the three packages, into dist/"
 	echo "make setup    only install what is needed: Debian packages, .venv, PlatformIO's packages"
 	echo "make lock     resolve host/requirements.in anew"
 	echo "make clean    remove what was built; make distclean removes .venv and .platformio as well"
 
-.PHONY: demo test bench soak mutation portability blind
+.PHONY: demo test bench soak mutation portability blind notebooks
 demo: setup
 	@$(bin)/bifa demo $(ARGS)
 
@@ -60,6 +61,9 @@ portability: setup
 
 blind: setup
 	@cd host && ../$(bin)/python -m benchmarks.blind $(ARGS)
+
+notebooks: setup
+	@cd host && ../$(bin)/python -m harness.notebooks $(ARGS)
 
 # --- Checks ---
 

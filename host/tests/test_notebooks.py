@@ -1,36 +1,63 @@
-"""The notebooks run as they stand, and what they assert at their ends holds."""
+"""The notebooks run as they stand, what they assert at their ends holds, and they are kept with what they give."""
 
-from pathlib import Path
+import re
+from itertools import count
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
 
-pytestmark = pytest.mark.slow
+from harness.notebooks import EMPS, NAMES, NOTEBOOKS, read, run, shape
 
-ROOT = Path(__file__).resolve().parents[2]
-NOTEBOOKS = ROOT / "docs" / "notebooks"
-EMPS = ROOT.parent / "shared" / "data" / "emps"
-LONGEST_S = 900  # a cell, on a machine that others load as well
+LARGEST = 400_000  # bytes, with its pictures
+by_name = pytest.mark.parametrize("name", NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["your-own-system", pytest.param("robot", marks=pytest.mark.uno), "emps"])
-def test_notebook_runs(name, tmp_path, monkeypatch):
-    if name == "emps" and not (EMPS / "DATA_EMPS.mat").exists():
-        pytest.skip(f"the EMPS benchmark's records are not in {EMPS.relative_to(ROOT.parent)} beside the checkout")
-    monkeypatch.setenv("EMPS_DATA", str(EMPS))
-    for own in ("IPYTHONDIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR"):  # else in a home that one may not have
-        monkeypatch.setenv(own, str(tmp_path / own))
-    monkeypatch.setenv("PYTHONPATH", f"{ROOT / 'host'}:{ROOT / 'docs' / 'examples'}")
-    notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
-    NotebookClient(notebook, timeout=LONGEST_S, resources={"metadata": {"path": str(tmp_path)}}).execute()
-    assert all(cell.get("outputs") for cell in notebook.cells if "verdict.plot()" in cell.source)
+def test_a_notebook_runs_and_gives_what_it_is_kept_with(name, tmp_path):
+    if name == "emps" and not EMPS.exists():
+        pytest.skip("the EMPS benchmark's records are not beside the checkout")
+    assert shape(run(name, tmp_path)) == shape(read(name)), "run `make notebooks`"
 
 
 def test_every_notebook_is_run():
-    assert {file.stem for file in NOTEBOOKS.glob("*.ipynb")} == {"your-own-system", "robot", "emps"}
+    assert {file.stem for file in NOTEBOOKS.glob("*.ipynb")} == set(NAMES)
 
 
-def test_notebooks_are_kept_without_outputs():
-    for file in NOTEBOOKS.glob("*.ipynb"):
-        assert not any(cell.get("outputs") for cell in nbformat.read(file, as_version=4).cells), file.name
+@by_name
+def test_it_is_kept_as_it_ran_once_from_top_to_bottom(name):
+    cells = [cell for cell in read(name).cells if cell.cell_type == "code"]
+    for number, cell in zip(count(1), cells, strict=False):
+        assert cell.execution_count == number
+        assert not [output for output in cell.outputs if output.output_type == "error"]
+    pictures = [cell for cell in cells if "plot(" in cell.source]
+    assert pictures
+    assert all(any("image/png" in output.get("data", {}) for output in cell.outputs) for cell in pictures)
+
+
+@by_name
+def test_it_is_small_names_its_front_end_and_no_place_of_the_computer_that_it_ran_on(name):
+    file = NOTEBOOKS / f"{name}.ipynb"
+    assert file.stat().st_size < LARGEST
+    assert "`jupyter lab docs/notebooks`" in read(name).cells[0].source
+    assert not re.search(r"/(home|root|tmp|work|Users)/", file.read_text())
+
+
+def test_the_robot_is_optimized_to_the_fastest_that_is_printed():
+    """As it is kept; the run asserts the same."""
+    text = (NOTEBOOKS / "robot.ipynb").read_text()
+    speeds = [float(speed) for speed in re.findall(r"(\d+\.\d) mm/s", text)]
+    (optimised,) = re.findall(r"(\d+\.\d) mm/s, [\d.]+ times as fast", text)
+    assert len(speeds) > 1
+    assert float(optimised) == max(speeds)
+
+
+def test_without_its_records_the_emps_notebook_ends_with_a_sentence(tmp_path):
+    with pytest.raises(CellExecutionError) as ended:
+        run("emps", tmp_path, emps=tmp_path)
+    (error,) = [
+        output for cell in ended.value.notebook.cells for output in cell.get("outputs", []) if "ename" in output
+    ]
+    assert error.ename == "SystemExit"
+    assert error.evalue.startswith(f"There is no DATA_EMPS.mat in {tmp_path}: get it from ")
+    assert not any("File" in line for line in error.traceback), "no traceback"

@@ -39,11 +39,13 @@ def plot(trial: Trial, axes: Any = None) -> Any:
         _, axes = plt.subplots(len(groups), 1, figsize=(8.0, 1.9 * len(groups)), sharex=True, squeeze=False)
         axes = axes[:, 0]
     for axis, (quantity, names) in zip(axes, groups.items(), strict=True):
-        for name in names:
-            axis.plot(trial.time_s, trial.columns[name], linewidth=1.0, label=name.removeprefix(f"{quantity}_"))
         unit = names[0].rsplit("_", 1)[-1] if quantity != "command" else ""
+        for name in names:
+            label = name.removeprefix(f"{quantity}_").removesuffix(f"_{unit}")
+            axis.plot(trial.time_s, trial.columns[name], linewidth=1.0, label=label)
         axis.set_ylabel(f"{quantity} [{unit}]" if unit and unit != quantity else quantity)
-        axis.legend(loc="upper right", fontsize=8, frameon=False)
+        if len(names) > 1:
+            axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)  # beside the curves
     axes[0].set_title(f"{trial.file}: {trial.label}", loc="left", fontsize=9)
     axes[-1].set_xlabel("time [s]")
     figure = axes[0].figure
