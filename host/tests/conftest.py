@@ -31,6 +31,26 @@ def browser():
 
 
 @pytest.fixture
+def uno():
+    """An Uno behind a serial port."""
+    from harness.pty_uno import PtyUno  # not on Windows
+
+    uno = PtyUno()
+    yield uno
+    uno.unplug()
+
+
+@pytest.fixture
+def gait(tmp_path) -> str:
+    """The path of a gait file."""
+    path = tmp_path / "gait.toml"
+    path.write_text(
+        "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
+    )
+    return str(path)
+
+
+@pytest.fixture
 def figure(record_property) -> Callable[[str], None]:
     """figure("text"): a line shown at the end of the run, whichever process the test ran in."""
     return partial(record_property, "figure")

@@ -201,7 +201,7 @@ def test_a_serial_port_exclusive_and_unplugged():
         uno.connect()
         uno.set("period_s", 3.0)
         assert uno.get("period_s") == 3.0
-        with pytest.raises(PortGoneError, match="another program"):
+        with pytest.raises(PortGoneError, match="is in use by"):
             SerialRig(plugged.device)
         uno.stream(True)
         began_s = rig.clock.now()
