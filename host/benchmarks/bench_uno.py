@@ -11,13 +11,11 @@ import tempfile
 from pathlib import Path
 
 from benchmarks import parts, stack_bound
-from bifa.link import Uno
-from bifa.link.transport import Transport
+from harness.chip import FIRMWARE, connected
 from virtual_robot.uno import CLOCK_HZ
 from virtual_robot.uno import Uno as Board
 
 PROJECT = Path(__file__).resolve().parents[2]
-FIRMWARE = PROJECT / ".pio/build/uno/firmware.elf"
 SOURCES = Path(__file__).parent / "uno"
 
 STROBE_PIN = 10
@@ -29,52 +27,12 @@ REAL_DAC_LIBRARY_BYTES, REAL_DAC_LIBRARY_RAM_BYTES = 858, 10
 FLASH_LIMIT, RAM_LIMIT, STACK_FREE_LIMIT = 29_000, 1_300, 300
 
 
-class BoardTransport:
-    """The host's end of the simulated serial port."""
-
-    def __init__(self, board: Board) -> None:
-        self.board = board
-
-    def write(self, data: bytes) -> None:
-        self.board.send(data)
-
-    def read(self, timeout_s: float) -> bytes:
-        self.board.run_until(self.board.cycle + round(timeout_s * CLOCK_HZ), stop_on_output=True)
-        return self.board.receive()
-
-    def reset(self) -> None:
-        self.board.reset()
-
-    def close(self) -> None:
-        self.board.close()
-
-
-class BoardClock:
-    """Virtual time."""
-
-    def __init__(self, board: Board) -> None:
-        self.board = board
-
-    def now(self) -> float:
-        return self.board.time_s
-
-    def sleep(self, duration_s: float) -> None:
-        self.board.run_for(duration_s)
-
-
 def board_at_rest() -> Board:
     """The image, with three sensors that read zero."""
     board = Board(FIRMWARE)
     for channel in range(3):
         board.set_analog(channel, SENSOR_ZERO_V)
     return board
-
-
-def connected(board: Board) -> Uno:
-    transport: Transport = BoardTransport(board)
-    uno = Uno(transport, BoardClock(board), seed=1)
-    uno.connect()
-    return uno
 
 
 def stimulate(board: Board, seconds: float) -> None:

@@ -5,7 +5,7 @@
     python -m benchmarks.blind systems [...]     other systems than robots: python -m benchmarks.small_systems
 
 Each data set is drawn from its seed by `python -m virtual_robot.sealed`, or measured through the real firmware by
-`python -m benchmarks.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the
+`python -m harness.sealed_campaign` (`realistic`): single effects in turn, sizes and pairs at random, outside the
 library those never in it and, but for the foreign truth, each library effect in turn, withheld from the diagnosis.
 Verdicts, and what each diagnosis did when, are kept in FOLDER, so that an interrupted trial continues; FILE has a line
 for each data set, with which it continues on another machine, and `--print` only prints what is in it; beside it lies,
@@ -39,7 +39,7 @@ from virtual_robot.truths.foreign import effects as foreign
 _STRIDE = 7  # through the effects: coprime to their numbers, so that relatives in the list are far apart
 _DRAWN_BY = {
     "own": ["-m", "virtual_robot.sealed"],
-    "realistic": ["-m", "benchmarks.sealed_campaign"],
+    "realistic": ["-m", "harness.sealed_campaign"],
     "foreign": ["-m", "virtual_robot.sealed", "--truth", "foreign"],
 }
 

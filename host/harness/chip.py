@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from bifa import link
 from virtual_robot.uno import CLOCK_HZ, Uno
 
 FIRMWARE = Path(__file__).parents[2] / ".pio/build/uno/firmware.elf"
@@ -12,11 +13,45 @@ CYCLES_A_BYTE = 10 * CLOCK_HZ // 250_000
 VALVES = range(4, 10)
 
 
-class Chip:
-    """A bare Uno (no robot) that is transport and clock at once."""
+class Line:
+    """Transport and clock at once, of an Uno in the simulated chip."""
+
+    def __init__(self, uno: Uno) -> None:
+        self.uno = uno
+
+    def write(self, data: bytes) -> None:
+        self.uno.send(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        self.uno.run_until(self.uno.cycle + round(timeout_s * CLOCK_HZ), stop_on_output=True)
+        return self.uno.receive()
+
+    def reset(self) -> None:
+        self.uno.reset("external")
+
+    def close(self) -> None:
+        self.uno.close()
+
+    def now(self) -> float:
+        return self.uno.time_s
+
+    def sleep(self, duration_s: float) -> None:
+        self.uno.run_for(duration_s)
+
+
+def connected(uno: Uno) -> link.Uno:
+    """The host's end of its link, connected."""
+    line = Line(uno)
+    host = link.Uno(line, line, seed=1)
+    host.connect()
+    return host
+
+
+class Chip(Line):
+    """A bare Uno (no robot) whose sensors live."""
 
     def __init__(self, keep_events: bool = False, eeprom: bytes | None = None) -> None:
-        self.uno = Uno(FIRMWARE, keep_events=keep_events)
+        super().__init__(Uno(FIRMWARE, keep_events=keep_events))
         if eeprom is not None:
             self.uno.eeprom = eeprom
             self.uno.reset("power-on")
@@ -28,23 +63,9 @@ class Chip:
         for channel in range(3):
             self.uno.set_analog(channel, AT_REST_V + A_BIT_V * (self._turn % 2))
 
-    def write(self, data: bytes) -> None:
-        self.uno.send(data)
-
     def read(self, timeout_s: float) -> bytes:
         self._live()
-        end = self.uno.cycle + round(timeout_s * CLOCK_HZ)
-        self.uno.run_until(end, stop_on_output=True)
-        return self.uno.receive()
-
-    def reset(self) -> None:
-        self.uno.reset("external")
-
-    def close(self) -> None:
-        self.uno.close()
-
-    def now(self) -> float:
-        return self.uno.time_s
+        return super().read(timeout_s)
 
     def sleep(self, duration_s: float) -> None:
         end = self.uno.cycle + round(duration_s * CLOCK_HZ)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from benchmarks.bench_uno import connected
 from bifa.link import frames
 from bifa.link.errors import LinkError, RefusedError
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH
+from harness.chip import connected
 
 pytestmark = pytest.mark.uno
 

@@ -5,9 +5,9 @@ import struct
 
 import pytest
 
-from benchmarks.bench_uno import connected
 from bifa.link import frames
 from bifa.link.table import COMMANDS, PARAMETERS
+from harness.chip import connected
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno

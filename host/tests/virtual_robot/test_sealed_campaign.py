@@ -5,9 +5,9 @@ import tomllib
 import numpy as np
 import pytest
 
-from benchmarks.sealed_campaign import generate, main
 from bifa.data import read_dataset
 from bifa.measure.plan import PlannedTrial
+from harness.sealed_campaign import generate, main
 from virtual_robot.instruments.sensors import Noise, measured
 from virtual_robot.plant import NOMINAL, profile
 

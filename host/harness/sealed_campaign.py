@@ -1,6 +1,6 @@
 """Sealed data sets measured through the real firmware: the `realistic` truth.
 
-    python -m benchmarks.sealed_campaign --seed 7 --out ../out/seven [--kind one|none|pair|outside] [--effect NAME]
+    python -m harness.sealed_campaign --seed 7 --out ../out/seven [--kind one|none|pair|outside] [--effect NAME]
 
 A robot is drawn as `python -m virtual_robot.sealed` draws it, and the campaign's own session measures it: the
 firmware image in the simulated chip, the link, instruments with clocks of their own, profile `realistic`. Writes the
@@ -63,7 +63,7 @@ def generate(
             trials or plan.session(),
             name=f"bench-{seed}",
             known=rig.known,
-            provenance={"recorded_by": "benchmarks.sealed_campaign", "port": "virtual"},
+            provenance={"recorded_by": "harness.sealed_campaign", "port": "virtual"},
             on_event=_shown,
         )
         if sys.stderr.isatty():
@@ -82,7 +82,7 @@ def _factor(name: str, values: dict[str, float]) -> float:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.sealed_campaign",
+        prog="python -m harness.sealed_campaign",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
