@@ -23,7 +23,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 
 PROJECT = Path(__file__).resolve().parent.parent
 BUILD = PROJECT / "build" / "portability"
-NUMERICAL = ("lacuna", "robot", "simulate", "measure", "identify", "pipe_robot", "gait", "campaign", "report")
+NUMERICAL = ("lacuna", "robot", "simulate", "measure", "identify", "problem", "gait", "campaign", "report")
 ESTIMATION = ("lacuna", "identify")  # where linear algebra decides; short enough for every commit
 NO_TESTS_RAN = 5  # pytest's exit status
 

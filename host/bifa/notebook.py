@@ -53,7 +53,7 @@ class Robot:
         a prediction is good enough. Minutes of processor for a whole campaign."""
         import lacuna
         from bifa.identify.start import prepare
-        from bifa.pipe_robot.accuracy import accuracies
+        from bifa.problem.accuracy import accuracies
 
         system = prepare(dataset, self.model)
         system.accuracies = accuracies([f"{name}={value}" for name, value in (matters or {}).items()])

@@ -18,7 +18,7 @@ from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
 from bifa.measure.experiments import record_columns
 from bifa.measure.plan import PlannedTrial
-from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of
+from bifa.problem.switches import seconds_per_uno_s, valves_of
 from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.rig import Rig
 from bifa.robot import Model

@@ -75,7 +75,7 @@ def diagnose(
 
     from bifa.campaign.resolve import refuse_leftovers
     from bifa.data import read_dataset
-    from bifa.pipe_robot.accuracy import accuracies
+    from bifa.problem.accuracy import accuracies
     from bifa.robot import load_model
     from bifa.screen import Console
 

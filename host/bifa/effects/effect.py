@@ -42,7 +42,7 @@ class PhysicalEffect:
 
     `enters`: the equation and the place in it; `experiments`: where it can be seen at all;
     `confusable_with`: effects whose signature is alike; `states`: numbers remembered for each actuator; `freed_at`:
-    where its form may differ from the formula, by the names in `bifa.pipe_robot.sites`; `apart`: parameters that it
+    where its form may differ from the formula, by the names in `bifa.problem.sites`; `apart`: parameters that it
     needs to be above those that they cannot be below.
     """
 

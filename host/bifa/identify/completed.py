@@ -7,8 +7,8 @@ from typing import cast
 
 from bifa.identify.robust import labeled, with_uncertainty
 from bifa.identify.scatter import with_scatter
-from bifa.pipe_robot.sites import learnt_curves
-from bifa.pipe_robot.system import RobotSystem
+from bifa.problem.sites import learnt_curves
+from bifa.problem.system import RobotSystem
 from bifa.robot import Model
 from bifa.simulate import plant
 from lacuna.estimation.fit import Fit

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.data import Dataset, Trial
-from bifa.pipe_robot.switches import step_timeline
+from bifa.problem.switches import step_timeline
 
 _SETTLED_MM_S = 0.5  # slower than this an actuator is at rest
 _SAMPLES = 20

@@ -14,8 +14,8 @@ from bifa.identify.robust import labeled, with_uncertainty
 from bifa.identify.scatter import with_scatter
 from bifa.identify.start import fit_statics, prepare
 from bifa.identify.static import StaticFit
-from bifa.pipe_robot.inputs import ANCHOR
-from bifa.pipe_robot.system import RobotSystem
+from bifa.problem.inputs import ANCHOR
+from bifa.problem.system import RobotSystem
 from bifa.robot import Model
 from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit, fit_base

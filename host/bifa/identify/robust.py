@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from bifa.pipe_robot.system import RobotSystem
+from bifa.problem.system import RobotSystem
 from bifa.robot import Model
 from bifa.robot.model import LEARNT, Covariance
 from lacuna.estimation.clustered import clustered_covariance

@@ -9,9 +9,9 @@ from typing import cast
 
 import numpy as np
 
-from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
-from bifa.pipe_robot.switches import seconds_per_uno_s
-from bifa.pipe_robot.system import FRICTION_WOBBLE, RobotSystem
+from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
+from bifa.problem.switches import seconds_per_uno_s
+from bifa.problem.system import FRICTION_WOBBLE, RobotSystem
 from bifa.robot import Model
 from bifa.robot.model import Scatter
 from lacuna.estimation.fit import Fit

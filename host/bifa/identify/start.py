@@ -15,9 +15,9 @@ from bifa import robot
 from bifa.data import Dataset
 from bifa.identify.equilibria import PRESSURE_SD_PSI, reach_m, rests
 from bifa.identify.static import StaticFit, fit_static
-from bifa.pipe_robot.curves import FittedCurve
-from bifa.pipe_robot.errors import UndeterminedError
-from bifa.pipe_robot.system import RobotSystem, fittable
+from bifa.problem.curves import FittedCurve
+from bifa.problem.errors import UndeterminedError
+from bifa.problem.system import RobotSystem, fittable
 from bifa.robot import Model, ModelParameterError
 
 _ACTUATORS = {"large": "body", "small": "small"}

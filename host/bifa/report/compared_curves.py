@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
+from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.evidence import BASE, COMPLETED
 from bifa.report.page import Section

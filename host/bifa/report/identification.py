@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bifa.identify.identification import Identification
-from bifa.pipe_robot.inputs import ANCHOR, STATIC, STEP, WALK
+from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.style import CHAMBER_COLORS, Palette, figure_style
 from lacuna.system import Channels, Record
 

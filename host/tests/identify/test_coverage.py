@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 from bifa.data import Dataset, Trial
 from bifa.identify.identification import Identification, identify
-from bifa.pipe_robot.unmeasured import PRIOR_SD
+from bifa.problem.unmeasured import PRIOR_SD
 from virtual_robot import gait
 from virtual_robot.sealed import specimen
 from virtual_robot.trials import Lab, Plan

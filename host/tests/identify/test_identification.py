@@ -12,7 +12,7 @@ from scipy.stats import binom
 from bifa.data import Dataset
 from bifa.identify.estimate import IntervalEstimate
 from bifa.identify.identification import identify
-from bifa.pipe_robot.unmeasured import PRIOR_SD
+from bifa.problem.unmeasured import PRIOR_SD
 from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
 from bifa.report.identification import draw
 from bifa.report.identification_remarks import remarks

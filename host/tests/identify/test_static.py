@@ -10,9 +10,9 @@ from numpy.polynomial import chebyshev
 
 from bifa.data import Dataset
 from bifa.identify.static import fit_static
-from bifa.pipe_robot.errors import UndeterminedError
-from bifa.pipe_robot.motion import imposed_motion
-from bifa.pipe_robot.stiffness import fit_stiffness
+from bifa.problem.errors import UndeterminedError
+from bifa.problem.motion import imposed_motion
+from bifa.problem.stiffness import fit_stiffness
 from bifa.robot import nominal
 from harness.independent_lab import Lab
 

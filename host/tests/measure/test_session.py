@@ -14,8 +14,8 @@ from bifa.measure.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
 from bifa.measure.plan import BRISK, EXPERIMENTS, PlannedTrial, session
 from bifa.measure.recording import Recording
 from bifa.measure.session import provenance, run_session
-from bifa.pipe_robot.spare import spare
-from bifa.pipe_robot.switches import seconds_per_uno_s, valves_of, walk_timeline
+from bifa.problem.spare import spare
+from bifa.problem.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.rig import open_rig
 from bifa.robot.gait import Gait
 from virtual_robot.uno import CLOCK_HZ

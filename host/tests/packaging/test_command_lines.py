@@ -32,7 +32,7 @@ RUN_BY = {
     "compare": "campaign/test_campaign.py",
     "console": "live/test_interactive.py",
     "demo": "campaign/test_demo.py",
-    "diagnose": "pipe_robot/test_robot_diagnosis.py",
+    "diagnose": "problem/test_robot_diagnosis.py",
     "doctor": "packaging/test_wheels.py",
     "experiment": "campaign/test_by_hand_campaign.py",
     "fit": "packaging/test_wheels.py",

@@ -1,0 +1,89 @@
+"""The stiffness curve while it is being fitted: the static fit plus whitened changes of its shape.
+
+In the monomials of a model file, or in Chebyshev's, the coefficients of K are hopelessly correlated.
+`StiffnessFit.shapes` gives directions in which the static data leave the curve uncertain by one standard deviation
+each: the coordinates `body_shape_01` ... (the least certain one first, mostly the continuation beyond the static
+range). Where the actuator never moves by itself, the continuation is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from bifa.problem.stiffness import StiffnessFit
+from bifa.robot.stiffness import DEGREE, StiffnessCurve
+from bifa.simulate.tables import Family
+from lacuna.system import Parameter
+
+_WIDEST = 500.0  # standard deviations that a shape may move: an effect unaccounted for biases the static fit by many
+_PRIOR_SD = 5.0  # a shape further off belies the static data: an effect is at work, which no curve should absorb
+_SCALE = 150.0  # derivatives step by 0.3 to 3 standard deviations: well above the integrator's own error
+_FELT_N = 0.01  # a shape that changes K by less does not change a walk that one could measure
+
+
+@dataclass(frozen=True)
+class FittedCurve:
+    """`prefix` names the actuator's parameters: "body" or "small". `moves`: there are trials in which the actuator
+    moves by itself, and so reaches beyond the static range."""
+
+    prefix: str
+    fit: StiffnessFit
+    moves: bool = True
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(f"{self.prefix}_shape_{i + 1:02d}" for i in range(len(self.shapes)))
+
+    @cached_property
+    def shapes(self) -> np.ndarray:
+        shapes, told = self.fit.shapes()
+        return shapes if self.moves else shapes[told]
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        source = "one standard deviation of the static fit each"
+        return tuple(
+            Parameter(
+                n, "sd", 0.0, -_WIDEST, _WIDEST, scale=_SCALE, source=source, prior_sd=_PRIOR_SD, prior_from_trials=True
+            )
+            for n in self.names
+        )
+
+    @cached_property
+    def felt(self) -> frozenset[str]:
+        """The shapes that matter in a walk."""
+        sizes = self._sizes(self.shapes)
+        return frozenset(name for name, size in zip(self.names, sizes, strict=True) if size > _FELT_N)
+
+    def curve(self, weights: tuple[float, ...]) -> StiffnessCurve:
+        """The curve with each shape added as often as `weights` say."""
+        coefficients = self.fit.coefficients + np.asarray(weights) @ self.shapes
+        return StiffnessCurve(tuple(chebyshev.cheb2poly(coefficients)), self.fit.lower_m, self.fit.upper_m)
+
+    @cached_property
+    def tables(self) -> Family:
+        """The curves that the shapes make, as the simulator reads them."""
+        none = np.zeros(len(self.shapes))
+        ends = self.fit.lower_m, self.fit.upper_m
+        return Family(self.curve(tuple(none)), [StiffnessCurve(tuple(way), *ends) for way in self._ways])
+
+    @cached_property
+    def changes(self) -> dict[str, dict[str, float]]:
+        """Of each shape by how much it changes the coefficients of the model's curve, by their names in a model."""
+        return {
+            name: {f"{self.prefix}_stiffness.{power}": float(change) for power, change in enumerate(way)}
+            for name, way in zip(self.names, self._ways, strict=True)
+        }
+
+    @cached_property
+    def _ways(self) -> list[np.ndarray]:
+        """The shapes in powers of the normalised coordinate."""
+        return [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]
+
+    def _sizes(self, shapes: np.ndarray) -> np.ndarray:
+        """By how many N each shape changes K where it changes it most."""
+        return np.abs(chebyshev.chebval(np.linspace(-1.0, 1.0, 200), shapes.T)).max(axis=1)

@@ -1,0 +1,322 @@
+"""What was done to the robot in a trial, without what came of it: all that a free-running prediction may use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from bifa import simulate
+from bifa.data import Trial
+from bifa.problem.motion import imposed_motion
+from bifa.problem.switches import (
+    elapsed_s,
+    seconds_per_uno_s,
+    shifted,
+    step_timeline,
+    switch_sd_s,
+    valves_of,
+    walk_timeline,
+)
+from bifa.problem.unmeasured import LOAD_CELL
+from bifa.simulate import Plant, Timeline
+from bifa.simulate.records import SimulatedTrial
+from lacuna.system import Theta
+
+STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
+_MM = 1e3
+Given = TypeVar("Given", bound="Inputs", covariant=True)
+
+
+@dataclass(frozen=True)
+class Case(Generic[Given]):
+    """One robot in a trial. `inputs`: what reached it (learnt curves may change the trial's own); `zeros_m`: K's
+    contracted zero of body and small actuator; `nuisances` may hold what varies from run to run."""
+
+    inputs: Given
+    plant: Plant
+    zeros_m: tuple[float, float]
+    nuisances: Theta
+
+    @property
+    def commands(self: Case[StepInputs] | Case[WalkInputs]) -> Timeline:
+        """When the valves switched."""
+        return shifted(self.inputs.commands, self.nuisances.get("switch_late_s", 0.0))
+
+    @property
+    def zero_m(self) -> float:
+        """Of the actuator on its stand."""
+        return self.zeros_m[self.inputs.actuator == "small"]
+
+
+class Inputs(Protocol):
+    """`channels`: what is predicted. `actuator`: "large", "small", or None where it is not a single one's test.
+    `positive_psi`: the supply, where the trial sets one of its own for the walk. `bench`: trials with an equal one are
+    simulated side by side."""
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+
+    @property
+    def actuator(self) -> str | None: ...
+
+    @property
+    def positive_psi(self) -> float | None: ...
+
+    @property
+    def bench(self) -> Hashable: ...
+
+    @staticmethod
+    def simulate(cases: Sequence[Case[Any]], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+        """The channels of each case on one bench, each of shape (n,). `together`: see `bifa.simulate.walks`."""
+        ...
+
+
+@dataclass(frozen=True)
+class StaticInputs:
+    """`turned_m`: how far the motion went where it turned between samples, each just before the sample number
+    `turned_before`. What remembers travel misses it there."""
+
+    actuator: str
+    time_s: np.ndarray
+    displacement_m: np.ndarray
+    direction: np.ndarray
+    pressure_psi: float
+    turned_before: tuple[int, ...] = ()
+    turned_m: tuple[float, ...] = ()
+    channels: tuple[str, ...] = ("force_N", "pressure_psi")
+    positive_psi: None = None
+
+    @cached_property
+    def bench(self) -> Hashable:
+        return STATIC, self.actuator, self.path_s.tobytes(), self.turned_before
+
+    @cached_property
+    def path_s(self) -> np.ndarray:
+        """Times of samples and turns; these in the middle between samples, so that trials share them."""
+        at = np.array(self.turned_before, int)
+        return np.insert(self.time_s, at, 0.5 * (self.time_s[at - 1] + self.time_s[at]))
+
+    @cached_property
+    def path_m(self) -> np.ndarray:
+        return np.insert(self.displacement_m, self.turned_before, self.turned_m)
+
+    @cached_property
+    def _is_sample(self) -> np.ndarray:
+        return np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
+
+    def sampled(self, columns: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        """Without the turns."""
+        return {name: column[self._is_sample] for name, column in columns.items()}
+
+    @staticmethod
+    def simulate(
+        cases: Sequence[Case[StaticInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
+        first = cases[0].inputs
+        records = simulate.static_loadings(
+            [case.plant for case in cases],
+            first.actuator,
+            first.path_s,
+            [(case.inputs.path_m - case.zero_m) * _MM for case in cases],
+            [case.inputs.pressure_psi for case in cases],
+        )
+        return [first.sampled(record.columns) for record in records]
+
+
+@dataclass(frozen=True)
+class StepInputs:
+    actuator: str
+    time_s: np.ndarray
+    commands: Timeline
+    pressure_psi: float
+    switch_sd_s: float = 0.0
+    channels: tuple[str, ...] = ("displacement_mm", "pressure_psi")
+    positive_psi: None = None
+
+    @property
+    def bench(self) -> Hashable:
+        return STEP, self.actuator
+
+    @staticmethod
+    def simulate(
+        cases: Sequence[Case[StepInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
+        records = simulate.step_responses(
+            [case.plant for case in cases],
+            cases[0].inputs.actuator,
+            [case.inputs.time_s for case in cases],
+            [case.commands for case in cases],
+            [case.inputs.pressure_psi for case in cases],
+            tolerance_m,
+            together,
+        )
+        return [
+            {**record.columns, "displacement_mm": record["displacement_mm"] + case.zero_m * _MM}
+            for record, case in zip(records, cases, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class PullInputs:
+    """`extended_psi`: by how much the head was extended before, if that is more; `grip`: factor of the friction's
+    coefficients, (n,) or one for all samples."""
+
+    pulled_s: np.ndarray
+    rate_mm_s: float
+    pressure_psi: float
+    load_cell_N_m: float
+    channels: tuple[str, ...] = ("force_N", "pressure_psi")
+    actuator: None = None
+    positive_psi: None = None
+    grip: np.ndarray | float = 1.0
+    extended_psi: float = 0.0
+
+    @cached_property
+    def sample_s(self) -> float:
+        return float(np.median(np.diff(self.pulled_s)))
+
+    @property
+    def bench(self) -> Hashable:
+        return ANCHOR, self.rate_mm_s, self.load_cell_N_m, self.extended_psi
+
+    @staticmethod
+    def simulate(
+        cases: Sequence[Case[PullInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
+        first = cases[0].inputs
+        records = simulate.anchor_pulls(
+            [case.plant for case in cases],
+            [case.inputs.pulled_s for case in cases],
+            first.rate_mm_s,
+            [case.inputs.pressure_psi for case in cases],
+            first.load_cell_N_m,
+            first.extended_psi,
+            tolerance_m,
+            together,
+        )
+        return [
+            {**record.columns, "force_N": case.inputs._force(record, case.nuisances)}
+            for record, case in zip(records, cases, strict=True)
+        ]
+
+    def _force(self, record: SimulatedTrial, nuisances: Theta) -> np.ndarray:
+        """The resistance, passing from the wound-up load cell to sliding over one sample instead of at once.
+
+        A peak that lies between two samples is only known to lie there. Were the prediction to jump, no small change
+        of a parameter would move it, and no derivative could find mu_s.
+        """
+        late_s = nuisances.get("slip_late_s", 0.0)
+        # until the head slips the load cell winds up alone: what it pulls is in proportion to its stiffness
+        wound = record["wound_N"] * (nuisances.get(LOAD_CELL, self.load_cell_N_m) / self.load_cell_N_m)
+        holding, kinetic = self.grip * record["holding_N"], self.grip * record["kinetic_N"]
+        gives = np.flatnonzero(wound >= holding)
+        if not len(gives):
+            return wound
+        k, before = gives[0], max(gives[0] - 1, 0)
+        excess, rise = holding[before] - wound[before], (wound - holding)[k] - (wound - holding)[before]
+        share = excess / rise if rise > 0.0 else 0.0
+        slip_s = self.pulled_s[before] + share * (self.pulled_s[k] - self.pulled_s[before]) + late_s
+        slid = np.clip((self.pulled_s - slip_s) / self.sample_s + 0.5, 0.0, 1.0)
+        return (1.0 - slid) * wound + slid * kinetic
+
+
+@dataclass(frozen=True)
+class WalkInputs:
+    time_s: np.ndarray
+    commands: Timeline
+    inclination_deg: float
+    positive_psi: float | None
+    channels: tuple[str, ...]
+    switch_sd_s: float = 0.0
+    actuator: None = None
+
+    @property
+    def bench(self) -> Hashable:
+        return WALK
+
+    @staticmethod
+    def simulate(
+        cases: Sequence[Case[WalkInputs]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
+        records = simulate.walks(
+            [case.plant for case in cases],
+            [case.commands for case in cases],
+            [case.inputs.time_s for case in cases],
+            inclinations_deg=[case.inputs.inclination_deg for case in cases],
+            tolerance_m=tolerance_m,
+            together=together,
+            states=False,
+        )
+        return [record.columns for record in records]
+
+
+def inputs_of(trial: Trial) -> Inputs:
+    """The inputs of a recorded trial."""
+    return _MAKERS[trial.experiment](trial)
+
+
+def _pressure_psi(trial: Trial) -> float:
+    """What the regulator was asked for, where the recorder noted it: its converter has steps of 0.03 psi."""
+    noted = trial.extra.get("set_point_psi")
+    return trial.commanded_psi if noted is None else noted
+
+
+def _time_s(trial: Trial) -> np.ndarray:
+    return elapsed_s(trial) * seconds_per_uno_s(trial)
+
+
+def _static(trial: Trial) -> StaticInputs:
+    motion = imposed_motion(trial.time_s, trial.columns["displacement_mm"] / _MM)
+    return StaticInputs(
+        trial.tested,
+        _time_s(trial),
+        motion.displacement_m,
+        motion.direction,
+        _pressure_psi(trial),
+        tuple(int(at) for at in np.searchsorted(trial.time_s, motion.turned_s)),
+        motion.turned_m,
+    )
+
+
+def _step(trial: Trial) -> StepInputs:
+    commands = valves_of(step_timeline(trial), trial)
+    return StepInputs(trial.tested, _time_s(trial), commands, _pressure_psi(trial), switch_sd_s(trial))
+
+
+def _pull(trial: Trial) -> PullInputs:
+    rate = abs(trial.commanded_mm_s)
+    backward = trial.extra.get("direction") == "backward"
+    pulled_mm = np.abs(trial.columns["displacement_mm"])
+    return PullInputs(
+        pulled_s=_pulled_time(_time_s(trial), pulled_mm, rate),
+        rate_mm_s=-rate if backward else rate,
+        pressure_psi=_pressure_psi(trial),
+        load_cell_N_m=float(trial.extra.get(LOAD_CELL, simulate.records.LOAD_CELL_N_M)),
+        extended_psi=float(trial.extra.get("extended_psi", 0.0)),
+    )
+
+
+def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
+    """For how long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
+    path_m = imposed_motion(time_s, pulled_mm / _MM).displacement_m
+    return np.maximum.accumulate(np.clip(path_m * _MM / rate_mm_s, 0.0, None))
+
+
+def _walk(trial: Trial) -> WalkInputs:
+    pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
+    displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
+    return WalkInputs(
+        time_s=_time_s(trial),
+        commands=valves_of(walk_timeline(trial), trial),
+        inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
+        positive_psi=trial.extra.get("set_point_psi", trial.pressure_psi),
+        channels=(*displacements, *pressures),
+        switch_sd_s=switch_sd_s(trial),
+    )
+
+
+_MAKERS: dict[str, Callable[[Trial], Inputs]] = {STATIC: _static, STEP: _step, ANCHOR: _pull, WALK: _walk}

@@ -1,0 +1,99 @@
+"""What every site's file declares: a `SITE`, and functions named after the places where a learnt curve acts.
+
+A curve of the robot's own equations (`equation`) needs no function: the integrator has it (`bifa.robot.learnt.ROWS`).
+Others have one or more of these, each of which gets the curve (`LearntCurve`) and returns what it gets with the curve
+in it. `place`: of the trial in the session, 0 for the day's first, 1 for its last.
+
+    plant(plant, curve, place)                      the robot of one trial
+    inputs(inputs, curve, place)                    what was done to it, as it reached it
+    readings(channels, curve, inputs, plant)        what the instruments say: those channels that change
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bifa.problem.inputs import Inputs, StaticInputs
+from bifa.robot.learnt import LearntCurve
+from lacuna.system import Channels, CorrectionSite
+
+
+@dataclass(frozen=True)
+class Range:
+    """The quantity that a curve is a function of."""
+
+    quantity: str
+    lower: float
+    upper: float
+
+
+PRESSURE = Range("pressure (psi)", -14.5, 14.5)
+SPEED = Range("velocity (m/s)", 0.0, 0.8)  # that a snap-through does not reach
+VELOCITY = Range("velocity (m/s)", -0.8, 0.8)
+PLACE = Range("position (m)", -0.1, 0.6)
+DAY = Range("place in the session", 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a curve may be learnt. `over`: a range, or the actuator ("body", "small") over whose spring's range it
+    goes; `scale`: how much of the term, in `unit`, matters; `rows`: one curve each; `equation`: of the robot's own."""
+
+    name: str
+    term: str
+    over: Range | str
+    unit: str
+    scale: float
+    rows: tuple[str, ...] = ("",)
+    experiments: tuple[str, ...] = ()
+    knots: int = 9
+    equation: bool = False
+
+    def declared(self, ends_m: tuple[float, float] | None) -> CorrectionSite:
+        """As the engine knows it; `ends_m`: of the spring's range, where the curve goes over that."""
+        if isinstance(self.over, Range):
+            over = self.over
+        elif ends_m is not None:
+            over = Range("displacement (m)", *ends_m)
+        else:
+            raise ValueError(f"{self.name} goes over the range of a spring, which is missing")
+        return CorrectionSite(
+            self.name,
+            self.term,
+            over.quantity,
+            self.unit,
+            over.lower,
+            over.upper,
+            self.scale,
+            self.rows,
+            self.experiments,
+            self.knots,
+        )
+
+
+def pressures(channels: Channels) -> list[tuple[str, np.ndarray]]:
+    """The channels that are pressures, in the order of the chambers."""
+    return [(name, values) for name, values in channels.items() if name.startswith("pressure")]
+
+
+def remembered(values: np.ndarray, time_s: np.ndarray, curve: LearntCurve, row: int) -> np.ndarray:
+    """`values` (n,) with what a curve over the time ago makes of their changes."""
+    sample_s = float(np.median(np.diff(time_s)))
+    ago_s = np.arange(0.5 * sample_s, curve.upper, sample_s)
+    changes = np.diff(values, prepend=values[0])
+    return values + np.convolve(changes, curve.at(ago_s, row))[: len(values)]
+
+
+def row_of(channel: str, inputs: Inputs) -> int:
+    """Of curves by actuator, the large one's first, that of a pressure channel."""
+    return 0 if inputs.actuator == "large" or channel == "pressure_body_psi" else 1
+
+
+def loading(channels: Channels, curve: LearntCurve, inputs: Inputs, actuator: str) -> Channels:
+    """The force of a static loading of `actuator` with what a curve adds by direction, extending first."""
+    if not isinstance(inputs, StaticInputs) or inputs.actuator != actuator:
+        return {}
+    extending, contracting = (curve.at(inputs.displacement_m, row) for row in (0, 1))
+    return {"force_N": channels["force_N"] + np.where(inputs.direction > 0, extending, contracting)}

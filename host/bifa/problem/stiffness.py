@@ -1,0 +1,233 @@
+"""The stiffness curve K of eq. (1) from a static test: a 15th-degree polynomial (paper, IV.A.1).
+
+The paper fits NumPy's polynomial to the data at 0 psi. Two things need more care than it tells:
+
+* in metres the Vandermonde matrix of degree 15 has a condition of 3e24, so the curve is held in Chebyshev
+  polynomials of the normalised coordinate z = 2 (x - lower) / (upper - lower) - 1;
+* the model uses K outside the range that the testing machine covered (under vacuum the actuator folds by some 5 mm
+  more than contracted). There the fit alone runs off, so the continuation gets a broad prior on its curvature and may
+  not turn downwards; equilibria seen in step responses then pin it down (`StiffnessFit.with_equilibria`).
+
+The fit is a Gaussian posterior, so it carries the uncertainty of every point of the curve with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import ArrayLike
+from scipy.optimize import LinearConstraint, minimize
+
+from bifa.problem.errors import UndeterminedError
+from lacuna.estimation.autocorrelation import correlation_samples
+
+DEGREE = 15
+CONTINUATION = 0.13  # of the static range, on either side, at most: beyond it the curve goes on straight
+_PRIOR_POINTS = 6  # on either side
+_TOLD = 0.9  # share of the information that stems from static loading
+_MIN_POINTS = 4 * (DEGREE + 1)
+
+
+@dataclass(frozen=True)
+class StiffnessFit:
+    """A posterior over stiffness curves.
+
+    lower_m, upper_m: where the polynomial holds; beyond them the model continues in a straight line.
+    covered_m: the displacements that the testing machine covered.
+    coefficients: Chebyshev coefficients in z [N], shape (16,).
+    information: the inverse of their covariance [1/N^2], shape (16, 16); `static` is the part of it that stems from
+        static loading, the rest from the broad prior on the continuation and from equilibria.
+    residual_N: RMS of the data about the curve, hysteresis included.
+    """
+
+    lower_m: float
+    upper_m: float
+    covered_m: tuple[float, float]
+    coefficients: np.ndarray
+    information: np.ndarray
+    static: np.ndarray
+    residual_N: float
+
+    def force(self, x: np.ndarray) -> np.ndarray:
+        """K(x) [N] at displacements x [m]."""
+        return self._rows(x) @ self.coefficients
+
+    def slope(self, x: np.ndarray) -> np.ndarray:
+        """K'(x) [N/m]."""
+        return self._rows(x, derivative=1) @ self.coefficients
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of the coefficients [N^2], shape (16, 16)."""
+        return np.linalg.pinv(self.information, hermitian=True)
+
+    def mean_force_sd(self, x: np.ndarray) -> float:
+        """Standard deviation of the mean of K over the points x [N]."""
+        row = self._rows(x).mean(axis=0)
+        return float(np.sqrt(max(row @ self.covariance @ row, 0.0)))
+
+    def unstable_m(self) -> float:
+        """The unstable equilibrium, eq. (3)'s threshold: where K falls through 0 between the stable states."""
+        x = np.linspace(*self.covered_m, 2001)
+        force = self.force(x)
+        falling = np.flatnonzero((force[:-1] > 0) & (force[1:] <= 0))
+        if not len(falling):
+            raise UndeterminedError("the curve does not fall through 0 between its ends: the actuator is not bistable")
+        i = falling[0]
+        return float(x[i] + (x[i + 1] - x[i]) * force[i] / (force[i] - force[i + 1]))
+
+    def with_equilibria(self, x: ArrayLike, force_N: ArrayLike, sd_N: ArrayLike) -> StiffnessFit:
+        """The posterior after seeing that the actuator rests at x [m] under a pressure force [N] known to sd [N]."""
+        rows = self._rows(np.asarray(x)) / np.asarray(sd_N)[:, None]
+        information = self.information + rows.T @ rows
+        target = self.information @ self.coefficients + rows.T @ (np.asarray(force_N) / np.asarray(sd_N))
+        coefficients = _solve_monotone(information, target, self._outside_slopes())
+        return replace(self, coefficients=coefficients, information=information)
+
+    def shapes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ways in which the curve may still change, each by one standard deviation.
+
+        Returns (16, 16), row j the Chebyshev coefficients [N] of a way, and (16,), True where static loading tells how
+        far. Any curve is `coefficients + z @ shapes`, and what is known so far says that z has zero mean and unit
+        covariance: the coordinates for a joint refinement. Those of the continuation come first, and within each kind
+        the least certain one.
+        """
+        values, vectors = np.linalg.eigh(self.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        told, turned = np.linalg.eigh(root.T @ self.static @ root)
+        ways = []
+        for subspace in (turned[:, told < _TOLD], turned[:, told >= _TOLD]):
+            _, sizes, directions = np.linalg.svd((root @ subspace).T, full_matrices=False)
+            ways.append(sizes[:, None] * directions)
+        shapes = np.concatenate(ways)
+        # A sign for each, so that the coordinates do not depend on the linear algebra library.
+        signs = np.sign(shapes[np.arange(len(shapes)), np.argmax(np.abs(shapes), axis=1)])
+        return shapes * signs[:, None], np.arange(len(shapes)) >= np.sum(told < _TOLD)
+
+    def _rows(self, x: np.ndarray, derivative: int = 0) -> np.ndarray:
+        return _rows(x, self.lower_m, self.upper_m, derivative)
+
+    def _outside_slopes(self) -> np.ndarray:
+        return self._rows(_outside(self.lower_m, self.upper_m, self.covered_m), derivative=1)
+
+
+def fit_stiffness(
+    displacement_m: np.ndarray,
+    force_N: np.ndarray,
+    loading: np.ndarray,
+    *,
+    reach_m: tuple[float, float] | None = None,
+) -> StiffnessFit:
+    """Fit K to static data at 0 psi, loading and unloading weighted alike wherever they lie, so that the curve runs
+    through the middle of the hysteresis.
+
+    displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
+    reach_m: the least and greatest displacement that the curve will be asked for, if known.
+
+    Raises UndeterminedError if there are too few points or they cover next to nothing.
+    """
+    x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
+    if len(x) < _MIN_POINTS:
+        raise UndeterminedError(f"{len(x)} points are too few for a curve of degree {DEGREE}: at least {_MIN_POINTS}")
+    covered = (float(x.min()), float(x.max()))
+    width = covered[1] - covered[0]
+    if width < 1e-3:
+        raise UndeterminedError(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be fitted to it")
+    lower, upper = covered[0] - CONTINUATION * width, covered[1] + CONTINUATION * width
+    if reach_m is not None:
+        lower = max(lower, min(reach_m[0], covered[0]) - 0.01 * width)
+        upper = min(upper, max(reach_m[1], covered[1]) + 0.01 * width)
+
+    loading = np.asarray(loading, bool)
+    rows, weight = _rows(x, lower, upper), _even_weights(x, loading)
+    scaled = rows * np.sqrt(weight)[:, None]
+    variance = max(_noise_variance(rows, force, loading), 1e-12)
+
+    outside = _outside(lower, upper, covered)
+    # Over the continuation's width the force may bend by several times the greatest force seen inside.
+    bend = 10.0 * np.abs(force).max() / max(covered[0] - lower, upper - covered[1]) ** 2
+    prior = _rows(outside, lower, upper, derivative=2) / bend
+    information = scaled.T @ scaled / variance + prior.T @ prior
+    target = scaled.T @ (force * np.sqrt(weight)) / variance
+    coefficients = _solve_monotone(information, target, _rows(outside, lower, upper, derivative=1))
+    final = force - rows @ coefficients
+    return StiffnessFit(
+        lower,
+        upper,
+        covered,
+        coefficients,
+        information,
+        scaled.T @ scaled / variance,
+        float(np.sqrt(np.average(final**2, weights=weight))),
+    )
+
+
+def _rows(x: np.ndarray, lower: float, upper: float, derivative: int = 0) -> np.ndarray:
+    """The Chebyshev polynomials (or their derivatives with respect to x) at x, shape (n, 16); straight beyond the
+    ends, as the model continues them."""
+    to_z = 2.0 / (upper - lower)
+    x = np.atleast_1d(np.asarray(x, float))
+    inside = np.clip(x, lower, upper)
+    z = (inside - lower) * to_z - 1.0
+    slopes = chebyshev.chebvander(z, DEGREE - 1) @ chebyshev.chebder(np.eye(DEGREE + 1)) * to_z
+    if derivative == 0:
+        return chebyshev.chebvander(z, DEGREE) + slopes * (x - inside)[:, None]
+    if derivative == 1:
+        return slopes
+    differentiated = chebyshev.chebder(np.eye(DEGREE + 1), m=derivative)
+    return chebyshev.chebvander(z, DEGREE - derivative) @ differentiated * to_z**derivative
+
+
+def _outside(lower: float, upper: float, covered: tuple[float, float]) -> np.ndarray:
+    return np.concatenate(
+        [np.linspace(lower, covered[0], _PRIOR_POINTS), np.linspace(covered[1], upper, _PRIOR_POINTS)]
+    )
+
+
+def _even_weights(x: np.ndarray, loading: np.ndarray, bins: int = 100) -> np.ndarray:
+    """Weights of mean 1 with which each branch counts alike at every displacement that both cover."""
+    place = np.minimum(((x - x.min()) / np.ptp(x) * bins).astype(int), bins - 1)
+    up = np.bincount(place[loading], minlength=bins)
+    down = np.bincount(place[~loading], minlength=bins)
+    both = (up > 0) & (down > 0)
+    total = up + down
+    share = np.where(both, total / 2.0, total)
+    weight = np.where(loading, share[place] / np.maximum(up[place], 1), share[place] / np.maximum(down[place], 1))
+    return weight / weight.mean()
+
+
+def _noise_variance(rows: np.ndarray, force: np.ndarray, loading: np.ndarray) -> float:
+    """Variance of one sample, inflated by serial correlation. Each branch is compared with a curve of its own: the
+    distance between the branches is hysteresis, not noise."""
+    variance = 0.0
+    for branch in (loading, ~loading):
+        if branch.sum() > 2 * (DEGREE + 1):
+            own = np.linalg.lstsq(rows[branch], force[branch], rcond=None)[0]
+            residual = force[branch] - rows[branch] @ own
+            share = branch.mean() * branch.sum() / (branch.sum() - DEGREE - 1)
+            square = float(np.mean(residual**2))
+            variance += share * square * (correlation_samples([residual / square**0.5]) if square else 1.0)
+    return variance
+
+
+def _solve_monotone(information: np.ndarray, target: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Minimise c'Ac/2 - b'c subject to slopes @ c >= 0: the continuation may not turn back."""
+    free = np.linalg.solve(information, target)
+    if (slopes @ free >= 0.0).all():
+        return free
+    root = np.linalg.cholesky(information)  # whitened, the problem is round
+    inverse = np.linalg.inv(root.T)
+    center = root.T @ free
+    turned = slopes @ inverse
+    scale = np.abs(turned).max()
+    solution = minimize(
+        lambda y: 0.5 * np.sum((y - center) ** 2),
+        center,
+        jac=lambda y: y - center,
+        constraints=LinearConstraint(turned / scale, 0.0, np.inf),
+        method="SLSQP",
+        options={"maxiter": 200, "ftol": 1e-12},
+    )
+    return inverse @ solution.x

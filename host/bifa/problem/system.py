@@ -1,0 +1,392 @@
+"""The robot and its bench as a `System`: what `bifa fit` and `bifa diagnose` run on.
+
+Displacements of single actuators are those of the data set (0 where the testing machine says 0); the simulator counts
+from K's own contracted zero, so the two differ by that zero, which is 0 where the lab set its instruments well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from functools import cached_property, lru_cache
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+
+from bifa import robot
+from bifa.data import Dataset, Trial
+from bifa.errors import BifaError
+from bifa.problem import candidates, regressors, sites
+from bifa.problem.accuracy import accuracy_of
+from bifa.problem.curves import FittedCurve
+from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK, Case, Inputs, inputs_of
+from bifa.problem.library import engine_effects
+from bifa.problem.spare import spare
+from bifa.problem.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
+from bifa.robot import Model
+from bifa.robot.stiffness import StiffnessCurve
+from bifa.simulate import Plant, lanes, layout
+from bifa.simulate.plant import of_values
+from bifa.simulate.tables import tabulated
+from lacuna.system import (
+    CandidateExperiment,
+    Channels,
+    Correction,
+    CorrectionSite,
+    Effect,
+    Parameter,
+    Record,
+    System,
+    Theta,
+)
+
+_REMEMBERED = ("_plant", "_own_values", "_unfitted", "_shapes")  # by a system, for speed
+FRICTION_WOBBLE = 0.01  # from run to run, relative
+_ADC_COUNT_PSI = 30.0 / 819.0  # 10 bits, 10-90 % of the supply over +-15 psi
+_EXACT_M = {STATIC: 1e-6, STEP: 2e-7, ANCHOR: 1e-6, WALK: 3e-7}
+_COARSE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-6}
+_ALIKE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-5}  # shared steps err alike: differences are better
+
+_LARGE = ("body_damping_Ns_m", "body_area_N_psi", "body_alpha_n_per_s", "body_alpha_s_per_s")
+_SMALL = ("small_damping_Ns_m", "small_area_N_psi", "small_alpha_n_per_s", "small_alpha_s_per_s")
+_PIPE = ("wall_offset_m", "mu_s", "mu_k")
+# A pull fits about as well with a wall nearer by a centimetre and less friction; only walks tell.
+_PLACES = {"wall_offset_m": (0.017, 0.022, 0.026, 0.031)}
+_SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
+_WALL = ("wall_stiffness_N_m", "wall_damping_Ns_m")
+_MASSES = ("head_mass_kg", "tail_mass_kg", "small_mass_kg")
+_FELT = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
+# Which experiments see which parameters; the shapes of the curves are added in `matters`.
+_SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
+    (STATIC, "large"): frozenset({"body_area_N_psi"}),
+    (STATIC, "small"): frozenset({"small_area_N_psi"}),
+    (STEP, "large"): frozenset({*_LARGE, "supply_negative_psi"}),
+    (STEP, "small"): frozenset({*_SMALL, "small_mass_kg", "supply_negative_psi"}),
+    (ANCHOR, None): frozenset({"small_area_N_psi", "head_segment_mass_kg", "wall_stiffness_N_m", *_PIPE}),
+    (WALK, None): frozenset({*_LARGE, *_SMALL, *_PIPE, *_SUPPLIES, *_MASSES, *_WALL}),
+}
+
+
+class RobotSystem(System):
+    """The robot's base model, its library of effects, and the trials of a data set.
+
+    model: values from which the search starts, and those that are not searched.
+    curves: the fitted stiffness curves, "body" and "small"; their shapes are parameters. An actuator without one keeps
+        the model's.
+    fitted: names of the model's parameters to be searched.
+    """
+
+    name = "pipe robot"
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        model: Model,
+        curves: Mapping[str, FittedCurve],
+        fitted: Sequence[str],
+    ):
+        self.dataset, self.model, self.curves = dataset, model, dict(curves)
+        self.fitted = tuple(fitted)
+        self.accuracies: Mapping[str, float] = {}  # RMS by quantity, up to which a prediction is good enough
+        self._inputs = {trial.file: inputs_of(trial) for trial in dataset.trials}
+        self.trials = tuple(_engine_trial(trial, self._inputs[trial.file]) for trial in dataset.trials)
+        self._last_in_session = max((t.session_order or 0 for t in self.trials), default=0)
+        self.effects: Mapping[str, Effect] = engine_effects()
+        shapes = [p for curve in self.curves.values() for p in curve.parameters]
+        self.bench = tuple(BENCH[name] for name in _bench_unknowns(dataset))
+        self.parameters = (*(self._named(name) for name in self.fitted), *self.bench, *shapes)
+        self._remember()
+
+    def _remember(self) -> None:
+        self._plant = lru_cache(maxsize=512)(self._plant_of)
+        self._own_values = _picked(self.fitted)
+        self._unfitted = {name: p.value for name, p in self.model.parameters.items() if name not in self.fitted}
+        self._shapes = {prefix: _picked(curve.names) for prefix, curve in self.curves.items()}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What travels to another process: all but what is remembered."""
+        return {n: value for n, value in vars(self).items() if n not in _REMEMBERED}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._remember()
+
+    # -- the System protocol ----------------------------------------------------------------------------------
+
+    def predict(
+        self,
+        theta: Theta,
+        effects: tuple[str, ...],
+        trial: Record,
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Correction] = (),
+    ) -> Channels:
+        return self.predict_trials([theta], effects, [trial], coarse=coarse, corrections=[corrections])[0]
+
+    forks = True  # compiled code without threads or state of its own
+
+    @property
+    def at_once(self) -> int:  # type: ignore[override]  # not before it is asked for: it may compile
+        return lanes.width()
+
+    def predict_trials(
+        self,
+        thetas: Sequence[Theta],
+        effects: tuple[str, ...],
+        trials: Sequence[Record],
+        *,
+        coarse: bool = False,
+        corrections: Sequence[Sequence[Correction]] = (),
+        alike: bool = False,
+    ) -> list[Channels]:
+        """Each of `thetas` in its trial, those on one bench side by side."""
+        each = list(zip(thetas, corrections or [()] * len(thetas), trials, strict=True))
+        cases = [self._case(theta, learnt, effects, trial) for theta, learnt, trial in each]
+        benches: dict[Hashable, list[int]] = {}
+        for k, (case, trial) in enumerate(zip(cases, trials, strict=True)):
+            if case is not None:
+                benches.setdefault(trial.payload.bench, []).append(k)
+        found: dict[int, Channels] = {}
+        for members in benches.values():
+            first = trials[members[0]]
+            shared = alike and self.at_once > 1
+            tolerances_m = _EXACT_M if not coarse else _ALIKE_M if shared else _COARSE_M
+            tolerance_m = tolerances_m[first.experiment]
+            there = [case for case in (cases[k] for k in members) if case is not None]
+            simulated = _simulated(first.payload, there, tolerance_m, alike)
+            for k, case, channels in zip(members, there, simulated, strict=True):
+                if channels:
+                    found[k] = _seen(channels, each[k][1], case, trials[k])
+        return [found[k] if k in found else _nothing(trial) for k, trial in enumerate(trials)]
+
+    def _case(
+        self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
+    ) -> Case[Inputs] | None:
+        """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
+        place = self._place_in_session(trial)
+        try:
+            plant, zeros = self._plant(self._key(theta, effects))
+            plant = sites.corrected(plant, learnt, place)
+        except BifaError:
+            return None
+        inputs: Inputs = sites.corrected_inputs(trial.payload, learnt, plant, place)
+        return Case(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
+
+    def _place_in_session(self, trial: Record) -> float:
+        """0 for the day's first trial, 1 for its last; 0 where the order was not noted."""
+        return (trial.session_order or 0) / max(self._last_in_session, 1)
+
+    def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
+        return regressors.of(trial, prediction)
+
+    def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
+        found = []
+        if trial.experiment in (ANCHOR, WALK):
+            source = "friction differs from run to run"
+            both = ("mu_s", "mu_k")
+            found.append(
+                Parameter("friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source=source, factor_of=both)
+            )
+        if trial.experiment in (STEP, WALK) and (sd := trial.payload.switch_sd_s) > 0.0:
+            source = "the valves switched between two samples"
+            found.append(Parameter("switch_late_s", "s", 0.0, -3.0 * sd, 3.0 * sd, scale=sd, source=source))
+        if trial.experiment == ANCHOR:
+            found.append(self._slip_late(trial))
+        return tuple(found)
+
+    def _slip_late(self, trial: Record) -> Parameter:
+        # Repeats are sampled alike, so that the same half sample may be missed in all of them.
+        half_s = 0.5 * trial.payload.sample_s
+        alike = sum(other.condition == trial.condition for other in self.trials)
+        return Parameter(
+            "slip_late_s",
+            "s",
+            0.0,
+            -2.0 * half_s,
+            2.0 * half_s,
+            scale=half_s * np.sqrt(max(alike, 1) / 3.0),
+            source="the peak lies between two samples",
+        )
+
+    def spare(self) -> tuple[tuple[str, Hashable], ...]:
+        return spare(self.dataset)
+
+    def matters(self, parameter: str, trial: Record) -> bool:
+        actuator = trial.payload.actuator
+        if parameter in BENCH:
+            return (trial.experiment, actuator) == _FELT[parameter]
+        if "_shape_" not in parameter:
+            return parameter in _SEEN_BY[trial.experiment, actuator]
+        prefix = parameter.split("_", 1)[0]
+        if actuator is not None and prefix != {"large": "body", "small": "small"}[actuator]:
+            return False
+        if trial.experiment == ANCHOR and prefix == "body":
+            return False
+        return trial.experiment in (STATIC, STEP) or parameter in self.curves[prefix].felt
+
+    def isolates(self, trial: Record) -> bool:
+        return trial.experiment != WALK
+
+    def accuracy(self, experiment: str, channel: str) -> float:
+        return accuracy_of(channel, self.accuracies)
+
+    def sensor_noise(self, experiment: str, channel: str) -> float:
+        """A converter's count is the least that a pressure can be uncertain by."""
+        return _ADC_COUNT_PSI / np.sqrt(12.0) if channel.startswith("pressure") else 0.0
+
+    @cached_property
+    def correction_sites(self) -> Mapping[str, CorrectionSite]:
+        return sites.declared(self.model, self.curves)
+
+    def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
+        return tuple(
+            CandidateExperiment(
+                experiment=recorded.experiment,
+                settings=settings,
+                trial=_engine_trial(recorded, inputs_of(recorded), measured=False),
+            )
+            for settings, recorded in candidates.of(self.dataset)
+        )
+
+    # -- from a vector to a model -----------------------------------------------------------------------------
+
+    def model_at(self, theta: Theta, effects: Iterable[str] = ()) -> Model:
+        """The model with the values of `theta`, curves included, and these effects active."""
+        values = {name: theta[name] for name in self.fitted}
+        chosen = {
+            effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
+        }
+        model = self.model.with_values(values).with_effects(chosen)
+        return _with_curves(
+            model, {prefix: curve.curve(self._shapes[prefix](theta)) for prefix, curve in self.curves.items()}
+        )
+
+    def _named(self, name: str) -> Parameter:
+        entry = self.model.parameters[name]
+        low, high = entry.plausible
+        prior_sd = PRIOR_SD.get(name)
+        # friction shows in fewer samples: wider steps for its derivatives
+        scale = prior_sd or (high - low) * (1.0 if name in _PIPE else 0.1)
+        # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
+        at_least = "mu_k" if name == "mu_s" else None
+        return Parameter(
+            name,
+            entry.unit,
+            entry.value,
+            entry.lower,
+            entry.upper,
+            (low, high),
+            scale,
+            entry.source,
+            prior_sd,
+            at_least=at_least,
+            elsewhere=_PLACES.get(name, ()),
+        )
+
+    def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple[Any, ...]:
+        """All that a plant depends on, hashable."""
+        weights = tuple((prefix, shapes(theta)) for prefix, shapes in self._shapes.items())
+        extra = tuple(
+            (effect, tuple((p.name, theta.get(f"{effect}.{p.name}", p.value)) for p in _all_of(self.effects[effect])))
+            for effect in effects
+        )
+        return self._own_values(theta), weights, extra
+
+    def _plant_of(self, key: tuple[Any, ...]) -> tuple[Plant, tuple[float, float]]:
+        """The compiled code's form of a model, and K's contracted zeros of body and small actuator."""
+        named, weights, extra = key
+        shapes = dict(weights)
+        body, small = (
+            self.curves[prefix].tables.at(shapes[prefix]) if prefix in shapes else tabulated(own)
+            for prefix, own in (("body", self.model.body_stiffness), ("small", self.model.small_stiffness))
+        )
+        effects = {effect: dict(values) for effect, values in extra}
+        values = self._unfitted | dict(zip(self.fitted, named, strict=True))
+        values |= {f"{effect}.{name}": v for effect, own in effects.items() for name, v in own.items()}
+        return of_values(values, effects, body, small), (body.contracted_m, small.contracted_m)
+
+
+def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:
+    """Names of the model's parameters that these trials see and the lab does not know."""
+    seen: set[str] = set()
+    for trial in dataset.trials:
+        seen |= _SEEN_BY[trial.experiment, trial.actuator]
+    return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known)
+
+
+def _bench_unknowns(dataset: Dataset) -> list[str]:
+    """Constants of the bench that these trials feel and nobody declared."""
+    experiments = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
+    return [name for name, where in _FELT.items() if where in experiments]
+
+
+def _simulated(
+    bench: Inputs, cases: Sequence[Case[Inputs]], tolerance_m: float, alike: bool
+) -> list[Mapping[str, np.ndarray]]:
+    """The channels of each case; none of one that is out of range."""
+    try:
+        return bench.simulate(cases, tolerance_m, alike)
+    except BifaError:
+        if len(cases) == 1:
+            return [{}]
+        return [_simulated(bench, [case], tolerance_m, alike)[0] for case in cases]
+
+
+def _nothing(trial: Record) -> Channels:
+    return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
+
+
+def _seen(
+    channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case[Inputs], trial: Record
+) -> Channels:
+    """What the instruments show of a simulation."""
+    channels = sites.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
+    return {name: channels[name] for name in trial.channels}
+
+
+def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:
+    """A function that picks these of a mapping's values: it is called for every simulation."""
+    if len(names) < 2:  # of one name itemgetter would make no tuple
+        return lambda theta: tuple(theta[name] for name in names)
+    return itemgetter(*names)
+
+
+def _all_of(effect: Effect) -> tuple[Parameter, ...]:
+    return effect.parameters + effect.own
+
+
+def _engine_trial(recorded: Trial, inputs: Inputs, measured: bool = True) -> Record:
+    channels = {
+        name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
+        for name in inputs.channels
+    }
+    return Record(
+        name=recorded.file,
+        experiment=recorded.experiment,
+        condition=recorded.condition,
+        time_s=recorded.time_s,
+        channels=channels,
+        session_order=recorded.session_order,
+        payload=inputs,
+    )
+
+
+def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:
+    """`plant` as it is in one trial: its friction, its supply, and what moves on the stand."""
+    friction = theta.get("friction_scale", 1.0)
+    q = plant.q.copy()
+    q[layout.MU_S] *= friction
+    q[layout.MU_K] *= friction
+    if positive_psi is not None:
+        q[layout.SUPPLY_POSITIVE] = positive_psi
+    if trial.experiment == STEP:
+        q[layout.BODY + layout.MASS] = theta.get(STAND_MASS, q[layout.BODY + layout.MASS])
+    return plant._replace(q=q)
+
+
+def _with_curves(model: Model, curves: Mapping[str, StiffnessCurve]) -> Model:
+    from dataclasses import replace
+
+    changes: dict[str, Any] = {f"{prefix}_stiffness": curve for prefix, curve in curves.items()}
+    return replace(model, **changes)

@@ -1,0 +1,242 @@
+"""Learnt curves in the shape of something that the model knows do what that does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from bifa.data import Dataset
+from bifa.identify.start import prepare
+from bifa.problem.sites import corrected, learnt_curves, modules
+from bifa.robot.learnt import ROWS
+from bifa.simulate import plant, vented_between
+from harness.independent_lab import BASELINE, Lab
+from lacuna.system import Correction
+
+
+@pytest.fixture(scope="module")
+def system():
+    lab = Lab().with_seed(4)
+    trials = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
+    trials += [lab.step(which, 8.5) for which in ("large", "small")]
+    trials += [lab.anchor(8.5), lab.walk(BASELINE, 8.0)]
+    known = {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
+    numbered = tuple(replace(t, file=f"{i:02d}.csv", session_order=i + 1) for i, t in enumerate(trials))
+    return prepare(Dataset(path=None, name="small day", known=known, trials=numbered))
+
+
+@pytest.fixture(scope="module")
+def theta(system):
+    return {p.name: p.value for p in system.parameters}
+
+
+def curve(system, name, function) -> Correction:
+    """`function` of the site's variable, on its grid, for every direction."""
+    site = system.correction_sites[name]
+    values = function(np.linspace(site.lower, site.upper, 65))
+    return Correction(name, np.array([values] * len(site.rows)))
+
+
+def trial_of(system, experiment):
+    return [t for t in system.trials if t.experiment == experiment][-1]
+
+
+def predict(system, theta, experiment, *corrections, effects=()):
+    return system.predict(theta, effects, trial_of(system, experiment), corrections=corrections)
+
+
+def test_a_site_s_file_has_its_name_and_the_equations_have_its_rows():
+    assert all(module.SITE.name == name for name, module in modules().items())
+    in_equations = {name: len(module.SITE.rows) for name, module in modules().items() if module.SITE.equation}
+    assert in_equations == ROWS
+
+
+def test_a_curve_outside_the_equations_acts_somewhere():
+    hooks = ("plant", "inputs", "readings")
+    for name, module in modules().items():
+        own = [hook for hook in hooks if hasattr(module, hook)]
+        assert len(own) == (0 if module.SITE.equation else 1), name
+
+
+@pytest.mark.slow
+def test_a_damper_learnt_as_a_straight_line_is_more_damping(system, theta):
+    body = next(t for t in system.trials if t.experiment == "step_response")
+    learnt = curve(system, "body_damper", lambda v: 20.0 * v)
+    more = theta | {"body_damping_Ns_m": theta["body_damping_Ns_m"] + 20.0}
+    got = system.predict(theta, (), body, corrections=(learnt,))["displacement_mm"]
+    assert got == pytest.approx(system.predict(more, (), body)["displacement_mm"], abs=0.02)
+    assert np.ptp(got - system.predict(theta, (), body)["displacement_mm"]) > 0.5
+
+
+def test_a_rate_learnt_as_a_loss_is_a_leak(system, theta):
+    learnt = curve(system, "filling", lambda p: -0.05 * p)
+    leaky = theta | {"leak.rate_per_s": 0.05}
+    got = predict(system, theta, "locomotion", learnt)
+    want = predict(system, leaky, "locomotion", effects=("leak",))
+    for channel in ("pressure_body_psi", "pressure_head_psi"):
+        assert got[channel] == pytest.approx(want[channel], abs=0.02)
+
+
+def test_a_constant_friction_slows_the_robot_whether_by_speed_or_by_place(system, theta):
+    plain = predict(system, theta, "locomotion")["displacement_head_mm"]
+    by_speed, by_place = (
+        predict(system, theta, "locomotion", curve(system, name, lambda x: np.full(x.shape, 3.0)))
+        for name in ("friction_speed", "friction_place")
+    )
+    assert by_speed["displacement_head_mm"] == pytest.approx(by_place["displacement_head_mm"], abs=1e-9)
+    assert by_speed["displacement_head_mm"][-1] < plain[-1] - 0.1
+    nothing = predict(system, theta, "locomotion", curve(system, "friction_speed", np.zeros_like))
+    assert nothing["displacement_head_mm"] == pytest.approx(plain, abs=1e-9)
+
+
+def test_what_changes_over_the_day_changes_by_the_place_in_the_session(system, theta):
+    last = curve(system, "friction_of_the_day", lambda share: 0.1 * share)
+    stiffer = theta | {name: 1.1 * theta[name] for name in ("mu_s", "mu_k")}
+    assert trial_of(system, "locomotion").session_order == len(system.trials)
+    got = predict(system, theta, "locomotion", last)["displacement_head_mm"]
+    assert got == pytest.approx(predict(system, stiffer, "locomotion")["displacement_head_mm"], abs=1e-9)
+
+
+def test_the_camera_reads_with_what_was_learnt(system, theta):
+    scaled = predict(system, theta, "locomotion", curve(system, "camera", lambda x: 0.03 * x))
+    plain = predict(system, theta, "locomotion")
+    inside = np.abs(plain["displacement_tail_mm"]) < 90.0
+    assert scaled["displacement_tail_mm"][inside] == pytest.approx(
+        1.03 * plain["displacement_tail_mm"][inside], abs=1e-6
+    )
+
+
+@pytest.mark.parametrize(("experiment", "channel"), [("locomotion", "head"), ("step_response", "")])
+def test_a_camera_that_remembers_is_one_on_a_mount_that_rings(system, theta, experiment, channel):
+    omega, damping = 2.0 * np.pi * 6.0, 0.1  # dies away within what is remembered
+    swing, decay = omega * np.sqrt(1.0 - damping**2), damping * omega
+
+    def after_a_step(ago_s):
+        return -np.exp(-decay * ago_s) * (np.cos(swing * ago_s) - decay / swing * np.sin(swing * ago_s))
+
+    site = system.correction_sites["camera_memory"]
+    at = np.linspace(site.lower, site.upper, 481)
+    learnt = Correction(site.name, np.array([after_a_step(at), 0.0 * at, 0.0 * at]))
+    trial = next(t for t in system.trials if t.experiment == experiment and t.payload.actuator in (None, "large"))
+    plain, got = (system.predict(theta, (), trial, corrections=one) for one in ((), (learnt,)))
+    name = f"displacement_{channel}_mm" if channel else "displacement_mm"
+    mount = ([-1.0, 0.0, 0.0], [1.0, 2.0 * decay, omega**2])  # r'' + 2 zeta omega r' + omega^2 r = -x''
+    moved_mm = plain[name] - plain[name][0]
+    rings_mm = lsim(mount, moved_mm, np.arange(len(moved_mm)) * 0.01)[1]
+    seen_mm = got[name] - plain[name]
+    assert np.abs(rings_mm).max() > 1.0
+    assert np.sqrt(np.mean((seen_mm - rings_mm) ** 2)) < 0.1 * np.sqrt(np.mean(rings_mm**2))
+    for other in plain.keys() - {name}:
+        np.testing.assert_array_equal(got[other], plain[other])
+
+
+def with_effect(theta, name, **values):
+    return theta | {f"{name}.{parameter}": value for parameter, value in values.items()}
+
+
+# A curve (a row each where they differ), the effect of the library that does the same, and where it shows.
+ALIKE = {
+    "valves": ([lambda _: 0.03], with_effect({}, "valve_latency", delay_s=0.03), ("step_response", "locomotion")),
+    "area_stroke": (
+        [lambda x: 0.1 * x],
+        with_effect({}, "area_variation", slope=0.1, force_kept=0.0),
+        ("static_loading",),
+    ),
+    "grip_speed": (
+        [lambda _: 0.15, lambda _: -0.15],
+        with_effect({}, "friction_direction", asymmetry=0.15),
+        ("anchor_pull", "locomotion"),
+    ),
+    "pressure_sensor_memory": (
+        [lambda ago_s: -np.exp(-ago_s / 0.05)],
+        with_effect({}, "sensor_lag", time_s=0.05),
+        ("step_response", "locomotion"),
+    ),
+    "pressure_sensor_inflow": (
+        [lambda drop_psi: 0.05 * drop_psi],
+        with_effect({}, "sensor_position", share=0.05),
+        ("step_response", "locomotion"),
+    ),
+}
+
+
+def with_dead_time(trial):
+    if trial.experiment not in ("step_response", "locomotion"):
+        return trial
+    return replace(trial, payload=replace(trial.payload, commands=vented_between(trial.payload.commands, 0.004)))
+
+
+@pytest.mark.parametrize("as_recorded", [lambda trial: trial, with_dead_time], ids=["plain", "with dead time"])
+@pytest.mark.parametrize(("site", "experiment"), [(name, where) for name, alike in ALIKE.items() for where in alike[2]])
+def test_a_curve_in_the_shape_of_an_effect_is_that_effect(system, theta, site, experiment, as_recorded):
+    rows, effect, _ = ALIKE[site]
+    here = system.correction_sites[site]
+    at = np.linspace(here.lower, here.upper, 257)
+    every = rows if len(rows) == len(here.rows) else rows * len(here.rows)
+    learnt = Correction(site, np.array([np.broadcast_to(row(at), at.shape) for row in every]))
+    names = tuple({name.split(".")[0] for name in effect})
+    trial = as_recorded(trial_of(system, experiment))
+    plain = system.predict(theta, (), trial)
+    want = system.predict(theta | effect, names, trial)
+    got = system.predict(theta, (), trial, corrections=(learnt,))
+    moved = {channel: np.abs(want[channel] - plain[channel]).max() for channel in want}
+    assert max(moved.values()) > 0.05
+    for channel, much in moved.items():
+        missed = np.sqrt(np.mean((got[channel] - want[channel]) ** 2))
+        assert missed < 0.05 * np.sqrt(np.mean((want[channel] - plain[channel]) ** 2)) + 2e-3, (channel, much)
+
+
+def test_a_pull_meets_the_friction_of_the_place_that_it_has_reached(system, theta):
+    site = system.correction_sites["grip_pulled"]
+    lip = np.exp(-0.5 * ((np.linspace(site.lower, site.upper, 513) - 0.03) / 0.004) ** 2)
+    pull = trial_of(system, "anchor_pull")
+    got, plain = (
+        system.predict(theta, (), pull, corrections=corrections)["force_N"]
+        for corrections in ((Correction("grip_pulled", np.array([0.4 * lip, 0.0 * lip])),), ())
+    )
+    pulled_m = 1e-3 * pull.payload.pulled_s * abs(pull.payload.rate_mm_s)
+    sliding = pulled_m > 0.01
+    want = 1.0 + 0.4 * np.exp(-0.5 * ((pulled_m - 0.03) / 0.004) ** 2)
+    assert got[sliding] / plain[sliding] == pytest.approx(want[sliding], rel=0.01)
+
+
+def test_a_sensor_sees_another_chamber_by_the_row_of_that_pair(system, theta):
+    site = system.correction_sites["pressure_sensor_others"]
+    table = np.zeros((len(site.rows), 9))
+    table[site.rows.index("head by body")] = 0.04 * np.linspace(site.lower, site.upper, 9)
+    got = predict(system, theta, "locomotion", Correction(site.name, table))
+    plain = predict(system, theta, "locomotion")
+    seen = plain["pressure_head_psi"] + 0.04 * plain["pressure_body_psi"]
+    assert got["pressure_head_psi"] == pytest.approx(seen, abs=1e-9)
+    assert got["pressure_tail_psi"] == pytest.approx(plain["pressure_tail_psi"], abs=1e-12)
+
+
+def test_slow_loading_differs_by_direction_on_the_actuator_that_it_was_learnt_for(system, theta):
+    table = np.array([np.full(9, 2.0), np.full(9, -1.0)])
+    large, small = (
+        [t for t in system.trials if t.experiment == "static_loading" and t.payload.actuator == which][-1]
+        for which in ("large", "small")
+    )
+    learnt = (Correction("body_loading", table),)
+    added = (
+        system.predict(theta, (), large, corrections=learnt)["force_N"] - system.predict(theta, (), large)["force_N"]
+    )
+    assert added == pytest.approx(np.where(large.payload.direction > 0, 2.0, -1.0))
+    untouched = system.predict(theta, (), small, corrections=learnt)["force_N"]
+    np.testing.assert_array_equal(untouched, system.predict(theta, (), small)["force_N"])
+
+
+def test_a_model_takes_along_what_was_learnt_in_the_robot_but_not_in_its_instruments(system, theta):
+    corrections = [
+        curve(system, "body_spring", lambda x: 3.0 * np.sin(300.0 * x)),
+        curve(system, "filling", lambda p: -0.03 * p),
+        curve(system, "camera", lambda x: 0.03 * x),
+    ]
+    model = system.model_at(theta, ())
+    kept = learnt_curves(plant(model), corrections)
+    assert set(kept) == {"body_spring", "filling"}
+    got, want = plant(replace(model, learnt=kept)), corrected(plant(model), corrections)
+    for ours, theirs in zip(got, want, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert not np.array_equal(got.body_curve, plant(model).body_curve)

@@ -1,0 +1,240 @@
+"""The robot as a system of the engine: predictions, what matters where, nuisances, candidates, corrections."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bifa.data import Dataset
+from bifa.identify.start import prepare
+from bifa.problem.errors import UndeterminedError
+from bifa.problem.inputs import inputs_of
+from bifa.problem.library import engine_effects
+from bifa.robot import ModelParameterError
+from harness.independent_lab import BASELINE, Lab
+from lacuna.estimation.fit import spread_starts
+from lacuna.estimation.graduated import solve_graduated
+from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.structure import Structure
+from lacuna.system import Correction
+
+
+def numbered(trials) -> tuple:
+    return tuple(replace(trial, file=f"{i:02d}.csv", session_order=i) for i, trial in enumerate(trials))
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return Lab().with_seed(4)
+
+
+@pytest.fixture(scope="module")
+def dataset(lab):
+    trials = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
+    trials += [lab.step(which, 8.5) for which in ("large", "small")]
+    trials += [lab.anchor(p) for p in (0.0, 8.5)]
+    trials += [lab.walk(BASELINE, 8.0)]
+    known = {"head_mass_kg": lab.head_mass, "tail_mass_kg": lab.tail_mass}
+    known |= {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
+    return Dataset(path=None, name="small day", known=known, trials=numbered(trials))
+
+
+@pytest.fixture(scope="module")
+def system(dataset):
+    return prepare(dataset)
+
+
+@pytest.fixture(scope="module")
+def theta(system):
+    return {p.name: p.value for p in system.parameters}
+
+
+def test_trials_side_by_side_are_predicted_as_each_alone(system, theta):
+    """Walks of several lengths and slopes in one kernel's lanes, and one among them that cannot be simulated."""
+    walk = next(t for t in system.trials if t.experiment == "locomotion")
+    short = replace(walk.payload, time_s=walk.time_s[: len(walk.time_s) // 2], inclination_deg=4.0)
+    half = {c: v[: len(short.time_s)] for c, v in walk.channels.items()}
+    shorter = replace(walk, name="shorter", time_s=short.time_s, channels=half, payload=short)
+    overhanging = replace(walk, payload=replace(walk.payload, inclination_deg=100.0))
+    trials = [*system.trials, shorter, walk, overhanging]
+    found = system.predict_trials([theta] * len(trials), (), trials)
+    assert np.isnan(next(iter(found[-1].values()))).all()
+    for trial, channels in zip(trials[:-1], found[:-1], strict=True):
+        alone = system.predict(theta, (), trial)
+        for name, expected in alone.items():
+            np.testing.assert_allclose(channels[name], expected, atol=2e-3 * np.ptp(expected) + 1e-9, err_msg=name)
+
+
+def test_statics_alone_give_the_areas(system, theta, lab):
+    assert theta["body_area_N_psi"] == pytest.approx(lab.large.area, rel=0.002)
+    assert theta["small_area_N_psi"] == pytest.approx(lab.small.area, rel=0.002)
+    assert set(system.fitted).isdisjoint({"head_mass_kg", "supply_positive_psi"})  # the lab knows them
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_fit_finds_the_robot_from_anywhere_plausible(system, lab, seed):
+    structure = Structure(system)
+    problem = Problem(structure, system.trials, estimate_noise(system, system.trials))
+    _, start = spread_starts(structure, structure.start(), 2, seed)
+    found = structure.theta(solve_graduated(problem, start, max_iterations=20, relative=1e-3).point.values)
+    truth = {
+        "body_damping_Ns_m": (lab.large.damping, 0.02),
+        "body_alpha_n_per_s": (lab.large.fast, 0.02),
+        "body_alpha_s_per_s": (lab.large.slow, 0.02),
+        "small_damping_Ns_m": (lab.small.damping, 0.05),
+        "small_alpha_n_per_s": (lab.small.fast, 0.02),
+        "small_alpha_s_per_s": (lab.small.slow, 0.02),
+        "mu_k": (lab.mu_k, 0.05),
+        "wall_offset_m": (lab.wall_offset, 0.02),
+    }
+    for name, (value, tolerance) in truth.items():
+        assert found[name] == pytest.approx(value, rel=tolerance), name
+
+
+def test_predictions_have_the_shape_of_the_measurements(system, theta):
+    for trial in system.trials:
+        prediction = system.predict(theta, (), trial)
+        assert prediction.keys() == trial.channels.keys()
+        for channel, measured in trial.channels.items():
+            assert prediction[channel].shape == measured.shape
+            assert np.isfinite(prediction[channel]).all()
+
+
+def test_what_travelled_to_another_process_predicts_the_same(system, theta):
+    traveled = pickle.loads(pickle.dumps(system))
+    for trial, arrived in zip(system.trials, traveled.trials, strict=True):
+        there = traveled.predict(theta, ("hysteresis",), arrived)
+        for channel, values in system.predict(theta, ("hysteresis",), trial).items():
+            assert np.array_equal(values, there[channel])
+
+
+def test_a_prediction_never_looks_at_what_was_measured(dataset, system, theta):
+    """Outputs replaced by rubbish: the same predictions."""
+    outputs = ("force_N", "pressure", "displacement_head", "displacement_tail")
+    rubbish = []
+    for trial in dataset.trials:
+        hidden = {
+            name: np.zeros_like(values)
+            if name.startswith(outputs) or (name == "displacement_mm" and trial.experiment == "step_response")
+            else values
+            for name, values in trial.columns.items()
+        }
+        rubbish.append(replace(trial, columns=hidden))
+    from bifa.problem.inputs import inputs_of
+
+    for trial, changed in zip(system.trials, rubbish, strict=True):
+        blind = replace(trial, payload=inputs_of(changed))
+        for channel, values in system.predict(theta, (), trial).items():
+            assert np.array_equal(values, system.predict(theta, (), blind)[channel])
+
+
+def test_what_is_said_not_to_matter_does_not(system, theta):
+    for trial in system.trials:
+        reference = system.predict(theta, (), trial)
+        for parameter in system.parameters:
+            if "_shape_" in parameter.name or system.matters(parameter.name, trial):
+                continue
+            moved = theta | {parameter.name: parameter.value + 0.01 * parameter.step_scale}
+            for channel, values in system.predict(moved, (), trial).items():
+                assert np.allclose(values, reference[channel], atol=1e-6), (parameter.name, trial.name)
+
+
+def test_mu_s_can_be_found_by_derivatives(system, theta):
+    """The peak of a pull lies between samples; a prediction that jumped would have no slope there."""
+    pull = next(t for t in system.trials if t.experiment == "anchor_pull" and t.payload.pressure_psi > 0)
+    slopes = []
+    for mu_s in np.linspace(0.44, 0.52, 41):
+        force = [system.predict(theta | {"mu_s": mu_s + d}, (), pull)["force_N"] for d in (-1e-4, 1e-4)]
+        slopes.append(np.abs(force[1] - force[0]).sum())
+    assert min(slopes) > 0.0
+
+
+@pytest.mark.parametrize("effect", sorted(engine_effects()))
+def test_effects_act_where_they_are_said_to(system, theta, effect):
+    parameters = system.effects[effect].parameters
+    active = theta | {f"{effect}.{p.name}": p.value for p in parameters}
+    for trial in system.trials:
+        without, with_ = system.predict(theta, (), trial), system.predict(active, (effect,), trial)
+        change = max(np.abs(with_[c] - without[c]).max() for c in without)
+        if trial.experiment not in system.effects[effect].experiments:
+            assert change < 1e-2, trial.name  # mm, N or psi: a tenth of the noise
+    shown = [t for t in system.trials if t.experiment in system.effects[effect].experiments]
+    assert any(
+        not np.allclose(system.predict(active, (effect,), t)[c], system.predict(theta, (), t)[c])
+        for t in shown
+        for c in t.channels
+    )
+
+
+def test_repeats_share_a_condition_and_friction_may_wobble(system):
+    nuisances = {t.experiment: [p.name for p in system.nuisances(t)] for t in system.trials}
+    assert nuisances["static_loading"] == []
+    assert nuisances["step_response"] == ["switch_late_s"], "the command column tells it to a sample, nothing else does"
+    assert nuisances["locomotion"] == ["friction_scale"]
+    assert nuisances["anchor_pull"] == ["friction_scale", "slip_late_s"]
+
+
+def test_regressors_have_a_value_for_every_sample(system, theta):
+    for trial in system.trials:
+        named = system.regressors(trial, system.predict(theta, (), trial))
+        assert "time" in named
+        assert "place in the session" in named
+        for name, values in named.items():
+            assert values.shape == trial.time_s.shape, name
+            assert np.isfinite(values).all(), name
+
+
+def test_candidates_can_be_predicted(system, theta):
+    found = {c.experiment for c in system.candidate_experiments()}
+    assert found == {"static_loading", "step_response", "anchor_pull", "locomotion"}
+    for candidate in system.candidate_experiments():
+        assert all(np.isnan(values).all() for values in candidate.trial.channels.values())
+    cheap = next(c for c in system.candidate_experiments() if c.experiment == "anchor_pull")
+    assert all(np.isfinite(v).all() for v in system.predict(theta, (), cheap.trial).values())
+
+
+def test_a_learnt_spring_adds_its_force(system, theta):
+    trial = system.trials[0]
+    site = system.correction_sites["body_spring"]
+    constant = Correction(site.name, np.full((1, 33), 2.5))
+    plain, more = (system.predict(theta, (), trial, corrections=c)["force_N"] for c in ((), (constant,)))
+    assert more - plain == pytest.approx(2.5, abs=1e-9)
+
+
+def test_the_identified_model_predicts_what_the_system_does(system, theta):
+    from bifa.simulate import static_loading
+
+    model = system.model_at(theta)
+    trial = system.trials[0]
+    inputs = trial.payload
+    path = (inputs.displacement_m - model.body_stiffness.contracted_m) * 1e3
+    record = static_loading(model, "large", inputs.time_s, path, inputs.pressure_psi)
+    assert record["force_N"] == pytest.approx(system.predict(theta, (), trial)["force_N"], abs=1e-9)
+
+
+def test_what_remembers_travel_sees_a_turn_between_samples(dataset, system, theta):
+    recorded, effect = dataset.trials[0], engine_effects()["hysteresis"]
+    loaded = theta | {effect.full_name(p): p.value for p in effect.parameters}
+    low_mm, half_s = recorded.columns["displacement_mm"].min(), 5.51  # it turns in the middle between two samples
+
+    def force(rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
+        time_s = np.arange(0.0, 2.0 * half_s, 1.0 / rate_hz)
+        path_mm = low_mm + 8.0 * np.minimum(time_s, 2.0 * half_s - time_s)
+        trial = replace(recorded, columns={"time_s": time_s, "displacement_mm": path_mm, "force_N": 0.0 * time_s})
+        record = replace(system.trials[0], time_s=time_s, channels={"force_N": 0.0 * time_s}, payload=inputs_of(trial))
+        return time_s, system.predict(loaded, ("hysteresis",), record)["force_N"]
+
+    coarse_s, coarse = force(50.0)
+    assert coarse == pytest.approx(np.interp(coarse_s, *force(10_000.0)), abs=0.01)
+
+
+def test_an_empty_data_set_is_refused():
+    with pytest.raises(UndeterminedError, match="no trials"):
+        prepare(Dataset(path=None, name="empty", known={}, trials=()))
+
+
+def test_knowledge_of_what_the_model_does_not_have_is_refused(dataset):
+    with pytest.raises(ModelParameterError, match="colour"):
+        prepare(replace(dataset, known=dataset.known | {"colour": 3.0}))
