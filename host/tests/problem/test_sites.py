@@ -8,7 +8,7 @@ from scipy.signal import lsim
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
-from bifa.problem.sites import corrected, learnt_curves, modules
+from bifa.problem.sites import SITES, corrected, learnt_curves
 from bifa.robot.learnt import ROWS
 from bifa.simulate import plant, vented_between
 from harness.independent_lab import BASELINE, Lab
@@ -46,17 +46,16 @@ def predict(system, theta, experiment, *corrections, effects=()):
     return system.predict(theta, effects, trial_of(system, experiment), corrections=corrections)
 
 
-def test_a_site_s_file_has_its_name_and_the_equations_have_its_rows():
-    assert all(module.SITE.name == name for name, module in modules().items())
-    in_equations = {name: len(module.SITE.rows) for name, module in modules().items() if module.SITE.equation}
+def test_the_equations_have_the_rows_of_their_sites():
+    in_equations = {name: len(site.rows) for name, site in SITES.items() if site.equation}
     assert in_equations == ROWS
 
 
 def test_a_curve_outside_the_equations_acts_somewhere():
     hooks = ("plant", "inputs", "readings")
-    for name, module in modules().items():
-        own = [hook for hook in hooks if hasattr(module, hook)]
-        assert len(own) == (0 if module.SITE.equation else 1), name
+    for name, site in SITES.items():
+        own = [hook for hook in hooks if getattr(site, hook)]
+        assert len(own) == (0 if site.equation else 1), name
 
 
 @pytest.mark.slow

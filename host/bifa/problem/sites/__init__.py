@@ -1,48 +1,43 @@
-"""Where a learnt curve may be added to the robot: in the equations, in what instruments say, over the day. One site a
-file; adding one adds a file."""
+"""Where a learnt curve may be added to the robot: in the equations, from trial to trial, in what instruments say. A new
+site is an entry in one of the tables."""
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Mapping, Sequence
-from functools import cache
-from types import MappingProxyType, ModuleType
 
 from bifa.problem.curves import FittedCurve
 from bifa.problem.inputs import Inputs
+from bifa.problem.sites import equations, instruments, trials
+from bifa.problem.sites.site import Range
 from bifa.robot import Model
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant
 from bifa.simulate.learnt_curves import with_curve
 from lacuna.system import Channels, Correction, CorrectionSite
 
-_NOT_A_SITE = "site"
-
-
-@cache
-def modules() -> Mapping[str, ModuleType]:
-    """Each site's module by the site's name, in alphabetical order."""
-    names = sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name != _NOT_A_SITE)
-    return MappingProxyType({name: importlib.import_module(f"{__name__}.{name}") for name in names})
+SITES = {
+    site.name: site for site in sorted((*equations.SITES, *trials.SITES, *instruments.SITES), key=lambda s: s.name)
+}
 
 
 def declared(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, CorrectionSite]:
     """The sites of a model; those over a spring's range have that of its fitted curve, if there is one."""
     springs = {"body": model.body_stiffness, "small": model.small_stiffness}
     fitted = {prefix: curves[prefix].fit if prefix in curves else spring for prefix, spring in springs.items()}
-    ends_m = {prefix: (spring.lower_m, spring.upper_m) for prefix, spring in fitted.items()}
-    return {name: module.SITE.declared(ends_m.get(module.SITE.over)) for name, module in modules().items()}
+    ends_m: dict[Range | str, tuple[float, float]] = {
+        prefix: (spring.lower_m, spring.upper_m) for prefix, spring in fitted.items()
+    }
+    return {name: site.declared(ends_m.get(site.over)) for name, site in SITES.items()}
 
 
 def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session: float = 0.0) -> Plant:
     """The plant with the learnt curves in it. place_in_session: 0 for the day's first trial, 1 for its last."""
     for correction in corrections:
-        module = modules()[correction.site]
-        if module.SITE.equation:
-            plant = with_curve(plant, correction.site, _curve(plant, correction))
-        elif act := getattr(module, "plant", None):
-            plant = act(plant, _curve(plant, correction), place_in_session)
+        site = SITES[correction.site]
+        if site.equation:
+            plant = with_curve(plant, site.name, _curve(plant, correction))
+        elif site.plant:
+            plant = site.plant(plant, _curve(plant, correction), place_in_session)
     return plant
 
 
@@ -51,7 +46,7 @@ def corrected_inputs(
 ) -> Inputs:
     """What was done to the robot, as it reached it: valves that switch late, a pipe that grips otherwise."""
     for correction in corrections:
-        if act := getattr(modules()[correction.site], "inputs", None):
+        if act := SITES[correction.site].inputs:
             inputs = act(inputs, _curve(plant, correction), place_in_session)
     return inputs
 
@@ -59,7 +54,7 @@ def corrected_inputs(
 def corrected_readings(channels: Channels, corrections: Sequence[Correction], inputs: Inputs, plant: Plant) -> Channels:
     """The channels with what the instruments add to them."""
     for correction in corrections:
-        if act := getattr(modules()[correction.site], "readings", None):
+        if act := SITES[correction.site].readings:
             channels = channels | act(channels, _curve(plant, correction), inputs, plant)
     return channels
 
@@ -67,11 +62,11 @@ def corrected_readings(channels: Channels, corrections: Sequence[Correction], in
 def learnt_curves(plant: Plant, corrections: Sequence[Correction]) -> dict[str, LearntCurve]:
     """Those of the corrections that are in the robot's equations, as a model has them; what is in the instruments or
     passes with the day is none of the robot's."""
-    return {c.site: _curve(plant, c) for c in corrections if modules()[c.site].SITE.equation}
+    return {c.site: _curve(plant, c) for c in corrections if SITES[c.site].equation}
 
 
 def _curve(plant: Plant, correction: Correction) -> LearntCurve:
-    over = modules()[correction.site].SITE.over
+    over = SITES[correction.site].over
     if isinstance(over, str):
         table = plant.body_curve if over == "body" else plant.small_curve
         return LearntCurve(float(table[0, 0]), float(table[0, 1]), correction.table)

@@ -1,22 +1,15 @@
-"""What every site's file declares: a `SITE`, and functions named after the places where a learnt curve acts.
-
-A curve of the robot's own equations (`equation`) needs no function: the integrator has it (`bifa.robot.learnt.ROWS`).
-Others have one or more of these, each of which gets the curve (`LearntCurve`) and returns what it gets with the curve
-in it. `place`: of the trial in the session, 0 for the day's first, 1 for its last.
-
-    plant(plant, curve, place)                      the robot of one trial
-    inputs(inputs, curve, place)                    what was done to it, as it reached it
-    readings(channels, curve, inputs, plant)        what the instruments say: those channels that change
-"""
+"""What a site declares, and what several have in common."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from bifa.problem.inputs import Inputs, StaticInputs
 from bifa.robot.learnt import LearntCurve
+from bifa.simulate import Plant
 from lacuna.system import Channels, CorrectionSite
 
 
@@ -39,7 +32,14 @@ DAY = Range("place in the session", 0.0, 1.0)
 @dataclass(frozen=True)
 class Site:
     """Where a curve may be learnt. `over`: a range, or the actuator ("body", "small") over whose spring's range it
-    goes; `scale`: how much of the term, in `unit`, matters; `rows`: one curve each; `equation`: of the robot's own."""
+    goes; `scale`: how much of the term, in `unit`, matters; `rows`: one curve each.
+
+    A curve of the robot's own equations (`equation`) needs no function: the integrator has it
+    (`bifa.robot.learnt.ROWS`). Others have one, which gets the curve and returns what it gets with the curve in it:
+    `plant(plant, curve, place)`, the robot of one trial; `inputs(inputs, curve, place)`, what was done to it, as it
+    reached it; `readings(channels, curve, inputs, plant)`, those channels that change. `place`: of the trial in the
+    session, 0 for the day's first, 1 for its last.
+    """
 
     name: str
     term: str
@@ -50,6 +50,9 @@ class Site:
     experiments: tuple[str, ...] = ()
     knots: int = 9
     equation: bool = False
+    plant: Callable[[Plant, LearntCurve, float], Plant] | None = None
+    inputs: Callable[[Inputs, LearntCurve, float], Inputs] | None = None
+    readings: Callable[[Channels, LearntCurve, Inputs, Plant], Channels] | None = None
 
     def declared(self, ends_m: tuple[float, float] | None) -> CorrectionSite:
         """As the engine knows it; `ends_m`: of the spring's range, where the curve goes over that."""

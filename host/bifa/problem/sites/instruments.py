@@ -1,0 +1,139 @@
+"""What instruments add to what they measure: readings by value, by place, by what came before."""
+
+import numpy as np
+
+from bifa.problem.inputs import STATIC, STEP, WALK, Inputs, StepInputs, WalkInputs
+from bifa.problem.sites.site import PLACE, PRESSURE, Range, Site, loading, pressures, remembered, row_of
+from bifa.robot.cpg import CHAMBERS
+from bifa.robot.learnt import LearntCurve
+from bifa.simulate import Plant, layout
+from lacuna.system import Channels
+
+_SEEN = ("displacement_head", "displacement_tail")
+_ROWS = {"displacement_head_mm": 0, "displacement_tail_mm": 1, "displacement_mm": 0}  # the body moves the head's end
+_JUST_S = 1e-6
+_PAIRS = tuple((mine, other) for mine in range(3) for other in range(3) if mine != other)
+
+
+def _camera(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    return {name: mm + 1e3 * curve.at(1e-3 * mm) for name, mm in channels.items() if name.startswith(_SEEN)}
+
+
+def _camera_memory(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    if not isinstance(inputs, (StepInputs, WalkInputs)):
+        return {}
+    rows = {"displacement_mm": 2} if inputs.actuator == "small" else _ROWS
+    return {name: remembered(mm, inputs.time_s, curve, rows[name]) for name, mm in channels.items() if name in rows}
+
+
+def _body_loading(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    return loading(channels, curve, inputs, "large")
+
+
+def _small_loading(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    return loading(channels, curve, inputs, "small")
+
+
+def _pressure_sensor(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    return {name: psi + curve.at(psi) for name, psi in pressures(channels)}
+
+
+def _pressure_sensor_inflow(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    if not isinstance(inputs, (StepInputs, WalkInputs)):
+        return {}
+    vacuum_psi = plant.q[layout.SUPPLY_NEGATIVE]
+    if isinstance(inputs, WalkInputs):  # begins vented,
+        positive_psi, rest_psi = plant.q[layout.SUPPLY_POSITIVE], 0.0
+    else:  # a step response under vacuum
+        positive_psi, rest_psi = inputs.pressure_psi, vacuum_psi
+    before = inputs.commands.at(inputs.time_s - _JUST_S)  # a sample at a switch does not see it yet
+    let_in = np.array([vacuum_psi, positive_psi, rest_psi])[before]
+    return {
+        name: psi + curve.at(let_in[:, chamber] - psi, row_of(name, inputs))
+        for chamber, (name, psi) in enumerate(pressures(channels))
+    }
+
+
+def _pressure_sensor_memory(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    if not isinstance(inputs, (StepInputs, WalkInputs)):
+        return {}
+    return {name: remembered(psi, inputs.time_s, curve, row_of(name, inputs)) for name, psi in pressures(channels)}
+
+
+def _pressure_sensor_others(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    if not isinstance(inputs, WalkInputs):
+        return {}
+    psi = [channels[f"pressure_{chamber}_psi"] for chamber in CHAMBERS]
+    found = {}
+    for mine, chamber in enumerate(CHAMBERS):
+        rows = [(row, other) for row, (one, other) in enumerate(_PAIRS) if one == mine]
+        found[f"pressure_{chamber}_psi"] = psi[mine] + sum(curve.at(psi[other], row) for row, other in rows)
+    return found
+
+
+SITES = (
+    Site("camera", "what the motion capture says", PLACE, "m", 0.002, experiments=(WALK,), readings=_camera),
+    Site(
+        "camera_memory",
+        "what the motion capture says by how the displacement has changed, by how long ago",
+        Range("time ago (s)", 0.0, 1.2),
+        "m/m",
+        0.1,
+        rows=("head", "tail", "small"),
+        experiments=(STEP, WALK),
+        knots=61,
+        readings=_camera_memory,
+    ),
+    Site(
+        "body_loading",
+        "force of the large actuator's spring while it is loaded slowly, by direction",
+        "body",
+        "N",
+        1.0,
+        rows=("extending", "contracting"),
+        experiments=(STATIC,),
+        readings=_body_loading,
+    ),
+    Site(
+        "small_loading",
+        "force of the small actuator's spring while it is loaded slowly, by direction",
+        "small",
+        "N",
+        1.0,
+        rows=("extending", "contracting"),
+        experiments=(STATIC,),
+        readings=_small_loading,
+    ),
+    Site("pressure_sensor", "what the pressure sensors say", PRESSURE, "psi", 0.1, readings=_pressure_sensor),
+    Site(
+        "pressure_sensor_inflow",
+        "what the pressure sensors say by how far the chamber is from what the valve lets in",
+        Range("pressure drop (psi)", -25.0, 25.0),
+        "psi",
+        0.1,
+        rows=("large", "small"),
+        experiments=(STEP, WALK),
+        readings=_pressure_sensor_inflow,
+    ),
+    Site(
+        "pressure_sensor_memory",
+        "what the pressure sensors say by how the pressure has changed, by how long ago",
+        Range("time ago (s)", 0.0, 0.4),
+        "psi/psi",
+        0.1,
+        rows=("large", "small"),
+        experiments=(STEP, WALK),
+        knots=17,
+        readings=_pressure_sensor_memory,
+    ),
+    Site(
+        "pressure_sensor_others",
+        "what the pressure sensors say by the pressure of each other chamber",
+        PRESSURE,
+        "psi",
+        0.1,
+        rows=tuple(f"{CHAMBERS[mine]} by {CHAMBERS[other]}" for mine, other in _PAIRS),
+        experiments=(WALK,),
+        readings=_pressure_sensor_others,
+    ),
+)

@@ -1,0 +1,86 @@
+"""What differs from trial to trial: parameters that change over the day, and what was done to the robot."""
+
+from dataclasses import replace
+
+from bifa.problem.inputs import ANCHOR, STEP, WALK, Inputs, PullInputs, StepInputs, WalkInputs
+from bifa.problem.sites.site import DAY, Range, Site
+from bifa.problem.switches import delayed
+from bifa.robot.learnt import LearntCurve
+from bifa.simulate import Plant, layout
+
+
+def _area_of_the_day(plant: Plant, curve: LearntCurve, place: float) -> Plant:
+    q = plant.q.copy()
+    q[[layout.BODY + layout.AREA, layout.SMALL + layout.AREA]] *= 1.0 + curve.at(place)
+    return plant._replace(q=q)
+
+
+def _friction_of_the_day(plant: Plant, curve: LearntCurve, place: float) -> Plant:
+    q = plant.q.copy()
+    q[[layout.MU_S, layout.MU_K]] *= 1.0 + curve.at(place)
+    return plant._replace(q=q)
+
+
+def _vacuum_of_the_day(plant: Plant, curve: LearntCurve, place: float) -> Plant:
+    q = plant.q.copy()
+    q[layout.SUPPLY_NEGATIVE] += curve.at(place)
+    return plant._replace(q=q)
+
+
+def _valves(inputs: Inputs, curve: LearntCurve, place: float) -> Inputs:
+    if not isinstance(inputs, (StepInputs, WalkInputs)):
+        return inputs
+    to_vacuum, to_positive = (float(curve.at(place, row)) for row in (0, 1))
+    return replace(inputs, commands=delayed(inputs.commands, to_vacuum, to_positive))
+
+
+def _grip_pulled(inputs: Inputs, curve: LearntCurve, place: float) -> Inputs:
+    if not isinstance(inputs, PullInputs):
+        return inputs
+    pulled_m = 1e-3 * inputs.pulled_s * abs(inputs.rate_mm_s)
+    return replace(inputs, grip=1.0 + curve.at(pulled_m, 0 if inputs.rate_mm_s > 0.0 else 1))
+
+
+SITES = (
+    Site("area_of_the_day", "the area a of eq. (2), as the day goes on", DAY, "", 0.01, plant=_area_of_the_day),
+    Site(
+        "friction_of_the_day",
+        "the friction's coefficients, as the day goes on",
+        DAY,
+        "",
+        0.01,
+        experiments=(ANCHOR, WALK),
+        plant=_friction_of_the_day,
+    ),
+    Site(
+        "vacuum_of_the_day",
+        "the vacuum, as the day goes on",
+        DAY,
+        "psi",
+        0.1,
+        experiments=(STEP, WALK),
+        plant=_vacuum_of_the_day,
+    ),
+    Site(
+        "valves",
+        "when the valves switch",
+        DAY,
+        "s",
+        0.005,
+        rows=("to vacuum", "to positive"),
+        experiments=(STEP, WALK),
+        knots=2,
+        inputs=_valves,
+    ),
+    Site(
+        "grip_pulled",
+        "friction coefficient of a pulled end, eq. (5), by how far it was pulled",
+        Range("pulled distance (m)", 0.0, 0.08),
+        "",
+        0.03,
+        rows=("forward", "backward"),
+        experiments=(ANCHOR,),
+        knots=33,
+        inputs=_grip_pulled,
+    ),
+)
