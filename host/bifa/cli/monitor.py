@@ -97,13 +97,14 @@ def _fly(
     later: "Callable[[Uno], None]",
 ) -> None:
     """Serve the page and fly until Ctrl-C or for `seconds`."""
-    from bifa.live.web.flights import fly
-    from bifa.live.web.pilot import Pilot
-    from bifa.live.web.server import LivePage, served
-    from bifa.report.live_page import live_page
+    with console.status("starting the page"):
+        from bifa.live.web.flights import fly
+        from bifa.live.web.pilot import Pilot
+        from bifa.live.web.server import LivePage, served
+        from bifa.report.live_page import live_page
 
-    pilot = Pilot()
-    page = LivePage(pilot, live_page(), model)
+        pilot = Pilot()
+        page = LivePage(pilot, live_page(), model)
     pilot.is_watched = page.is_watched
 
     def say(text: str) -> None:

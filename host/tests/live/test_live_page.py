@@ -20,6 +20,8 @@ expect = pytest.importorskip("playwright.sync_api", reason="playwright is not in
 
 LOOKS = (Path(__file__).parents[1] / "report" / "looks.js").read_text(encoding="utf-8")
 
+PATIENCE_MS = 60_000  # a prediction lets everything else go first
+
 
 @pytest.fixture
 def monitor():
@@ -58,10 +60,10 @@ def test_a_slider_predicts_apply_changes_the_robot_and_stop_says_when_it_has(mon
     page = tab(bifa.url)
     assert bifa.until("running") == "running"
     predicted = page.locator("#predicted")
-    expect(predicted).to_contain_text("10.8")
+    expect(predicted).to_contain_text("10.8", timeout=PATIENCE_MS)
     page.locator("input[name=period_s]").fill("4.5")
     expect(predicted).not_to_contain_text("10.8")
-    assert re.search(r"predicts \d+\.\d\d mm/s, with \d+\.\d\d mm of slip", predicted.inner_text())
+    expect(predicted).to_have_text(re.compile(r"predicts \d+\.\d\d mm/s.*; \d+\.\d\d mm of slip"), timeout=PATIENCE_MS)
     assert bifa.gait()["period_s"] == pytest.approx(5.7), "nothing changes before it is applied"
     page.get_by_role("button", name="Apply").click()
     page.get_by_text("applied;").wait_for()
@@ -93,7 +95,8 @@ def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(m
     bifa = monitor("--run", port=str(port), uno=first)
     page = tab(bifa.url)
     first.unplug()
-    page.locator("#state", has_text="the robot is gone").wait_for()
+    expect(page.locator("#state")).to_have_text("the robot is gone")
+    expect(page.locator("#alarm")).to_have_text(re.compile(f"^{port} is gone; plug the Uno in again"))
     assert page.locator("#alarm").evaluate("box => box.classList.contains('loud')")
     page.get_by_role("button", name="Stop", exact=True).click()
     expect(page.locator("#said")).to_contain_text("NOT CONFIRMED")
@@ -110,6 +113,17 @@ def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(m
     bifa.process.send_signal(signal.SIGINT)
     bifa.process.wait(15)
     assert second.board.valves == 0
+
+
+def test_a_server_that_ends_while_the_robot_is_gone_leaves_no_page_that_waits_for_it(monitor, tab):
+    bifa = monitor("--run")
+    page = tab(bifa.url)
+    bifa.uno.unplug()
+    expect(page.locator("#state")).to_have_text("the robot is gone")
+    bifa.process.kill()
+    expect(page.locator("#state")).to_have_text("not connected")
+    expect(page.locator("#alarm")).to_contain_text("bifa monitor does not answer: what is shown is old.")
+    expect(page.locator("#alarm")).to_contain_text("is gone; plug the Uno in again")
 
 
 def test_a_robot_that_is_gone_while_nobody_watches_ends_the_command(monitor):
@@ -200,7 +214,7 @@ def test_a_page_of_an_earlier_server_says_so_and_still_stops(monitor, tab):
 def test_two_tabs_show_the_same(monitor, tab):
     bifa = monitor("--run")
     one, other = tab(bifa.url), tab(bifa.url)
-    expect(other.locator("#predicted")).to_contain_text("10.8")
+    expect(other.locator("#predicted")).to_contain_text("10.8", timeout=PATIENCE_MS)
     one.locator("input[name=period_s]").fill("4.5")
     for page in (one, other):
         expect(page.locator("#predicted")).not_to_contain_text("10.8")
@@ -255,6 +269,52 @@ def test_the_page_is_legible_wide_and_narrow_light_and_dark(monitor, tab):
             page.emulate_media(color_scheme=scheme)
             page.wait_for_timeout(300)
             assert page.evaluate(LOOKS) == []
+
+
+CONTROLS = r"- (?:button|slider|spinbutton|combobox|textbox|checkbox|progressbar)\b.*"
+
+
+def test_who_hears_the_page_is_told_what_every_control_is(monitor, tab):
+    bifa = monitor("--run")
+    page = tab(bifa.url)
+    bifa.until("running")
+    heard = page.locator("body").aria_snapshot()
+    controls = re.findall(CONTROLS, heard)
+    assert len(controls) >= 6 + 6 + 3 + 8
+    assert [control for control in controls if not re.match(r'- \w+ "[^"]+"', control)] == []
+    assert len(re.findall(r"- (?:status|alert)\b", heard)) <= 5, "what is no news is not spoken"
+    assert not re.search(r"\d\.\d{5}", heard), "no phase of fifteen digits"
+
+
+def test_the_keyboard_alone_sets_a_gait_and_stops(monitor, tab):
+    bifa = monitor("--run")
+    page = tab(bifa.url)
+    assert bifa.until("running") == "running"
+    expect(page.locator("input[name=period_s]")).to_be_enabled()
+    focused = "document.activeElement.id || document.activeElement.name || document.activeElement.dataset.do"
+    reached = []
+    while "apply" not in reached:
+        page.keyboard.press("Tab")
+        reached.append(page.evaluate(focused))
+        assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") != "none", reached
+        if reached[-1] == "period_s":
+            page.keyboard.press("ArrowRight")
+        assert len(reached) < 30
+    assert reached[:2] == ["stop", "period_s"], "to stop is first"
+    page.keyboard.press("Enter")
+    page.get_by_text("applied;").wait_for()
+    assert bifa.gait()["period_s"] > 5.7
+    for _ in reached[1:]:
+        page.keyboard.press("Shift+Tab")
+    assert page.evaluate(focused) == "stop"
+    page.keyboard.press("Space")
+    assert bifa.until("stopped") == "stopped"
+    assert page.complaints == []
+
+
+def test_what_is_drawn_begins_when_the_uno_does(monitor, tab):
+    page = tab(monitor().url)
+    assert page.evaluate("Chart.getChart(document.querySelector('#plot canvas')).scales.x.min") >= 0.0
 
 
 def test_a_port_that_is_taken_is_refused_with_what_to_do(monitor):

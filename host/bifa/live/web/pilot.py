@@ -152,7 +152,7 @@ class Pilot:
 
     def _gone(self, error: Exception, tell: Tell) -> None:
         self._ended = f"the robot is gone: {error}"
-        tell({"gone": self._ended, "robot": "gone"}, [])
+        tell({"gone": str(error), "robot": "gone"}, [])
 
     def _take_off(self, came_back: str) -> None:
         with self._lock:

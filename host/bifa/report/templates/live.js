@@ -9,7 +9,7 @@
   const sliders = [...document.querySelectorAll("input[type=range]")];
   const chambers = [...document.querySelectorAll("[data-chamber]")].map((row) => row.dataset.chamber);
   const SHOWN_S = 20, LEVEL = { vacuum: 0, off: 0.5, positive: 1, both: 1 };
-  const OLD = "bifa monitor does not answer: what is shown is old";
+  const OLD = "bifa monitor does not answer: what is shown is old.";
   const STALE = "This page is of an earlier bifa monitor: open the address that the terminal prints now. Stop works here all the same.";
   // who listens to a page is told of changes, not ten times a second of what is as it was
   const tell = (element, text) => { if (element.textContent !== text) element.textContent = text; };
@@ -116,9 +116,11 @@
     for (const output of document.querySelectorAll("[data-robot]")) if (robot) tell(output, String(rounded(robot[output.dataset.robot])));
     showDraft();
     const differs = robot && live.draft && sliders.some(({ name }) => Math.abs(live.draft.gait[name] - robot[name]) > 6e-4);
-    tell(unsent, live.is_pending ? "The robot takes its new gait at its next cycle." : differs ? "Not sent: the robot walks another gait than the sliders show." : robot ? "The sliders show the robot's gait." : "");
+    tell(unsent, live.is_pending ? "The robot takes its new gait at its next cycle." : differs ? "Not sent: the robot has another gait than the sliders show." : robot ? "The sliders show the robot's gait." : "");
     const found = live.prediction;
-    if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.foretold || `${found.speed_mm_s.toFixed(2)} mm/s`}, with ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
+    const isAsked = live.draft && (!found || sliders.some(({ name }) => found.gait[name] !== live.draft.gait[name]));
+    if (isAsked) tell(predicted, "Predicting the speed of this gait…");
+    else if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.foretold || `${found.speed_mm_s.toFixed(2)} mm/s`}; ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
     const there = Object.keys(live.presets || {});
     if (there.join() !== [...presets.options].map((option) => option.value).join()) presets.replaceChildren(...there.map((name) => new Option(name)));
     return differs;
@@ -134,9 +136,10 @@
   };
 
   const show = () => {
-    tell(state, live.gone || (live.robot === "connecting" ? "waiting for the robot" : live.warning ? `${live.robot}: ${live.warning}` : live.robot));
+    tell(state, live.gone ? "the robot is gone" : (live.robot === "connecting" ? "waiting for the robot" : live.warning ? `${live.robot}: ${live.warning}` : live.robot));
     tell(clock, live.gone || live.uno_s === undefined ? "" : `, ${live.uno_s.toFixed(1)} s`);
     state.classList.toggle("wrong", Boolean(live.gone || live.warning));
+    document.body.classList.toggle("old", Boolean(live.gone));
     tell(alarm, you.is_stale ? STALE : live.gone || stopWords(live.stopped));
     alarm.classList.toggle("loud", Boolean(you.is_stale || live.gone || (live.stopped && live.stopped.is_confirmed === false)));
     tell(link, live.link || "–");
@@ -145,7 +148,9 @@
       if (!now) continue;
       tell(row.querySelector(".psi"), now.psi.toFixed(2));
       tell(row.querySelector(".valves"), now.valves);
-      row.querySelector("progress").value = now.phase_rad / (2 * Math.PI);
+      const phase = row.querySelector("progress"), share = now.phase_rad / (2 * Math.PI);
+      phase.value = share;
+      phase.setAttribute("aria-valuetext", `${Math.round(360 * share)}°`);
     }
     if (live.position_mm) {
       const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "not for a cycle yet" : live.settled || `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
@@ -202,7 +207,7 @@
     const now = times.length ? times[times.length - 1] : 0;
     for (const one of panels) {
       for (const curve of one.data.datasets) { const [x, y] = curve.points(); curve.data = x.map((t, i) => ({ x: t, y: y[i] })); }
-      Object.assign(one.options.scales.x, { min: now - SHOWN_S, max: now });
+      Object.assign(one.options.scales.x, { min: Math.max(now - SHOWN_S, 0), max: Math.max(now, SHOWN_S) });
       one.update("none");
     }
     if (times.length) document.documentElement.dataset.drawn = times.length;
@@ -223,7 +228,12 @@
   const lost = () => {
     for (const waits of waiting.values()) waits.reject(new Error("bifa monitor does not answer; it may have ended"));
     waiting.clear();
-    if (!live || !live.gone) { tell(state, "not connected"); tell(clock, ""); tell(alarm, OLD); state.classList.add("wrong"); alarm.classList.add("loud"); }
+    tell(state, "not connected");
+    tell(clock, "");
+    tell(alarm, live && live.gone ? `${live.gone}.\n${OLD}` : OLD);
+    state.classList.add("wrong");
+    alarm.classList.add("loud");
+    document.body.classList.add("old");
     for (const control of document.querySelectorAll("[data-do], form input, form select, #revert")) control.disabled = true;
     setTimeout(connect, 1000);
   };
