@@ -79,6 +79,7 @@ lint: $(python) $(stamps)/lint
 	check "ruff format in host/" sh -c 'cd host && ../$(bin)/ruff format --quiet --check .'
 	check "ruff format in tools/ and schema/" $(bin)/ruff format --quiet --check $(ruff_elsewhere)
 	check "types" sh -c 'cd host && ../$(bin)/mypy --no-error-summary'
+	check "names" $(bin)/python tools/names.py
 	check "import rules" sh -c 'cd host && ../$(bin)/lint-imports --no-cache >../build/imports.txt 2>&1 || { cat ../build/imports.txt; exit 1; }'
 	check "clang-format" clang-format --dry-run -Werror $(cpp_files)
 	check "lib/ knows no Arduino" tools/check-includes.sh

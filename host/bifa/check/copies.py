@@ -8,10 +8,10 @@ from bifa.check.finding import Finding
 from bifa.data import Dataset
 
 
-def check_copies(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[Finding]:
-    """Trials whose displacement or force is that of an earlier one of the experiment; `besides`: files told of."""
+def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
+    """Trials whose displacement or force is that of an earlier one of the experiment; `skipped`: files told of."""
     first: dict[tuple[str, str, bytes], str] = {}
-    for trial in (trial for trial in dataset.trials if trial.file not in besides):
+    for trial in (trial for trial in dataset.trials if trial.file not in skipped):
         for name, values in trial.columns.items():
             if not name.startswith(("displacement", "force")) or np.ptp(values) == 0.0:
                 continue

@@ -33,9 +33,9 @@ class _Group:
     ranges: dict[str, float]
 
 
-def check_repeats(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[Finding]:
-    """`besides`: files in which a mistake is known already; they are compared with nothing."""
-    kept = [[trial for trial in group if trial.file not in besides] for group in dataset.repeats()]
+def check_repeats(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
+    """`skipped`: files in which a mistake is known already; they are compared with nothing."""
+    kept = [[trial for trial in group if trial.file not in skipped] for group in dataset.repeats()]
     groups = [_compared(group) for group in kept if len(group) > 1]
     for group in groups:
         usual = _usual(group, groups)

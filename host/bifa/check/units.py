@@ -55,16 +55,16 @@ def check_units(trial: Trial) -> Iterator[Finding]:
             yield Finding("unit", text + _or_else(long_mm, 60.0, _MM), trial.file, column="displacement_head_mm")
 
 
-def check_strokes(dataset: Dataset, besides: Collection[str] = ()) -> Iterator[Finding]:
-    """The camera's stroke against the cross-head's, of the same actuator; `besides`: files that are wrong already."""
+def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
+    """The camera's stroke against the cross-head's, of the same actuator; `skipped`: files that are wrong already."""
     strokes = {}
     for actuator in _KINDS:
-        found = [_stroke_mm(t) for t in dataset.of("static_loading", actuator) if t.file not in besides]
+        found = [_stroke_mm(t) for t in dataset.of("static_loading", actuator) if t.file not in skipped]
         if found:
             strokes[actuator] = float(np.median(found))
     for trial in dataset.trials:
         shown, seen_mm, column = _seen(trial)
-        if shown is None or shown not in strokes or trial.file in besides:
+        if shown is None or shown not in strokes or trial.file in skipped:
             continue
         moved_mm = float(np.ptp(seen_mm))
         share = moved_mm / strokes[shown]

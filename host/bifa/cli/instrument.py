@@ -75,7 +75,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
     import numpy as np
 
     from bifa.data.errors import DatasetError
-    from bifa.measure.sketch import panel
+    from bifa.measure.text_plot import panel
     from bifa.report.page import Table
     from bifa.report.terminal import print_table
 

@@ -21,7 +21,7 @@ from bifa.measure.experiments import record_trial
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import idle
-from bifa.measure.sketch import sketch
+from bifa.measure.text_plot import text_plot
 from bifa.rig import Rig
 
 _REPEAT = ("r", "repeat")
@@ -92,7 +92,7 @@ class ByHand:
                 return trial
 
     def _accepted(self, rig: Rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
-        for line in sketch(trial, self._plain):
+        for line in text_plot(trial, self._plain):
             self._desk.say(line)
         wrong = [str(finding) for finding in check_trial(trial)]
         if misfit := misfit_of(trial, writer.trials):

@@ -15,7 +15,7 @@ _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))  # by column and ro
 _MARGIN = 8  # characters for the axis's numbers
 
 
-def sketch(trial: Trial, plain: bool = False) -> list[str]:
+def text_plot(trial: Trial, plain: bool = False) -> list[str]:
     """Lines of at most 80 characters: force over displacement, or displacement and pressure over time.
 
     plain: only ASCII.
