@@ -1,33 +1,10 @@
 """Where an effect may act: the hooks, and the chains of all effects' functions that the integrator calls.
 
 An effect's file defines functions named after hooks. Their arguments are found by name: the effect's own
-parameters, what the hook offers (below), and `state`, the number remembered for each actuator. Each chain calls
+parameters, what the hook offers, and `state`, the number remembered for each actuator. Each chain calls
 the active effects in alphabetical order; an effect costs one test of a bit while it is inactive.
 
-| hook | returns | offered |
-|---|---|---|
-| `delay` | s from command to switch | `to_positive` |
-| `supply` | supply pressure now | `supply_psi`, `now_s` |
-| `load` | supply pressure under load | `supply_psi`, `conductance_per_s`, `pull_psi_per_s`, `positive` |
-| `line` | chamber's inlet pressure after the step, kept as `state` | `source_psi`, `step_s` |
-| `filling` | convergence factor alpha of (2) | `rate_per_s`, `pressure_psi`, `inlet_psi`, `volume_share` |
-| `loss` | 1/s of pressure lost | `pressure_psi` |
-| `area` | factor of the area a | `stroke_share` |
-| `air` | factor of the pressure as the area changes over a step | `area_ratio` (before over after) |
-| `play` | position of the spring | `position_m` |
-| `play_state` | new `state` | `position_m` |
-| `spring` | force now, its growth per velocity over the step | `small`, `direction`, `step_s` |
-| `spring_state` | new `state` | `travel_m`, `step_s` |
-| `friction` | coefficient at a speed | `coefficient`, `static_coefficient`, `sliding_m_s` |
-| `grip` | factor of both coefficients | `direction` (+1 or -1) |
-| `drag` | N of friction at the tail | `distance_m` |
-| `incline` | radians uphill | |
-| `slack` | m before a load train pulls | |
-| `sensed` | pressure where the sensor sits | `pressure_psi`, `source_psi` |
-| `sensor` | new `state`, which is then read | `before_psi`, `after_psi`, `step_s` |
-| `reading` | what the sensor says | `pressure_psi` |
-| `stamp` | s by which displacements are recorded late | |
-| `initial` | first `state` (0 without this hook) | `position_m`, `pressure_psi` |
+What each hook returns, and in which unit, is in docs/adding-an-effect.md.
 """
 
 from __future__ import annotations
@@ -39,8 +16,8 @@ from bifa.effects import EffectError
 from bifa.simulate import generated, layout
 
 _STATEFUL = ("z", "actuator")
-# hook: (arguments of the chain, how the effects' results combine)
-_HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
+# hook: (arguments of the chain, offered to effects unless hidden; how the effects' results combine)
+HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "delay": (("to_positive",), "sum"),
     "supply": (("supply_psi", "now_s"), "replace"),
     "load": (("supply_psi", "conductance_per_s", "pull_psi_per_s", "positive"), "replace"),
@@ -64,7 +41,7 @@ _HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "stamp": ((), "sum"),
     "initial": ((*_STATEFUL, "position_m", "pressure_psi"), "first"),
 }
-_HIDDEN = {"z", "z_new", "actuator"}
+HIDDEN = {"z", "z_new", "actuator"}
 
 
 def chain_source() -> str:
@@ -75,24 +52,24 @@ def chain_source() -> str:
         lines.append(f"import bifa.effects.{name} as {name}")
     lines.append("")
     users: dict[str, list[str]] = {}
-    for hook in _HOOKS:
+    for hook in HOOKS:
         users[hook] = [name for name, module in modules.items() if inspect.isfunction(getattr(module, hook, None))]
         for name in users[hook]:
             lines.append(f'{hook}_of_{name} = njit(error_model="numpy")({name}.{hook})')
         lines.append(f"{hook.upper()} = {sum(1 << layout.effect_bit(name) for name in users[hook])}")
     idle = [name for name in modules if not any(name in names for names in users.values())]
     if idle:
-        raise EffectError(f"{', '.join(idle)} acts nowhere: no function is named after a hook ({', '.join(_HOOKS)})")
+        raise EffectError(f"{', '.join(idle)} acts nowhere: no function is named after a hook ({', '.join(HOOKS)})")
     for hook, names in users.items():
         lines += _chain(hook, names)
     return "\n".join(lines) + "\n"
 
 
 def _chain(hook: str, names: list[str]) -> list[str]:
-    arguments, combine = _HOOKS[hook]
+    arguments, combine = HOOKS[hook]
     value = {"sum": "total", "product": "total", "pair": "total, growth"}.get(combine, "")
     if combine in ("replace", "keep"):
-        value = next(argument for argument in arguments if argument not in _HIDDEN)
+        value = next(argument for argument in arguments if argument not in HIDDEN)
     body = {"sum": ["total = 0.0"], "product": ["total = 1.0"], "pair": ["total = 0.0", "growth = 0.0"]}.get(
         combine, []
     )
@@ -117,8 +94,8 @@ def _call(hook: str, name: str, combine: str, value: str) -> list[str]:
     effect = effects.library()[name]
     state = f"[{layout.state_slot(name)} + actuator]" if effect.states else None
     own = {parameter.name: f"q[{layout.index(f'{name}.{parameter.name}')}]" for parameter in effect.parameters}
-    offered = {argument: argument for argument in _HOOKS[hook][0] if argument not in _HIDDEN}
-    if state and "actuator" in _HOOKS[hook][0]:
+    offered = {argument: argument for argument in HOOKS[hook][0] if argument not in HIDDEN}
+    if state and "actuator" in HOOKS[hook][0]:
         offered["state"] = f"z{state}"
     given = []
     for argument in inspect.signature(getattr(effects.modules()[name], hook)).parameters:
