@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import cpp_commands
+import cpp_constants
 import cpp_parameters
 import doc_parameters
 import doc_tables
@@ -14,7 +15,7 @@ import phrases
 import py_ranges
 import py_tables
 import py_version
-from tables import WIRE_BYTES, command_table, parameter_table, table_hash
+from tables import WIRE_BYTES, command_table, constants, parameter_table, table_hash
 
 ROOT = Path(__file__).parent.parent
 
@@ -32,6 +33,7 @@ def generated() -> dict[Path, str]:
         ROOT / "docs/parameters.md": doc_parameters.page(parameters, commands),
         ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
         ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters, packed),
+        ROOT / "lib/constants/constants.h": cpp_constants.header(constants()),
         ROOT / "lib/commands/command_table.h": cpp_commands.command_header(commands),
         ROOT / "lib/commands/command_table.cpp": cpp_commands.command_source(commands, packed),
         ROOT / "lib/text/phrase_table.cpp": cpp_commands.phrase_source(common),
@@ -41,7 +43,7 @@ def generated() -> dict[Path, str]:
         ROOT / "host/lacuna/version.py": py_version.module(commands),
         ROOT / "host/virtual_robot/version.py": py_version.module(commands, py_version.GPL),
         ROOT / "host/bifa/ranges.py": py_ranges.module(parameters),
-        ROOT / "host/bifa/link/table.py": py_tables.module(parameters, commands, agreed),
+        ROOT / "host/bifa/link/table.py": py_tables.module(parameters, commands, constants(), agreed),
     }
 
 

@@ -1,6 +1,6 @@
 """Writes host/bifa/link/table.py."""
 
-from tables import NAME_BYTES, WIRE_BYTES, CommandTable, Message, ParameterTable
+from tables import NAME_BYTES, WIRE_BYTES, CommandTable, Constant, Message, ParameterTable
 
 _FORMAT = {"u8": "B", "u16": "H", "i16": "h", "u32": "I", "name": f"{NAME_BYTES}s"}
 
@@ -18,7 +18,12 @@ def _plural(name: str) -> str:
     return "".join("_" * (c.isupper() and i > 0) + c.upper() for i, c in enumerate(name)) + "S"
 
 
-def module(parameters: ParameterTable, commands: CommandTable, table_hash: int) -> str:
+def _constant(constant: Constant) -> str:
+    name = "_".join(part for part in (constant.name, constant.unit) if part).upper()
+    return f"{name} = {constant.value}  # {constant.help}"
+
+
+def module(parameters: ParameterTable, commands: CommandTable, constants: tuple[Constant, ...], table_hash: int) -> str:
     set_size = sum(WIRE_BYTES[p.wire] for p in parameters.parameters)
     rows = "\n".join(
         f"    UnoParameter({p.name!r}, {p.unit!r}, {p.decimals}, {p.minimum}, {p.maximum}, {p.default},\n"
@@ -62,6 +67,9 @@ class Message(NamedTuple):
 PROTOCOL_VERSION = {commands.protocol_version}
 TABLE_HASH = 0x{table_hash:08X}
 NAME_BYTES = {NAME_BYTES}
+
+# the firmware's own numbers
+{chr(10).join(map(_constant, constants))}
 
 PARAMETERS = (
 {rows}

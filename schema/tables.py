@@ -99,6 +99,17 @@ class CommandTable:
     words: dict[str, list[str]]
 
 
+@dataclass(frozen=True)
+class Constant:
+    """A number of the firmware's that the host has to know."""
+
+    name: str
+    wire: str
+    value: int
+    help: str
+    unit: str = ""
+
+
 def _load(name: str) -> dict:
     return tomllib.loads((FOLDER / name).read_text(), parse_float=Decimal)
 
@@ -108,6 +119,15 @@ def _to_wire(value: int | Decimal, decimals: int) -> int:
     if scaled != int(scaled):
         raise ValueError(f"{value} has more than {decimals} decimals")
     return int(scaled)
+
+
+def constants() -> tuple[Constant, ...]:
+    """The constants of constants.toml."""
+    found = tuple(Constant(**row) for row in _load("constants.toml")["constant"])
+    for constant in found:
+        if not 0 <= constant.value < 1 << 8 * WIRE_BYTES[constant.wire]:
+            raise ValueError(f"{constant.name} does not fit {constant.wire}")
+    return found
 
 
 def parameter_table() -> ParameterTable:

@@ -18,8 +18,6 @@
 
 namespace bifa {
 
-const uint8_t kMarkPause = 10;  ///< strobes that a mark leaves out
-
 /// What became of a request.
 enum class Verdict : uint8_t {
   kDone,

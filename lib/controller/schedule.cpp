@@ -3,7 +3,7 @@
 namespace bifa {
 
 bool Schedule::add(uint32_t time_ms, Chamber chamber, ChamberState state) {
-  if (count_ == kCapacity) return false;
+  if (count_ == kScheduleEntries) return false;
   entries_[count_].time_ms = time_ms;
   entries_[count_].what = static_cast<uint8_t>(static_cast<uint8_t>(chamber) << 4 | static_cast<uint8_t>(state));
   ++count_;

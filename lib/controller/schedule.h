@@ -2,6 +2,7 @@
 #pragma once
 
 #include "chamber.h"
+#include "constants.h"
 
 namespace bifa {
 
@@ -22,14 +23,12 @@ class Schedule {
   void tick() { ++now_ms_; }
 
  private:
-  static const uint8_t kCapacity = 16;
-
   struct Entry {
     uint32_t time_ms;
     uint8_t what;  ///< chamber in the upper half, state in the lower: memory is short
   };
 
-  Entry entries_[kCapacity] = {};
+  Entry entries_[kScheduleEntries] = {};
   uint8_t count_ = 0;
   uint8_t next_ = 0;
   uint32_t now_ms_ = 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "chamber.h"
+#include "constants.h"
 #include "fault.h"
 #include "persistence.h"
 
@@ -27,8 +28,6 @@ const uint16_t kStuckTime_ms = 2000;
 const int16_t kJump_mpsi = 1000;
 const uint8_t kJumpStep = 3;
 const uint8_t kJumpLimit = 100;
-
-const uint8_t kSamplePeriod_ms = 10;
 
 /// The limit of over-pressure, which follows the set-point.
 class TripLimit {

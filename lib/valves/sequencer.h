@@ -2,11 +2,10 @@
 #pragma once
 
 #include "chamber.h"
+#include "constants.h"
 
 namespace bifa {
 
-/// For how long both valves stay off when one follows the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms.
-const uint8_t kDeadTime_ms = 3;
 /// How long a valve stays energised at least, however short the command. Venting does not wait for it.
 const uint8_t kDwell_ms = 20;
 

@@ -30,25 +30,26 @@ PROTOCOL_VERSION = 1
 TABLE_HASH = 0x6908B694
 NAME_BYTES = 12
 
+# the firmware's own numbers
+DEAD_TIME_MS = 3  # for how long both valves of a chamber stay off when one follows the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
+SAMPLE_PERIOD_MS = 10  # from one strobe and sample of the pressures to the next
+MARK_PAUSE = 10  # strobes that a mark leaves out
+SCHEDULE_ENTRIES = 16  # timed holds that fit
+CONVERTER_COUNTS = 4096  # of the MCP4725, 12 bits
+REGULATOR_SPAN_MPSI = (
+    130000  # full scale of the SMC ITV1050 (0.9 MPa at 5 V): on the converter it would burst pouches and sensors
+)
+
 PARAMETERS = (
-    UnoParameter('period_s', 's', 6, 500000, 60000000, 5700000,
-              'time of one cycle (1/f)'),
-    UnoParameter('psi12_deg', 'deg', 3, 0, 360000, 270000,
-              'phase of the head ahead of the body (psi_12)'),
-    UnoParameter('psi13_deg', 'deg', 3, 0, 360000, 90000,
-              'phase of the tail ahead of the body (psi_13)'),
-    UnoParameter('duty_body', '', 4, 0, 10000, 5000,
-              'fraction of the cycle under vacuum; the body contracts (d_1)'),
-    UnoParameter('duty_head', '', 4, 0, 10000, 5000,
-              'fraction of the cycle under vacuum; the head releases (d_2)'),
-    UnoParameter('duty_tail', '', 4, 0, 10000, 5000,
-              'fraction of the cycle under vacuum; the tail releases (d_3)'),
-    UnoParameter('coupling_per_s', '1/s', 3, 0, 20000, 10000,
-              "oscillators' pull into phase (alpha_phi)"),
-    UnoParameter('pressure_psi', 'psi', 3, 0, 14000, 8500,
-              'set-point of the positive supply'),
-    UnoParameter('host_timeout_s', 's', 3, 0, 60000, 0,
-              'vent after such silence of the host; 0 = never'),
+    UnoParameter("period_s", "s", 6, 500000, 60000000, 5700000, "time of one cycle (1/f)"),
+    UnoParameter("psi12_deg", "deg", 3, 0, 360000, 270000, "phase of the head ahead of the body (psi_12)"),
+    UnoParameter("psi13_deg", "deg", 3, 0, 360000, 90000, "phase of the tail ahead of the body (psi_13)"),
+    UnoParameter("duty_body", "", 4, 0, 10000, 5000, "fraction of the cycle under vacuum; the body contracts (d_1)"),
+    UnoParameter("duty_head", "", 4, 0, 10000, 5000, "fraction of the cycle under vacuum; the head releases (d_2)"),
+    UnoParameter("duty_tail", "", 4, 0, 10000, 5000, "fraction of the cycle under vacuum; the tail releases (d_3)"),
+    UnoParameter("coupling_per_s", "1/s", 3, 0, 20000, 10000, "oscillators' pull into phase (alpha_phi)"),
+    UnoParameter("pressure_psi", "psi", 3, 0, 14000, 8500, "set-point of the positive supply"),
+    UnoParameter("host_timeout_s", "s", 3, 0, 60000, 0, "vent after such silence of the host; 0 = never"),
 )
 
 # struct format of a parameter set, on the wire and in EEPROM
@@ -57,97 +58,158 @@ SET_SIZE = 24
 
 # factory presets: one value in wire units for every parameter
 PRESETS = {
-    'baseline': (5700000, 270000, 90000, 5000, 5000, 5000, 10000, 8500, 0),
-    'obstacle': (6000000, 270000, 90000, 5000, 5000, 5000, 10000, 8500, 0),
+    "baseline": (5700000, 270000, 90000, 5000, 5000, 5000, 10000, 8500, 0),
+    "obstacle": (6000000, 270000, 90000, 5000, 5000, 5000, 10000, 8500, 0),
 }
 
 # messages to the Uno
 COMMANDS = {
-    'version': Message('version', 0x01, 'open', '<', ()),
-    'connect': Message('connect', 0x02, 'open', '<HH', (('boot_nonce', 1), ('session_key', 1))),
-    'stop_now': Message('stop_now', 0x03, 'open', '<', ()),
-    'status': Message('status', 0x10, 'session', '<', ()),
-    'run': Message('run', 0x11, 'session', '<', ()),
-    'stop': Message('stop', 0x12, 'session', '<', ()),
-    'hold': Message('hold', 0x13, 'session', '<BB', (('chamber', 1), ('state', 1))),
-    'clear': Message('clear', 0x14, 'session', '<', ()),
-    'stream': Message('stream', 0x15, 'session', '<B', (('on', 1),)),
-    'save': Message('save', 0x20, 'session', '<12s', (('preset', 1),)),
-    'load': Message('load', 0x21, 'session', '<12s', (('preset', 1),)),
-    'presets': Message('presets', 0x22, 'session', '<B', (('index', 1),)),
-    'forget': Message('forget', 0x23, 'session', '<12s', (('preset', 1),)),
-    'defaults': Message('defaults', 0x24, 'session', '<', ()),
-    'zero': Message('zero', 0x25, 'session', '<B', (('factory', 1),)),
-    'begin': Message('begin', 0x30, 'session', '<', ()),
-    'field': Message('field', 0x31, 'session', '<BI', (('parameter', 1), ('value', 1))),
-    'commit': Message('commit', 0x32, 'session', '<H', (('check', 1),)),
-    'read_set': Message('read_set', 0x33, 'session', '<', ()),
-    'schedule_clear': Message('schedule_clear', 0x38, 'session', '<', ()),
-    'schedule_add': Message('schedule_add', 0x39, 'session', '<IBB', (('time_ms', 1), ('chamber', 1), ('state', 1))),
-    'schedule_start': Message('schedule_start', 0x3A, 'session', '<', ()),
-    'read_clock': Message('read_clock', 0x3C, 'session', '<', ()),
-    'mark': Message('mark', 0x3D, 'session', '<', ()),
+    "version": Message("version", 0x01, "open", "<", ()),
+    "connect": Message("connect", 0x02, "open", "<HH", (("boot_nonce", 1), ("session_key", 1))),
+    "stop_now": Message("stop_now", 0x03, "open", "<", ()),
+    "status": Message("status", 0x10, "session", "<", ()),
+    "run": Message("run", 0x11, "session", "<", ()),
+    "stop": Message("stop", 0x12, "session", "<", ()),
+    "hold": Message("hold", 0x13, "session", "<BB", (("chamber", 1), ("state", 1))),
+    "clear": Message("clear", 0x14, "session", "<", ()),
+    "stream": Message("stream", 0x15, "session", "<B", (("on", 1),)),
+    "save": Message("save", 0x20, "session", "<12s", (("preset", 1),)),
+    "load": Message("load", 0x21, "session", "<12s", (("preset", 1),)),
+    "presets": Message("presets", 0x22, "session", "<B", (("index", 1),)),
+    "forget": Message("forget", 0x23, "session", "<12s", (("preset", 1),)),
+    "defaults": Message("defaults", 0x24, "session", "<", ()),
+    "zero": Message("zero", 0x25, "session", "<B", (("factory", 1),)),
+    "begin": Message("begin", 0x30, "session", "<", ()),
+    "field": Message("field", 0x31, "session", "<BI", (("parameter", 1), ("value", 1))),
+    "commit": Message("commit", 0x32, "session", "<H", (("check", 1),)),
+    "read_set": Message("read_set", 0x33, "session", "<", ()),
+    "schedule_clear": Message("schedule_clear", 0x38, "session", "<", ()),
+    "schedule_add": Message("schedule_add", 0x39, "session", "<IBB", (("time_ms", 1), ("chamber", 1), ("state", 1))),
+    "schedule_start": Message("schedule_start", 0x3A, "session", "<", ()),
+    "read_clock": Message("read_clock", 0x3C, "session", "<", ()),
+    "mark": Message("mark", 0x3D, "session", "<", ()),
 }
 
 # messages from the Uno
 REPORTS = {
-    'hello': Message('hello', 0x80, 'open', '<B3BIHBH', (('protocol', 1), ('firmware', 3), ('table_hash', 1), ('boot_nonce', 1), ('start_cause', 1), ('session_key', 1))),
-    'done': Message('done', 0x81, 'session', '<B', (('result', 1),)),
-    'expected': Message('expected', 0x82, 'session', '<', ()),
-    'status_report': Message('status_report', 0x83, 'session', '<BBBhhI3h3h3hBBIHHHH', (('state', 1), ('fault', 1), ('fault_channel', 1), ('fault_value', 1), ('fault_limit', 1), ('fault_time_ms', 1), ('fault_lowest_mpsi', 3), ('fault_highest_mpsi', 3), ('pressure_mpsi', 3), ('valves', 1), ('flags', 1), ('uptime_ms', 1), ('frames_bad', 1), ('frames_repeated', 1), ('bytes_lost', 1), ('samples_lost', 1))),
-    'set_report': Message('set_report', 0x84, 'session', '<B24s', (('pending', 1), ('set', 1))),
-    'preset_report': Message('preset_report', 0x85, 'session', '<BB12s', (('count', 1), ('source', 1), ('preset', 1))),
-    'clock_report': Message('clock_report', 0x86, 'session', '<IH', (('time_us', 1), ('marked', 1))),
-    'sample': Message('sample', 0x90, 'stream', '<HIB3h3HBB', (('sequence', 1), ('time_us', 1), ('state', 1), ('pressure_mpsi', 3), ('phase', 3), ('command', 1), ('valves', 1))),
+    "hello": Message(
+        "hello",
+        0x80,
+        "open",
+        "<B3BIHBH",
+        (
+            ("protocol", 1),
+            ("firmware", 3),
+            ("table_hash", 1),
+            ("boot_nonce", 1),
+            ("start_cause", 1),
+            ("session_key", 1),
+        ),
+    ),
+    "done": Message("done", 0x81, "session", "<B", (("result", 1),)),
+    "expected": Message("expected", 0x82, "session", "<", ()),
+    "status_report": Message(
+        "status_report",
+        0x83,
+        "session",
+        "<BBBhhI3h3h3hBBIHHHH",
+        (
+            ("state", 1),
+            ("fault", 1),
+            ("fault_channel", 1),
+            ("fault_value", 1),
+            ("fault_limit", 1),
+            ("fault_time_ms", 1),
+            ("fault_lowest_mpsi", 3),
+            ("fault_highest_mpsi", 3),
+            ("pressure_mpsi", 3),
+            ("valves", 1),
+            ("flags", 1),
+            ("uptime_ms", 1),
+            ("frames_bad", 1),
+            ("frames_repeated", 1),
+            ("bytes_lost", 1),
+            ("samples_lost", 1),
+        ),
+    ),
+    "set_report": Message("set_report", 0x84, "session", "<B24s", (("pending", 1), ("set", 1))),
+    "preset_report": Message("preset_report", 0x85, "session", "<BB12s", (("count", 1), ("source", 1), ("preset", 1))),
+    "clock_report": Message("clock_report", 0x86, "session", "<IH", (("time_us", 1), ("marked", 1))),
+    "sample": Message(
+        "sample",
+        0x90,
+        "stream",
+        "<HIB3h3HBB",
+        (
+            ("sequence", 1),
+            ("time_us", 1),
+            ("state", 1),
+            ("pressure_mpsi", 3),
+            ("phase", 3),
+            ("command", 1),
+            ("valves", 1),
+        ),
+    ),
 }
 
 # how a command ended: name and words, by number
 RESULTS = (
-    ('ok', 'ok'),
-    ('unknown', 'no such command; type help'),
-    ('usage', 'wrong arguments'),
-    ('no_parameter', 'no such parameter; type show'),
-    ('range', 'out of range'),
-    ('latched', 'stopped: type clear first'),
-    ('refused', 'not in this state; type stop first'),
-    ('no_preset', 'no such preset; type presets'),
-    ('name', 'a name is 1 to 12 of a-z 0-9 _ -, not factory'),
-    ('full', 'no room left'),
-    ('eeprom', 'the EEPROM failed'),
-    ('busy', 'busy saving; try again'),
-    ('transaction', 'no transaction open, or a field was rejected'),
-    ('check', 'the set arrived damaged'),
-    ('fault', 'its cause is still there; type status'),
-    ('order', 'times must not go backwards'),
-    ('unrest', 'pressures still move: rest 4 s first'),
-    ('offset', 'more than 0.9 psi from zero'),
+    ("ok", "ok"),
+    ("unknown", "no such command; type help"),
+    ("usage", "wrong arguments"),
+    ("no_parameter", "no such parameter; type show"),
+    ("range", "out of range"),
+    ("latched", "stopped: type clear first"),
+    ("refused", "not in this state; type stop first"),
+    ("no_preset", "no such preset; type presets"),
+    ("name", "a name is 1 to 12 of a-z 0-9 _ -, not factory"),
+    ("full", "no room left"),
+    ("eeprom", "the EEPROM failed"),
+    ("busy", "busy saving; try again"),
+    ("transaction", "no transaction open, or a field was rejected"),
+    ("check", "the set arrived damaged"),
+    ("fault", "its cause is still there; type status"),
+    ("order", "times must not go backwards"),
+    ("unrest", "pressures still move: rest 4 s first"),
+    ("offset", "more than 0.9 psi from zero"),
 )
 
 # words for numbers in messages
-CHAMBERS = ('body', 'head', 'tail')
-CHAMBER_STATES = ('off', 'vacuum', 'positive')
-STATES = ('idle', 'running', 'holding', 'stopped', 'fault')
-FAULTS = ('none', 'over_pressure', 'sensor_range', 'sensor_stuck', 'regulator', 'supply_control', 'host_silent', 'watchdog', 'brown_out', 'restart')
-START_CAUSES = ('power', 'external', 'brown_out', 'watchdog', 'restart')
+CHAMBERS = ("body", "head", "tail")
+CHAMBER_STATES = ("off", "vacuum", "positive")
+STATES = ("idle", "running", "holding", "stopped", "fault")
+FAULTS = (
+    "none",
+    "over_pressure",
+    "sensor_range",
+    "sensor_stuck",
+    "regulator",
+    "supply_control",
+    "host_silent",
+    "watchdog",
+    "brown_out",
+    "restart",
+)
+START_CAUSES = ("power", "external", "brown_out", "watchdog", "restart")
 
 # what people type: name, usage, help
 CONSOLE_COMMANDS = (
-    ('help', 'help [NAME]', 'list everything, or explain one'),
-    ('version', 'version', 'versions, cause of the last start'),
-    ('status', 'status', 'state, fault, pressures, valves, link'),
-    ('show', 'show [NAME]', 'values, ranges; * where power-up loads another'),
-    ('set', 'set NAME VALUE', 'change a parameter, also while running'),
-    ('run', 'run', 'walk'),
-    ('stop', 'stop', 'stop, and vent all chambers'),
-    ('hold', 'hold CHAMBER positive|vacuum|off', 'inflate, evacuate or vent body, head or tail'),
-    ('clear', 'clear', 'release a stop or fault'),
-    ('stream', 'stream on|off', 'telemetry: one line (>) a sample'),
-    ('plot', 'plot on|off', 'telemetry for the Serial Plotter'),
-    ('save', 'save [NAME]', 'keep the parameters; without NAME for power-up'),
-    ('load', 'load PRESET', 'use a preset'),
-    ('presets', 'presets', 'list the presets'),
-    ('forget', 'forget PRESET', 'delete a preset from EEPROM'),
-    ('defaults', 'defaults confirm', 'erase all presets and settings'),
-    ('zero', 'zero confirm|factory', 'take the pressures as zero; or undo that'),
-    ('echo', 'echo on|off', 'repeat what you type (bare terminal)'),
+    ("help", "help [NAME]", "list everything, or explain one"),
+    ("version", "version", "versions, cause of the last start"),
+    ("status", "status", "state, fault, pressures, valves, link"),
+    ("show", "show [NAME]", "values, ranges; * where power-up loads another"),
+    ("set", "set NAME VALUE", "change a parameter, also while running"),
+    ("run", "run", "walk"),
+    ("stop", "stop", "stop, and vent all chambers"),
+    ("hold", "hold CHAMBER positive|vacuum|off", "inflate, evacuate or vent body, head or tail"),
+    ("clear", "clear", "release a stop or fault"),
+    ("stream", "stream on|off", "telemetry: one line (>) a sample"),
+    ("plot", "plot on|off", "telemetry for the Serial Plotter"),
+    ("save", "save [NAME]", "keep the parameters; without NAME for power-up"),
+    ("load", "load PRESET", "use a preset"),
+    ("presets", "presets", "list the presets"),
+    ("forget", "forget PRESET", "delete a preset from EEPROM"),
+    ("defaults", "defaults confirm", "erase all presets and settings"),
+    ("zero", "zero confirm|factory", "take the pressures as zero; or undo that"),
+    ("echo", "echo on|off", "repeat what you type (bare terminal)"),
 )

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from decimal import ROUND_HALF_UP, Decimal
 
 from bifa.errors import BifaError
-from bifa.link.table import PARAMETERS, SET_FORMAT, UnoParameter
+from bifa.link.table import CONVERTER_COUNTS, PARAMETERS, REGULATOR_SPAN_MPSI, SET_FORMAT, UnoParameter
 
-_CONVERTER_COUNTS = 4096  # MCP4725
-_REGULATOR_SPAN_MPSI = 130_000  # ITV1050: 0 to 5 V
 BY_NAME = {parameter.name: parameter for parameter in PARAMETERS}
 
 
@@ -52,8 +50,8 @@ def from_wire(name: str, value: int) -> float:
 def set_point_psi(pressure_psi: float) -> float:
     """What the regulator is asked for where `pressure_psi` is: whole counts of the converter, rounded down
     (lib/pressure/supply.h)."""
-    counts = int(round(pressure_psi * 1e3) * _CONVERTER_COUNTS // _REGULATOR_SPAN_MPSI)
-    return counts * _REGULATOR_SPAN_MPSI / _CONVERTER_COUNTS * 1e-3
+    counts = int(round(pressure_psi * 1e3) * CONVERTER_COUNTS // REGULATOR_SPAN_MPSI)
+    return counts * REGULATOR_SPAN_MPSI / CONVERTER_COUNTS * 1e-3
 
 
 def index_of(name: str) -> int:

@@ -13,7 +13,7 @@ from bifa.link.clock_relation import ClockRelation
 from bifa.link.errors import LinkError, NoAnswerError, StillMovingError
 from bifa.link.leaving import CONFIRMED_WITHIN_S
 from bifa.link.session import Counters, Hello, Session
-from bifa.link.table import CHAMBER_STATES, CHAMBERS, FAULTS, STATES
+from bifa.link.table import CHAMBER_STATES, CHAMBERS, DEAD_TIME_MS, FAULTS, SAMPLE_PERIOD_MS, SCHEDULE_ENTRIES, STATES
 from bifa.link.transport import Transport
 from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
 from bifa.link.words import word
@@ -24,11 +24,9 @@ CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
 PRESSURES_AFTER_S = 1.3e-3  # a sample's pressures are means about so long after its strobe (docs/firmware.md)
-SAMPLE_US = 10_000
-DEAD_TIME_S = 4e-3  # from one supply to the other a chamber is vented: kDeadTime_ms and the tick that it waits for
-MARK_PAUSE = 10  # strobes that a mark leaves out (kMarkPause in lib/controller/controller.h)
+SAMPLE_US = 1000 * SAMPLE_PERIOD_MS
+DEAD_TIME_S = 1e-3 * (DEAD_TIME_MS + 1)  # from one supply to the other a chamber vents, and waits for the tick
 CONNECTIONS = ("off", "positive", "vacuum", "both")  # by the two valves of a chamber
-SCHEDULE_ENTRIES = 16  # lib/controller/schedule.h
 LATEST_HOLD_S = (2**32 - 1) / 1000
 _WRAP_US = 1 << 32
 _OLDEST_US = 10_000_000  # by which a sample may be older than what came before it

@@ -16,8 +16,7 @@ from rich.status import Status
 
 from bifa.errors import BifaError
 from bifa.link import NoAnswerError, PortGoneError, RefusedError, RestartedError, Sample, StillMovingError, Uno
-from bifa.link.table import CHAMBERS
-from bifa.link.uno import MARK_PAUSE
+from bifa.link.table import CHAMBERS, MARK_PAUSE
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.rig import Rig, RigError, SameBoard

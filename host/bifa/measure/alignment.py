@@ -13,7 +13,7 @@ import numpy as np
 
 from bifa.data.lost import held
 from bifa.errors import BifaError
-from bifa.link.uno import MARK_PAUSE
+from bifa.link.table import MARK_PAUSE
 
 MIN_EDGES = 20
 MAX_RMS_S = 2e-3

@@ -15,7 +15,7 @@ import pytest
 from rich.console import Console
 
 from bifa.link import PortGoneError, Sample, Uno
-from bifa.link.uno import MARK_PAUSE
+from bifa.link.table import MARK_PAUSE
 from bifa.live.monitor import Monitor, watch
 from bifa.live.record import record_telemetry
 from bifa.rig import RigError, SameBoard, SerialRig

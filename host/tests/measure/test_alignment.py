@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bifa.link.uno import MARK_PAUSE
+from bifa.link.table import MARK_PAUSE
 from bifa.measure.alignment import AlignmentError, align, align_after_restart, camera_rate, resampled
 
 PERIOD_S = 0.01

@@ -14,7 +14,7 @@ from bifa.data.export import parse_exports
 from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.link import Uno
-from bifa.link.uno import MARK_PAUSE
+from bifa.link.table import MARK_PAUSE
 from bifa.measure.instrument_csv import InstrumentFileError, import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import open_rig
