@@ -78,15 +78,23 @@ class Gain:
 
 def measured(effect: str, seed: int, out: Path, effort: Effort | None = None) -> Gain:
     """Run the campaign on the robot with `effect` at its full size, or what is left of it, and walk its gaits."""
-    values = EFFECTS[effect].at(1.0, np.random.default_rng([seed, 0x100]))
-    options = {"sealed": seed, "sealed_kind": "none", "effects": {effect: values}, "profile": "realistic"}
-    setup, folder = Setup("virtual", seed, options), out / f"{effect}-{seed}"
+    setup, folder = robot(effect, seed), out / f"{effect}-{seed}"
     stages = campaign(setup, effort or Effort(), lambda what, share: None)
     run_stages(folder, stages, on_start=_begun)
     summary = json.loads((folder / "summary.json").read_text())
     gaits = walked(folder, setup, effort or Effort())
     print("\r" + " " * 60, end="\r")
     return Gain(effect, seed, tuple(found["name"] for found in summary["effects"]), gaits)
+
+
+def robot(effect: str, seed: int) -> Setup:
+    """A specimen with `effect` at its full size."""
+    values = EFFECTS[effect].at(1.0, np.random.default_rng([seed, 0x100]))
+    return Setup(
+        "virtual",
+        seed,
+        {"sealed": seed, "sealed_kind": "none", "effects": {effect: values}, "profile": "realistic"},
+    )
 
 
 def _begun(stage: Stage) -> None:

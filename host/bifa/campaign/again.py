@@ -21,6 +21,7 @@ from bifa.campaign.stages import StageError
 from bifa.campaign.walks import foretold, predict, predicted_speed, speeds
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.files import write_text
+from bifa.gait.prediction import FELL
 from bifa.robot import Model, load_model, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 
@@ -61,9 +62,12 @@ class Round:
 
     @property
     def is_predicted(self) -> bool:
-        """Whether the speed is predicted to within what repeats differ by, or to half a per cent."""
+        """Whether the speed is predicted to within what repeats differ by, or to half a per cent; repeats of which some
+        fell differ by what no prediction is excused with."""
         error_mm_s = abs(self.predicted_mm_s - self.measured_mm_s)
-        return error_mm_s <= max(2.0 * self.spread_mm_s, _PREDICTED * abs(self.measured_mm_s))
+        return self.measured_mm_s >= FELL * self.predicted_mm_s and error_mm_s <= max(
+            2.0 * self.spread_mm_s, _PREDICTED * abs(self.measured_mm_s)
+        )
 
     def changes_nothing(self, before: Round) -> bool:
         """Whether the model still names the same and its gait walks no faster or slower, nor is predicted better."""

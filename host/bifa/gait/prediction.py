@@ -106,7 +106,7 @@ class Predictor:
         clock_rate: seconds per second of the Uno, if not what is known of it; speeds are those on the Uno's clock.
         """
         draws, rate = len(self._robots), self._timing.clock if clock_rate is None else clock_rate
-        rows = gait_rows([gait] * draws)
+        rows = self._switched(gait_rows([gait] * draws))
         rows[:, 0] *= rate
         vented_s = rate * self._timing.dead_time_s
         progress = speeds(self._robots, rows, cycles, FINE_M, dead_time_s=vented_s, workers=workers)
@@ -116,6 +116,16 @@ class Predictor:
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
         means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s(gait)
         return Prediction(np.fmax(np.nan_to_num(means), 0.0), _most(f.begins for f in found if f.is_settled) + LEAST)
+
+    def _switched(self, rows: np.ndarray) -> np.ndarray:
+        """The gaits (n, 6) as each walk has them, whose valves switch a little early or late: at a cliff half a
+        millisecond decides."""
+        most_s = self._timing.switch_error_s
+        late_s = np.random.default_rng([self._seed, 6]).uniform(-most_s, most_s, (len(rows), 3, 2))
+        to_vacuum, to_positive = np.moveaxis(late_s, 2, 0) / rows[:, :1]  # of body, head, tail, in parts of the period
+        rows[:, 1:3] -= 360.0 * (to_vacuum[:, 1:] - to_vacuum[:, :1])
+        rows[:, 3:] = np.clip(rows[:, 3:] + to_positive - to_vacuum, 0.0, 1.0)
+        return rows
 
 
 def predict_speed(

@@ -64,8 +64,11 @@ def _timing(system: RobotSystem) -> Scatter:
     if not walks:
         return Scatter()
     clock = float(np.mean([seconds_per_uno_s(trial) for trial in walks]))
-    dead_time_s = float(np.mean([trial.extra.get("dead_time_s", 0.0) for trial in walks]))
-    return Scatter(clock=round(clock, 6), dead_time_s=round(dead_time_s, 6))
+    noted = {
+        name: round(float(np.mean([trial.extra.get(name, 0.0) for trial in walks])), 6)
+        for name in ("dead_time_s", "switch_error_s")
+    }
+    return Scatter(clock=round(clock, 6), **noted)
 
 
 def _between_runs(fit: Fit) -> float:

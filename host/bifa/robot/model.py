@@ -15,7 +15,7 @@ from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParamete
 from bifa.robot.stiffness import StiffnessCurve
 
 GRAVITY_M_S2 = 9.80665
-MOST_DEAD_TIME_S = 0.1
+MOST_LATE_S = 0.1
 STIFFNESS, LEARNT = ("body_stiffness", "small_stiffness"), "learnt"
 
 
@@ -43,7 +43,8 @@ class Scatter:
     friction: relative standard deviation of the friction from run to run. pressure_psi, force_N: RMS of what the model
     leaves unexplained of pressures and forces, the same in every repeat; speed: of a walk's speed, relative. And how
     the Uno keeps time, which is no scatter but moves the edge all the same: clock, seconds that pass in one of its own;
-    dead_time_s, of its own, in which a chamber is vented between the supplies.
+    dead_time_s, of its own, in which a chamber is vented between the supplies; switch_error_s, by which valves switch
+    early or late at most, as its ticks fall.
     """
 
     friction: float = 0.0
@@ -52,11 +53,12 @@ class Scatter:
     speed: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
+    switch_error_s: float = 0.0
 
     @property
     def timing(self) -> Scatter:
         """How the Uno keeps time, and nothing else."""
-        return Scatter(clock=self.clock, dead_time_s=self.dead_time_s)
+        return Scatter(clock=self.clock, dead_time_s=self.dead_time_s, switch_error_s=self.switch_error_s)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -64,8 +66,9 @@ class Scatter:
                 raise ModelParameterError(f"scatter.{name} = {value:g} must be a number not below 0")
         if not 0.9 <= self.clock <= 1.1:
             raise ModelParameterError(f"scatter.clock = {self.clock:g} must be a clock's, within 0.9 to 1.1")
-        if self.dead_time_s > MOST_DEAD_TIME_S:
-            raise ModelParameterError(f"scatter.dead_time_s = {self.dead_time_s:g} must be at most {MOST_DEAD_TIME_S}")
+        for name in ("dead_time_s", "switch_error_s"):
+            if getattr(self, name) > MOST_LATE_S:
+                raise ModelParameterError(f"scatter.{name} = {getattr(self, name):g} must be at most {MOST_LATE_S}")
 
 
 @dataclass(frozen=True)

@@ -158,6 +158,8 @@ def test_a_speed_within_what_repeats_differ_by_is_predicted():
         assert replace(one, predicted_mm_s=(1 + off) * one.measured_mm_s, spread_mm_s=0.0).is_predicted is predicted
     wide = replace(one, predicted_mm_s=1.04 * one.measured_mm_s, spread_mm_s=0.03 * one.measured_mm_s)
     assert wide.is_predicted
+    one_fell = replace(one, measured_mm_s=0.68 * one.predicted_mm_s, spread_mm_s=0.55 * one.predicted_mm_s)
+    assert not one_fell.is_predicted
 
 
 def test_rounds_of_an_earlier_version_are_walked_again(tmp_path):

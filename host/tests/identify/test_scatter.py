@@ -26,10 +26,12 @@ def test_the_scatter_says_how_the_uno_keeps_time():
     gait = BASELINE.as_dict()
     trials = [
         Trial(f"walk_{k}.csv", "locomotion", columns={}, gait=gait, repeat=k, extra=extra)
-        for k, extra in enumerate([{"clock_rate": 1.004, "dead_time_s": 0.004}, {"clock_rate": 1.002}], start=1)
+        for k, extra in enumerate(
+            [{"clock_rate": 1.004, "dead_time_s": 0.004, "switch_error_s": 0.0005}, {"clock_rate": 1.002}], start=1
+        )
     ]
     timing = _timing(SimpleNamespace(dataset=Dataset(None, "day", {}, tuple(trials), {})))
-    assert timing == Scatter(clock=0.99701, dead_time_s=0.002)
+    assert timing == Scatter(clock=0.99701, dead_time_s=0.002, switch_error_s=0.00025)
 
 
 def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
@@ -45,13 +47,21 @@ def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
 def test_a_model_file_keeps_the_scatter(tmp_path):
     from dataclasses import replace
 
-    model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004))
+    model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004, 0.0005))
     save_model(tmp_path / "m.toml", model)
     assert load_model(tmp_path / "m.toml").scatter == model.scatter
 
 
 @pytest.mark.parametrize(
-    "line", ["friction = -0.1", 'friction = "much"', "friction = nan", "dead_time_s = 0.2", "wind = 1.0"]
+    "line",
+    [
+        "friction = -0.1",
+        'friction = "much"',
+        "friction = nan",
+        "dead_time_s = 0.2",
+        "switch_error_s = 0.2",
+        "wind = 1.0",
+    ],
 )
 def test_a_scatter_that_is_none_is_refused(tmp_path, line):
     save_model(tmp_path / "m.toml", nominal())

@@ -1,0 +1,165 @@
+"""Whether the probability of walking is honest where it matters: at the cliff, robot by robot.
+
+    python -m benchmarks.cliff [--out ../out/loop] [--records FILE] [--print]
+
+Of every campaign that `benchmarks.loop` has left in OUT, the last gait is made faster until, by the last model, nearly
+all, most, half and few of the robots that are possible walk with it; each such gait is walked `RUNS` times, through the
+real firmware. FILE has a line for each robot, with which an interrupted run goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+import numpy as np
+
+from benchmarks import loop
+from benchmarks import records as lines
+from bifa.campaign.walks import measure_walks, speeds
+from bifa.gait.prediction import FELL, Prediction, Predictor
+from bifa.gait.settling import STANDING_MM_S
+from bifa.gait.uncertainty import spread_of
+from bifa.robot import Model, load_model
+from bifa.robot.gait import Gait
+
+WANTED = (0.95, 0.8, 0.5, 0.2, 0.05)
+RUNS = 6
+_MOST_FASTER = 0.15  # part of the period, within which the cliff is looked for
+_HALVINGS = 12
+_CYCLES = 12
+_STAGE = 70  # the first of the rig's numbers for these walks
+
+
+@dataclass(frozen=True)
+class Step:
+    """One gait: by what part its period is shorter, the probability of walking and the interval that were foretold, and
+    the speeds of its runs; `walked`: which of them walk."""
+
+    faster: float
+    probability: float
+    interval_90_mm_s: tuple[float, float]
+    runs_mm_s: tuple[float, ...]
+    walked: tuple[bool, ...]
+
+
+def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
+    """Parts by which the period is shorter, and what is foretold there, for each of the probabilities `WANTED`; none of
+    a gait that all robots walk with however fast."""
+    predictor = Predictor(model, spread_of(model))
+
+    def foretold(faster: float) -> Prediction:
+        return predictor.of(replace(gait, period_s=gait.period_s * (1.0 - faster)), cycles=_CYCLES)
+
+    least = FELL * foretold(0.0).speed_mm_s  # what falls may still creep
+
+    def share(faster: float) -> float:
+        return float(np.mean(foretold(faster).speeds_mm_s >= least))
+
+    if share(_MOST_FASTER) > WANTED[-1]:
+        return []
+    found = []
+    for wanted in WANTED:
+        low, high = 0.0, _MOST_FASTER
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if share(middle) > wanted else (low, middle)
+        found.append((0.5 * (low + high), foretold(0.5 * (low + high))))
+    return found
+
+
+def walked(folder: Path, effect: str, seed: int) -> list[Step]:
+    """The robot's steps over the cliff, from the campaign in `folder`."""
+    model = load_model(folder / "model-last.toml")
+    gait = Gait(**json.loads((folder / "rounds.json").read_text())[-1]["gait"])
+    steps = []
+    for number, (faster, prediction) in enumerate(at_the_cliff(model, gait)):
+        quicker = replace(gait, period_s=gait.period_s * (1.0 - faster))
+        with tempfile.TemporaryDirectory() as aside, loop.robot(effect, seed).open(_STAGE + number) as rig:
+            dataset = measure_walks(rig, Path(aside) / "walks", {"g": quicker}, _CYCLES, RUNS)
+        runs = tuple(run.mean_mm_s for run in speeds(dataset)["g"])
+        least = max(FELL * prediction.speed_mm_s, STANDING_MM_S)
+        which = tuple(speed >= least for speed in runs)
+        steps.append(Step(faster, prediction.walks_probability, prediction.interval_90_mm_s, runs, which))
+    return steps
+
+
+HEADING = f"{'effect, seed':24}" + "".join(f"{f'{100 * wanted:.0f} %':>18}" for wanted in WANTED)
+
+
+def row(name: str, steps: Sequence[Step]) -> str:
+    """A line of the table under `HEADING`: by how many per cent the period is shorter, how many runs walked."""
+    cells = [f"-{100 * step.faster:.2f} %: {sum(step.walked)} of {len(step.walked)}" for step in steps]
+    return f"{name:24}" + ("".join(f"{cell:>18}" for cell in cells) or "no cliff")
+
+
+def summed_up(found: Sequence[Sequence[Step]]) -> dict[str, float]:
+    """Foretold and walked share by `WANTED`, and the Brier score; printed and returned."""
+    with_cliff = [steps for steps in found if steps]
+    if not with_cliff:
+        return {}
+    print(f"\n{f'robots: {len(with_cliff)}':24}" + "".join(f"{f'{100 * wanted:.0f} %':>9}" for wanted in WANTED))
+    by_wanted = list(zip(*with_cliff, strict=True))
+    print(f"{'foretold':24}" + "".join(f"{mean(step.probability for step in steps):9.2f}" for steps in by_wanted))
+    shares = [mean(walks for step in steps for walks in step.walked) for steps in by_wanted]
+    print(f"{'walked':24}" + "".join(f"{share:9.2f}" for share in shares))
+    every = [(step.probability, walks) for steps in with_cliff for step in steps for walks in step.walked]
+    brier = mean((probability - walks) ** 2 for probability, walks in every)
+    inside = [low <= v <= high for steps in with_cliff for low, high, v in _walking(steps)]
+    print(f"Brier score of {len(every)} runs: {brier:.3f}; of {len(inside)} that walked {mean(inside):.2f} in the 90 %")
+    return {"cliff_robots": len(with_cliff), "cliff_brier": brier, "cliff_holds_90": mean(inside)}
+
+
+def _walking(steps: Sequence[Step]) -> list[tuple[float, float, float]]:
+    """Interval and speed of each run that walked."""
+    return [
+        (*step.interval_90_mm_s, speed)
+        for step in steps
+        for speed, walks in zip(step.runs_mm_s, step.walked, strict=True)
+        if walks
+    ]
+
+
+def run(out: Path, kept: Path | None = None, only_print: bool = False) -> dict[str, float]:
+    """Print the table, a line a robot; returns the figures flat."""
+    known = lines.read(kept, lambda record: record["robot"]) if kept else {}
+    if not only_print:
+        for rounds in sorted(out.glob("*/rounds.json")):
+            name = rounds.parent.name
+            if name not in known:
+                effect, _, seed = name.rpartition("-")
+                known[name] = {"robot": name, "steps": [asdict(s) for s in walked(rounds.parent, effect, int(seed))]}
+                if kept:
+                    lines.write(kept, known.values())
+    print(HEADING)
+    found = {name: [_step_of(step) for step in record["steps"]] for name, record in known.items()}
+    for name, steps in found.items():
+        print(row(name, steps))
+    return summed_up(list(found.values()))
+
+
+def _step_of(record: dict[str, Any]) -> Step:
+    return Step(**{name: tuple(v) if isinstance(v, list | tuple) else v for name, v in record.items()})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.cliff", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, default=loop.OUT, help="where benchmarks.loop keeps its campaigns")
+    parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
+    parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
+    options = parser.parse_args()
+    if options.print and not options.records:
+        parser.error("--print takes what is in a file of records: add --records FILE")
+    run(options.out, options.records, options.print)
+
+
+if __name__ == "__main__":
+    main()
