@@ -1,33 +1,12 @@
 // Sensors whose reading does not move, and open inputs, whose reading moves as no air does.
 #include <unity.h>
 
+#include "../sensor_looks.h"
 #include "../suite.h"
 #include "sensor.h"
 #include "sensor_watch.h"
 
-using bifa::ChamberState;
-using bifa::Fault;
-using bifa::SensorWatch;
-
 namespace {
-
-const ChamberState kOff = ChamberState::kOff;
-const ChamberState kVacuum = ChamberState::kVacuum;
-const ChamberState kPositive = ChamberState::kPositive;
-const uint16_t kHalfScale = 512 * bifa::kOversampling;
-const int16_t kTrip_mpsi = 10000;
-
-Fault look(SensorWatch& watch, int16_t pressure_mpsi, uint16_t sum = kHalfScale, ChamberState chamber = kOff) {
-  return watch.look(sum, pressure_mpsi, kTrip_mpsi, chamber).fault;
-}
-
-/// The first fault in so many samples alike.
-Fault samples_of(SensorWatch& watch, uint16_t samples, int16_t pressure_mpsi, uint16_t sum,
-                 ChamberState chamber = kOff) {
-  Fault fault = Fault::kNone;
-  for (; samples > 0 && fault == Fault::kNone; --samples) fault = look(watch, pressure_mpsi, sum, chamber);
-  return fault;
-}
 
 // ---- a stuck sensor ----
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "../../suite.h"
+#include "../cobs.h"
 #include "crc.h"
 #include "host_port.h"
 #include "output.h"
@@ -102,14 +103,7 @@ std::string Bench::frame(MessageId message, uint8_t sequence, uint32_t seed, con
     body += static_cast<char>(check);
     body += static_cast<char>(check >> 8);
   }
-  std::string coded;
-  for (size_t at = 0; at <= body.size();) {
-    size_t end = body.find('\0', at);
-    if (end == std::string::npos) end = body.size();
-    coded += static_cast<char>(end - at + 1);
-    coded += body.substr(at, end - at);
-    at = end + 1;
-  }
+  std::string coded = cobs(body);
   char mask = 1;
   while (coded.find(mask) != std::string::npos || coded.find(static_cast<char>(mask ^ '!')) != std::string::npos)
     ++mask;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "../../suite.h"
+#include "../cobs.h"
 #include "crc.h"
 #include "frame.h"
 #include "output.h"
@@ -29,18 +30,6 @@ std::string with_checks(std::string body, uint32_t seed) {
   const uint32_t check = checks(body, seed);
   for (uint8_t byte = 0; byte < 4; ++byte) body += static_cast<char>(check >> 8 * byte);
   return body;
-}
-
-std::string cobs(const std::string& body) {
-  std::string coded;
-  for (size_t at = 0; at <= body.size();) {
-    size_t end = body.find('\0', at);
-    if (end == std::string::npos) end = body.size();
-    coded += static_cast<char>(end - at + 1);
-    coded += body.substr(at, end - at);
-    at = end + 1;
-  }
-  return coded;
 }
 
 std::string masked(std::string coded, char mask = 0x5A) {
