@@ -129,7 +129,7 @@ def _bring_up_to_date(
     folder.mkdir(parents=True, exist_ok=True)
     records = _read_records(folder)
     names = {stage.name for stage in stages}
-    for stage in stages:  # another campaign's stages, as those of `bifa demo --quick`, may have made the same
+    for stage in stages:  # another version's stages may have made the same
         theirs = {name: record for name, record in records.items() if name == stage.name or name not in names}
         _refuse_unrecorded(folder, stage, theirs)
     shutil.rmtree(folder / _SCRATCH, ignore_errors=True)

@@ -1,15 +1,14 @@
 """Walk gaits on a rig and compare what was measured with what the model predicts."""
 
 import itertools
-import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bifa.campaign.stages import OnProgress, Stage
+from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, DatasetWriter, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.gait.prediction import Prediction, predict_speed
@@ -19,7 +18,6 @@ from bifa.link import Uno
 from bifa.measure.experiments import record_columns
 from bifa.measure.plan import PlannedTrial
 from bifa.problem.switches import seconds_per_uno_s, valves_of
-from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.rig import Rig
 from bifa.robot import Model
 from bifa.robot.gait import Gait
@@ -114,43 +112,3 @@ def predicted_speed(model: Model, trial: Trial) -> float:
     """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
     columns = predict(model, trial)
     return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.walked["period_s"], 0.0).mean_mm_s
-
-
-def walks_stage(
-    open_rig: Callable[[], Rig],
-    gaits: Mapping[str, tuple[str, Gait]],
-    cycles: int,
-    model: Model,
-    settings: Mapping[str, object],
-    on_progress: OnProgress,
-) -> Stage:
-    """The stage that makes `walks` (data set), `walks.png` and `walks.json` (speeds).
-
-    gaits: name -> (title for people, gait).
-    """
-
-    def run(inputs: Path, outputs: Path) -> None:
-        with open_rig() as rig:
-            walked = {name: gait for name, (_, gait) in gaits.items()}
-            dataset = measure_walks(rig, outputs / "walks", walked, cycles, 1, on_progress)
-        measured = {name: [asdict(speed) for speed in repeats] for name, repeats in speeds(dataset).items()}
-        (outputs / "walks.json").write_text(json.dumps(measured, indent=1) + "\n")
-        columns = [
-            Walk(
-                gaits[trial.file.rsplit("_", 1)[0]][0],
-                trial.walked["period_s"],
-                {MEASURED: trial.columns, f"{model.name} model": predict(model, trial)},
-            )
-            for trial in dataset.trials
-        ]
-        draw_walks(columns, outputs / "walks.png")
-
-    recorded = {name: gait.as_dict() for name, (_, gait) in gaits.items()}
-    return Stage(
-        "walk",
-        "walk the gaits on the rig",
-        (),
-        ("walks", "walks.png", "walks.json"),
-        run,
-        dict(settings) | {"gaits": recorded, "cycles": cycles},
-    )
