@@ -164,7 +164,7 @@ def noise_table(error: Mapping[str, Any]) -> Table:
         if error["before"].get(what) is not None
     ]
     for name in error["before"]["by_experiment"]:
-        rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1"])
+        rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1.00"])
     columns = ["RMS error, in units of the noise floor", "base model", "completed model", "noise floor"]
     return Table(columns, rows, strong_row=1)
 
