@@ -1,5 +1,16 @@
 """`python -m bifa` is the command `bifa`."""
 
-from bifa.cli import main
+import sys
 
-main()
+
+def main() -> None:
+    """The command; Ctrl-C while it is still being loaded ends it without a traceback."""
+    try:
+        from bifa.cli import main as command
+    except KeyboardInterrupt:
+        sys.exit(130)
+    command()
+
+
+if __name__ == "__main__":
+    main()

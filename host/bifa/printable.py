@@ -1,4 +1,4 @@
-"""Text from outside, made safe to show: what a terminal would obey becomes visible."""
+"""Text as it is shown: from outside made safe, so that what a terminal would obey becomes visible; and counts."""
 
 
 def printable(text: str, keep: str = "\n\t") -> str:
@@ -9,3 +9,8 @@ def printable(text: str, keep: str = "\n\t") -> str:
     if text.isprintable():
         return text
     return "".join(c if c in keep or c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def counted(number: int, one: str) -> str:
+    """`number` of what `one` of is called so: 1 trial, 2 trials."""
+    return f"{number} {one}{'' if number == 1 else 's'}"

@@ -33,10 +33,11 @@ class StageProgress:
             self._begin()
 
     def _begin(self) -> Progress:
+        wide = self._console.width
         self._bars = bars = Progress(
-            words("{task.description}", table_column=Column(min_width=_TITLE)),
-            BarColumn(bar_width=20),
-            words("{task.fields[what]}"),
+            words("{task.description}", table_column=Column(min_width=min(_TITLE, wide // 3), no_wrap=False)),
+            BarColumn(bar_width=min(20, wide // 8)),
+            words("{task.fields[what]}", table_column=Column(no_wrap=False)),  # where it is narrow, the words yield
             TimeElapsedColumn(),
             console=self._console,
         )

@@ -19,6 +19,7 @@ import bifa
 from bifa.errors import BifaError
 from bifa.files import is_stray, write_text
 from bifa.lock import locked
+from bifa.printable import counted
 from bifa.toml import parse_toml
 
 OnProgress = Callable[[str, float], None]  # what the running stage is at, and the share of that done, 0 to 1
@@ -236,7 +237,7 @@ def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, An
     differing += [f"another {name}" for name in _other_inputs(begun, asked)]
     if differing:
         trials = trials_in(scratch)
-        held = f"holds {trials} trial{'' if trials == 1 else 's'} of the stage {stage.name}, begun"
+        held = f"holds {counted(trials, 'trial')} of the stage {stage.name}, begun"
         raise StageError(
             f"{scratch} {held if trials else 'was begun'} with {', '.join(differing)}: go on there with what it was "
             "begun with, or name another folder for a new campaign; both are kept then"

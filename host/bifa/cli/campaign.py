@@ -8,6 +8,7 @@ import typer
 
 from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, examples, port_option, stoppable
 from bifa.computer import EXAMPLE_PORT
+from bifa.printable import counted
 
 if TYPE_CHECKING:
     from bifa.campaign.setup import Setup
@@ -176,6 +177,6 @@ def _kept(out: Path) -> str:
     except (OSError, ValueError, KeyError):
         done = []
     trials = sum(map(trials_in, out.glob(".*-unfinished")))
-    under_way = f"{trials} trial{'' if trials == 1 else 's'} of the stage under way" if trials else ""
+    under_way = f"{counted(trials, 'trial')} of the stage under way" if trials else ""
     kept = " and ".join(part for part in (f"the stages {', '.join(done)}" if done else "", under_way) if part)
     return f"{out} keeps {kept}" if kept else "nothing has been finished yet"

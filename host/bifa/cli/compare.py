@@ -27,20 +27,22 @@ def compare(
 
     check_targets(report)
 
-    from bifa.campaign.side_by_side import (
-        compare_page,
-        error_table,
-        gait_table,
-        parameter_table,
-        read_runs,
-        speed_table,
-        verdict_table,
-    )
-    from bifa.report.terminal import print_table
     from bifa.screen import Console
 
     console = Console()
-    found = read_runs(runs)
+    with console.status("reading"):
+        from bifa.campaign.side_by_side import (
+            compare_page,
+            error_table,
+            gait_table,
+            parameter_table,
+            read_runs,
+            speed_table,
+            verdict_table,
+        )
+        from bifa.report.terminal import print_table
+
+        found = read_runs(runs)
     for table in (verdict_table, speed_table, error_table, parameter_table):
         print_table(console, table(found))
     for which in found[0].gaits:

@@ -73,16 +73,18 @@ def diagnose(
 
     check_targets(json, out, report)
 
-    from bifa.campaign.resolve import refuse_leftovers
-    from bifa.data import read_dataset
-    from bifa.problem.accuracy import accuracies
-    from bifa.robot import load_model
     from bifa.screen import Console
 
     console = Console()
-    good_enough = accuracies(matters or ())
-    measured = read_dataset(dataset)
-    warn_of_units(console, measured)
+    with console.status("reading"):
+        from bifa.campaign.resolve import refuse_leftovers
+        from bifa.data import read_dataset
+        from bifa.problem.accuracy import accuracies
+        from bifa.robot import load_model
+
+        good_enough = accuracies(matters or ())
+        measured = read_dataset(dataset)
+        warn_of_units(console, measured)
     beside = named(dataset)
     folder = beside.with_name(f"{beside.name}-resolved") if resolve else None
     if folder is not None:
@@ -107,11 +109,13 @@ def _found(
     """The diagnosis of a data set; `resolved`: with experiments that separate, recorded into this folder."""
     from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
-    from bifa.campaign.resolve import resolve
-    from bifa.identify.start import prepare
-    from bifa.report.words import spoken
     from bifa.screen import words
-    from lacuna.diagnosis.diagnose import diagnose
+
+    with console.status("starting"):
+        from bifa.campaign.resolve import resolve
+        from bifa.identify.start import prepare
+        from bifa.report.words import spoken
+        from lacuna.diagnosis.diagnose import diagnose
 
     with Progress(SpinnerColumn(), words("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("fitting stiffness curves")

@@ -30,11 +30,12 @@ def doctor(
     colors = {"ok": "green", "missing": "red", "optional": "yellow"}
     console = Console(highlight=False)
     missing = False
-    for finding in run_checks(port):
-        missing |= finding.state == MISSING
-        console.print(Text.assemble((f"{finding.state:9}", colors[finding.state]), f" {finding.what:22} "), end="")
-        console.out(finding.found)
-        if finding.remedy:
-            console.out(f"{'':10}fix: {finding.remedy}")
+    with console.status("checking"):
+        for finding in run_checks(port):
+            missing |= finding.state == MISSING
+            said = Text.assemble((f"{finding.state:9}", colors[finding.state]), f" {finding.what:22} {finding.found}")
+            console.print(said, soft_wrap=True)
+            if finding.remedy:
+                console.out(f"{'':10}fix: {finding.remedy}")
     if missing:
         raise typer.Exit(1)

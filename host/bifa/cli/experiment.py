@@ -9,6 +9,7 @@ import typer
 
 from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, examples, file_option, stoppable
 from bifa.computer import EXAMPLE_PORT
+from bifa.printable import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -160,7 +161,7 @@ def _kept(out: Path) -> str:
     from bifa.data.write import partial_of
 
     partial = partial_of(out)
-    return f"{len(list(partial.glob('*.csv')))} finished trials are kept in {partial}"
+    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), 'finished trial')}"
 
 
 def _load(path: Path) -> "Gait":
@@ -186,6 +187,7 @@ def _run(
     from contextlib import nullcontext
 
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+    from rich.table import Column
 
     from bifa.cli.campaign import at_desk
     from bifa.measure.known import known_of
@@ -194,8 +196,8 @@ def _run(
     from bifa.screen import warning, words
 
     columns = (
-        words("{task.description}"),
-        BarColumn(),
+        words("{task.description}", table_column=Column(no_wrap=False)),  # where it is narrow, this one yields
+        BarColumn(bar_width=20),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
@@ -225,7 +227,7 @@ def _run(
                 on_event=show,
             )
             bars.update(task, completed=len(trials))
-    console.print(f"{out}: {len(dataset.trials)} trials, {len(errors)} of them just recorded.")
+    console.print(f"{out}: {counted(len(dataset.trials), 'trial')}, {len(errors)} just recorded.")
     if errors:
         console.print(
             f"Instruments and Uno synchronised to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."

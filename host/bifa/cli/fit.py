@@ -40,16 +40,19 @@ def fit(
 
     from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
-    from bifa.data import read_dataset
-    from bifa.identify.identification import identify
-    from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
-    from bifa.report.terminal import print_sections, print_table
-    from bifa.robot import load_model, save_model
+    from bifa.printable import counted
     from bifa.screen import Console, words
 
     console = Console()
-    measured = read_dataset(dataset)
-    warn_of_units(console, measured)
+    with console.status("reading"):
+        from bifa.data import read_dataset
+        from bifa.identify.identification import identify
+        from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
+        from bifa.report.terminal import print_sections, print_table
+        from bifa.robot import load_model, save_model
+
+        measured = read_dataset(dataset)
+        warn_of_units(console, measured)
     begun = time.perf_counter()
     columns = (SpinnerColumn(), words("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
@@ -75,6 +78,6 @@ def fit(
             draw(found, aside)
         console.print(f"pictures: {pictures}", highlight=False)
     console.print(
-        f"{out}: fitted to {len(measured.trials)} trials in {time.perf_counter() - begun:.1f} s. "
+        f"{out}: fitted to {counted(len(measured.trials), 'trial')} in {time.perf_counter() - begun:.1f} s. "
         f"Next: bifa simulate --model {out} --gait GAIT.toml, or bifa optimize --model {out} --out gait.toml"
     )

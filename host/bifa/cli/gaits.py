@@ -52,7 +52,7 @@ def gaits(
     title = "Gaits of the nominal robot: mm/s; head, tail ahead; vacuum of body, head, tail"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("gait", "speed", "9 in 10", "period, s", "ahead, °", "vacuum"):
-        table.add_column(heading, no_wrap=True)
+        table.add_column(heading, no_wrap=heading != "vacuum")  # which yields where it is narrow
     for name in names:
         entry = library.load(name)
         gait, notes = entry.gait, entry.provenance

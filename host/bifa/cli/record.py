@@ -54,8 +54,17 @@ def record(
         has_instruments = rig.instruments is not None
         if has_instruments:
             console.print(f"gait: {gait or 'the baseline'}, {steps}", highlight=False)
-            with stoppable(lambda: f"valves off; finished walks are kept in {out}.partial; the same command resumes"):
+            with stoppable(lambda: f"valves off; {_kept(out)}; the same command resumes"):
                 record_walks(rig, out, gait, cycles, repeats, console)
     if not has_instruments:
         console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking", highlight=False)
         record_telemetry(open_rig, port, out, gait, seconds, console)
+
+
+def _kept(out: Path) -> str:
+    """What an interrupted recording has on disk, in words."""
+    from bifa.data.write import partial_of
+    from bifa.printable import counted
+
+    partial = partial_of(out)
+    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), 'finished walk')}"

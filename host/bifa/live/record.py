@@ -19,6 +19,7 @@ from bifa.link import NoAnswerError, PortGoneError, RefusedError, RestartedError
 from bifa.link.table import CHAMBERS, MARK_PAUSE
 from bifa.lock import locked
 from bifa.measure.desk import Desk
+from bifa.printable import counted
 from bifa.rig import Rig, RigError, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
@@ -65,8 +66,10 @@ def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repe
     gait = steps.gait
     writer = DatasetWriter(out, "walks", provenance=provenance("bifa record"), resume=True)
     _check_same(writer, _settings(steps), round(cycles * gait.period_s, 2))
-    with Progress(console=console) as progress, Uno(rig.transport, rig.clock) as uno:
+    with Uno(rig.transport, rig.clock) as uno, Progress(console=console) as progress:
+        waiting = progress.add_task("waiting for the Uno", total=None)
         hello = uno.connect()
+        progress.remove_task(waiting)
         uno.clear()
         if steps.others:
             uno.upload(steps.others)
@@ -93,7 +96,7 @@ def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repe
                 progress.console.print(f"walk {repeat}: {speed.text}{more}", highlight=False)
     writer.finish()
     console.print(
-        f"{out}: {repeats} walk{'' if repeats == 1 else 's'} of {cycles} cycles, firmware {hello.firmware}; "
+        f"{out}: {counted(repeats, 'walk')} of {cycles} cycles, firmware {hello.firmware}; "
         f"look at it with: bifa check {out}"
     )
 

@@ -12,6 +12,7 @@ from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, camera_rate, resampled
 from bifa.measure.recording import LEAD_S, Recording, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
+from bifa.printable import counted
 from bifa.rig import Rig
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import Gait
@@ -71,7 +72,7 @@ def record_walk(
     with tape:
         tape.wait(LEAD_S, report=False)
         uno.run()
-        doing = f"The robot walks {cycles} cycle{'' if cycles == 1 else 's'} of {gait.period_s:g} s"
+        doing = f"The robot walks {counted(cycles, 'cycle')} of {gait.period_s:g} s"
         tape.wait(cycles * gait.period_s + LEAD_S, doing=doing)
     return RecordedWalk(
         _columns(tape, gait.period_s, cycles), tape.clock, tape.lost_samples, camera_rate(tape.instrument_s)

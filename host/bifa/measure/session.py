@@ -20,6 +20,7 @@ from bifa.link import Uno
 from bifa.lock import locked
 from bifa.measure.experiments import record_trial
 from bifa.measure.plan import PlannedTrial
+from bifa.printable import counted
 from bifa.rig import Rig
 
 
@@ -97,7 +98,7 @@ def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) 
     ]
     if differing:
         raise DatasetError(
-            f"{writer.partial} holds {len(writer.trials)} trials that were made with {', '.join(differing)}: go on "
+            f"{writer.partial} holds {counted(len(writer.trials), 'trial')} made with {', '.join(differing)}: go on "
             "with the same options, name another folder, or move it away"
         )
 

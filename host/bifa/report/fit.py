@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bifa.identify.identification import Identification
+from bifa.printable import counted
 from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
@@ -34,12 +35,12 @@ def fit_page(found: Identification) -> Page:
         else f"The base model does not describe this data: in the worst case its error is {worst:.1f} times "
         "the noise floor."
     )
-    counted = f"{len(found.intervals)} parameters were fitted to {len(dataset.trials)} trials."
+    fitted_to = f"{len(found.intervals)} parameters were fitted to {counted(len(dataset.trials), 'trial')}."
     labels = {trial.file: trial.label for trial in dataset.trials}
     curves = compared_curves(found.fit.problem.trials, {BASE: found.fit.predictions()}, labels)
     return Page(
         f"Fit of {dataset.name}",
-        f"{says} {counted}",
+        f"{says} {fitted_to}",
         [*parameters_and_remarks(found), *curves],
         (f"{BASE_MODEL} {RMS} {NOISE_FLOOR} {_OF_REPEATS}",),
         (errors_table(found),),

@@ -207,3 +207,18 @@ def test_a_page_to_be_written_need_not_be_there(command, tmp_path):
     assert found.exit_code != 0  # there is no data set
     assert "page.html" not in found.output
     assert "page.html" not in str(found.exception)
+
+
+def test_ctrl_c_while_the_command_is_loaded_ends_it_without_a_traceback(tmp_path):
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n")
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-m", "bifa"], capture_output=True, text=True, env=environment, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("width", [60, 200])
+def test_the_gaits_are_listed_whole_on_any_terminal(width):
+    said = CliRunner().invoke(app, ["gaits"], env={"COLUMNS": str(width)}).output
+    assert "…" not in said
+    assert max(map(len, said.partition("files:")[0].splitlines())) <= width
+    assert all(figure in said for figure in ("speed", "period", "23.5", "208, 334", "0.65, 0.43,"))

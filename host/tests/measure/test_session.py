@@ -245,7 +245,7 @@ def test_a_session_is_resumed_with_the_same_settings_only(tmp_path, change):
             assert len(begin(rig, options).trials) == 2
             return
         [(name, value)] = change.items()
-        with pytest.raises(DatasetError, match=f"1 trials that were made with {name} = {options[name]}, not {value}"):
+        with pytest.raises(DatasetError, match=f"1 trial made with {name} = {options[name]}, not {value}"):
             begin(rig, options | change)
         made = provenance("bifa experiment", "/dev/ttyACM0", options)
         with pytest.raises(DatasetError, match="virtual = True, not False"):
