@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks import records as lines
-from bifa.campaign.loop import Effort, campaign, found_gait
-from bifa.campaign.setup import Setup
+from bifa.campaign.loop import campaign, found_gait
+from bifa.campaign.setup import Effort, Setup
 from bifa.campaign.stages import Stage, run_stages
 from bifa.campaign.walks import foretold, measure_walks, planned_cycles, speeds
 from bifa.data import read_dataset

@@ -2,16 +2,15 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from bifa.campaign.about import about
 from bifa.campaign.again import Trades, again
 from bifa.campaign.prediction_error import prediction_errors
 from bifa.campaign.residuals import residuals
 from bifa.campaign.resolve import joined, resolve
-from bifa.campaign.setup import Setup
+from bifa.campaign.setup import Effort, Setup, about
 from bifa.campaign.stages import OnProgress, Stage
 from bifa.campaign.summary import summarize
 from bifa.campaign.walks import measure_walks, planned_cycles
@@ -37,15 +36,6 @@ from lacuna.diagnosis.record import as_record
 _AT_EDGE = 0.05  # of the robots that may fall off
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much is measured: `quick` measures each condition twice instead of three times, and faster."""
-
-    quick: bool = False
-    cycles: int = 7
-    repeats: int = 3
 
 
 def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:

@@ -1,10 +1,22 @@
-"""Where a campaign is run: a rig that is opened anew for every stage that measures."""
+"""Where a campaign is run, a rig that is opened for every stage that measures; how much it measures; both in words."""
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from bifa.measure.by_hand import ByHand
 from bifa.rig import Rig, is_offered, open_rig
+
+Pairs = list[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured: `quick` measures each condition twice instead of three times, and faster."""
+
+    quick: bool = False
+    cycles: int = 7
+    repeats: int = 3
 
 
 @dataclass(frozen=True)
@@ -51,3 +63,21 @@ class Setup:
 
     def _options(self, stage: int) -> dict[str, object]:
         return {**self.options, "seed": 100 * self.seed + stage} if self.is_virtual else dict(self.options)
+
+
+def about(setup: Setup, effort: Effort) -> tuple[str, Pairs]:
+    """The robot in words, and how the campaign was made; the same for the same settings."""
+    words = ["bifa", "campaign", "--port", setup.port]
+    if setup.is_virtual:
+        words += ["--seed", str(setup.seed)]
+    if "profile" in setup.options:
+        words += ["--profile", str(setup.options["profile"])]
+    if effort.quick:
+        words.append("--quick")
+    for name, value in setup.known.items():
+        words += ["--known", f"{name}={value!r}"]
+    robot = f"virtual robot {setup.seed}" if setup.is_virtual else f"robot on {setup.port}"
+    made = [("robot", robot), ("command", shlex.join(words))]
+    if setup.is_virtual:
+        made.append(("seed", str(setup.seed)))
+    return robot, made

@@ -46,8 +46,8 @@ def gait_names(incomplete: str = "") -> list[str]:
 
 def stages(incomplete: str = "") -> list[str]:
     """Stages of a campaign, for completion."""
-    from bifa.campaign.loop import Effort, campaign
-    from bifa.campaign.setup import Setup
+    from bifa.campaign.loop import campaign
+    from bifa.campaign.setup import Effort, Setup
 
     names = [stage.name for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)]
     return [name for name in names if name.startswith(incomplete)]

@@ -91,9 +91,10 @@ def run_campaign(
             setup = _attended(console, setup, watch, bench_file)
 
         with console.status("starting"):  # slow to import: the person is asked first
-            from bifa.campaign.loop import Effort, campaign
+            from bifa.campaign.loop import campaign
             from bifa.campaign.page import prediction_table, speed_table
             from bifa.campaign.progress import stage_progress
+            from bifa.campaign.setup import Effort
             from bifa.campaign.stages import run_stages
             from bifa.report.diagnosis import noise_table
             from bifa.report.terminal import plain_spaces, print_lines, print_table

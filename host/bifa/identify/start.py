@@ -16,7 +16,7 @@ from bifa.data import Dataset
 from bifa.identify.equilibria import PRESSURE_SD_PSI, reach_m, rests
 from bifa.identify.static import StaticFit, fit_static
 from bifa.problem.curves import FittedCurve
-from bifa.problem.errors import UndeterminedError
+from bifa.problem.stiffness import UndeterminedError
 from bifa.problem.system import RobotSystem, fittable
 from bifa.robot import Model, ModelParameterError
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from bifa.data import Dataset, Trial
 from bifa.identify.estimate import IntervalEstimate, weighted_mean
-from bifa.problem.errors import UndeterminedError
 from bifa.problem.motion import imposed_motion
-from bifa.problem.stiffness import StiffnessFit, fit_stiffness
+from bifa.problem.stiffness import StiffnessFit, UndeterminedError, fit_stiffness
 
 UNPRESSURISED_PSI = 0.05  # below this commanded pressure a trial counts as one at 0 psi
 

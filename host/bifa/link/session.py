@@ -17,7 +17,6 @@ from bifa.link.clock import Clock
 from bifa.link.errors import AbandonedError, MismatchError, NoAnswerError, RefusedError, RestartedError
 from bifa.link.table import COMMANDS, PROTOCOL_VERSION, START_CAUSES, TABLE_HASH
 from bifa.link.transport import Transport
-from bifa.link.words import word
 from bifa.printable import printable
 
 WINDOW = 4
@@ -31,6 +30,11 @@ ANSWERS = {  # of the commands that ask for something; the others are answered b
     "read_clock": "clock_report",
 }
 LEAST_WAIT_S = 1e-4  # so that time goes on, however finely a clock counts
+
+
+def word(words: Sequence[str], number: int) -> str:
+    """The word for `number`; a number that another version of the firmware may use is shown as it is."""
+    return words[number] if number < len(words) else f"unknown ({number})"
 
 
 @dataclass

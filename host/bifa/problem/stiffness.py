@@ -20,7 +20,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 from scipy.optimize import LinearConstraint, minimize
 
-from bifa.problem.errors import UndeterminedError
+from bifa.errors import BifaError
 from lacuna.estimation.autocorrelation import correlation_samples
 
 DEGREE = 15
@@ -28,6 +28,10 @@ CONTINUATION = 0.13  # of the static range, on either side, at most: beyond it t
 _PRIOR_POINTS = 6  # on either side
 _TOLD = 0.9  # share of the information that stems from static loading
 _MIN_POINTS = 4 * (DEGREE + 1)
+
+
+class UndeterminedError(BifaError):
+    """A parameter cannot be determined from this data set; the text says which, and which experiment would do it."""
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from bifa.toolchain.errors import ToolchainError
-from bifa.toolchain.run import run
+from bifa.toolchain.run import ToolchainError, run
 
 BAUD = "115200"  # of optiboot, the Uno's bootloader
 INSTALL = {

@@ -7,9 +7,8 @@ import serial
 
 from bifa.rig import find_port
 from bifa.rig.unopened import why_unopened
-from bifa.toolchain.errors import ToolchainError
 from bifa.toolchain.project import ENVIRONMENT, image_path, platformio_program
-from bifa.toolchain.run import run
+from bifa.toolchain.run import ToolchainError, run
 
 
 def choose_port(port: str | None) -> str:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import bifa
-from bifa.toolchain.errors import ToolchainError
+from bifa.toolchain.run import ToolchainError
 
 ENVIRONMENT = "uno"
 

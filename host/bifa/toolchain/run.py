@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bifa.computer import PORT_BUSY, PORT_REFUSED
-from bifa.toolchain.errors import ToolchainError
+from bifa.errors import BifaError
 
 LINES_KEPT = 12
 
@@ -19,6 +19,10 @@ REMEDIES = (
     (r"device or resource busy", PORT_BUSY),
     (r"HTTPClientError|InternetConnectionError", "PlatformIO lacks a package and cannot download it: run `make setup`"),
 )  # fmt: skip
+
+
+class ToolchainError(BifaError):
+    """A tool is missing, a build failed, or the board could not be written; it says what to do."""
 
 
 def run(

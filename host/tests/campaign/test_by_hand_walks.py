@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bifa.campaign import loop
-from bifa.campaign.loop import Effort, campaign
-from bifa.campaign.setup import Setup
+from bifa.campaign.loop import campaign
+from bifa.campaign.setup import Effort, Setup
 from bifa.campaign.stages import run_stages
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.data.layout import RAW

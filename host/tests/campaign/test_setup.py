@@ -6,9 +6,8 @@ import pytest
 
 import bifa.campaign.setup
 from bifa.campaign import loop
-from bifa.campaign.about import about
-from bifa.campaign.loop import Effort, campaign
-from bifa.campaign.setup import Setup
+from bifa.campaign.loop import campaign
+from bifa.campaign.setup import Effort, Setup, about
 from bifa.campaign.stages import StageError, run_stages
 from bifa.campaign.summary import _with_stand_in
 from bifa.cli.campaign import _kept

@@ -10,9 +10,8 @@ from numpy.polynomial import chebyshev
 
 from bifa.data import Dataset
 from bifa.identify.static import fit_static
-from bifa.problem.errors import UndeterminedError
 from bifa.problem.motion import imposed_motion
-from bifa.problem.stiffness import fit_stiffness
+from bifa.problem.stiffness import UndeterminedError, fit_stiffness
 from bifa.robot import nominal
 from harness.independent_lab import Lab
 

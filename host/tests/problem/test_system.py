@@ -8,9 +8,9 @@ import pytest
 
 from bifa.data import Dataset
 from bifa.identify.start import prepare
-from bifa.problem.errors import UndeterminedError
 from bifa.problem.inputs import inputs_of
 from bifa.problem.library import engine_effects
+from bifa.problem.stiffness import UndeterminedError
 from bifa.robot import ModelParameterError
 from harness.independent_lab import BASELINE, Lab
 from lacuna.estimation.fit import spread_starts
