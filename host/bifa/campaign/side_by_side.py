@@ -40,7 +40,7 @@ class CompareError(BifaError):
 
 
 @dataclass(frozen=True)
-class Run:
+class Campaign:
     """A finished campaign. models: "base" and "completed"; gaits: by name, the baseline not among them."""
 
     name: str
@@ -50,7 +50,7 @@ class Run:
     gaits: Mapping[str, Gait]
 
 
-def read_runs(folders: Sequence[Path]) -> list[Run]:
+def read_runs(folders: Sequence[Path]) -> list[Campaign]:
     """The campaigns in these folders, each by its folder's name, or by its path where names are equal."""
     if len(folders) < 2:
         raise CompareError("compare takes two campaigns or more: bifa compare out/monday out/tuesday")
@@ -60,7 +60,7 @@ def read_runs(folders: Sequence[Path]) -> list[Run]:
     return [_read(name, folder) for name, folder in zip(names, folders, strict=True)]
 
 
-def _read(name: str, folder: Path) -> Run:
+def _read(name: str, folder: Path) -> Campaign:
     try:
         summary = json.loads((folder / "summary.json").read_text())
     except FileNotFoundError:
@@ -73,10 +73,10 @@ def _read(name: str, folder: Path) -> Run:
         ) from None
     which = ("base", "completed")
     models = {w: load_model(folder / f"model-{w}.toml") for w in which}
-    return Run(name, folder, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})
+    return Campaign(name, folder, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})
 
 
-def compare_page(runs: Sequence[Run]) -> Page:
+def compare_page(runs: Sequence[Campaign]) -> Page:
     """All of it as a page."""
     return Page(
         f"{len(runs)} campaigns side by side",
@@ -98,7 +98,7 @@ def compare_page(runs: Sequence[Run]) -> Page:
     )
 
 
-def _lead(runs: Sequence[Run]) -> str:
+def _lead(runs: Sequence[Campaign]) -> str:
     found = {run.name: {effect["name"] for effect in run.summary["effects"]} for run in runs}
     shared = set.intersection(*found.values())
     speed, gait, where = max((_speed(run, gait), gait, run.name) for run in runs for gait in GAIT_NAMES)
@@ -116,15 +116,15 @@ def _names(effects: Iterable[str]) -> str:
     return " and ".join(effect_words(name) for name in sorted(effects))
 
 
-def _verdict(run: Run) -> str:
+def _verdict(run: Campaign) -> str:
     return verdict_sentence(run.summary["verdict"], run.summary["effects"], run.summary["remainder"])
 
 
-def _speed(run: Run, gait: str) -> float:
+def _speed(run: Campaign, gait: str) -> float:
     return next(g["measured"] for g in run.summary["gaits"] if g["gait"] == gait)
 
 
-def verdict_table(runs: Sequence[Run]) -> Table:
+def verdict_table(runs: Sequence[Campaign]) -> Table:
     """What each found."""
     rows = []
     for run in runs:
@@ -133,13 +133,13 @@ def verdict_table(runs: Sequence[Run]) -> Table:
     return Table(["run", "verdict", "effects"], rows, words=True)
 
 
-def speed_table(runs: Sequence[Run]) -> Table:
+def speed_table(runs: Sequence[Campaign]) -> Table:
     """Measured speeds of the gaits."""
     rows = [[run.name, *(f"{_speed(run, gait):.2f}" for gait in GAIT_NAMES)] for run in runs]
     return Table(["measured speed, mm/s", *GAIT_NAMES.values()], rows)
 
 
-def error_table(runs: Sequence[Run]) -> Table:
+def error_table(runs: Sequence[Campaign]) -> Table:
     """Errors on held-out trials, before and after, in the units of the instruments."""
     rows = []
     for run in runs:
@@ -151,7 +151,7 @@ def error_table(runs: Sequence[Run]) -> Table:
     return Table(["RMS error, held-out trials", "base model", "completed model", "noise floor"], rows)
 
 
-def parameter_table(runs: Sequence[Run]) -> Table:
+def parameter_table(runs: Sequence[Campaign]) -> Table:
     """The completed models' parameters; those that differ by more than their uncertainties are marked."""
     models = [run.models["completed"] for run in runs]
     rows = []
@@ -177,14 +177,14 @@ def _differ(parameters: Sequence[ModelParameter]) -> bool:
     )
 
 
-def gait_table(runs: Sequence[Run], which: str) -> Table:
+def gait_table(runs: Sequence[Campaign], which: str) -> Table:
     """The parameters of the gaits found with the "base" or the "completed" model."""
     gaits = [run.gaits[which].as_dict() for run in runs]
     rows = [[gait_parameter_words(name), *(plain(gait[name], 3) for gait in gaits)] for name in gaits[0]]
     return Table([f"gait {GAIT_NAMES[which]}", *(run.name for run in runs)], rows)
 
 
-def _errors(runs: Sequence[Run]) -> Chart:
+def _errors(runs: Sequence[Campaign]) -> Chart:
     pairs = {}
     for run in runs:
         before, after, floor = (run.summary["error"][side]["held_out"] for side in ("before", "after", "noise_floor"))
@@ -192,7 +192,7 @@ def _errors(runs: Sequence[Run]) -> Chart:
     return before_and_after(pairs, 1.0, "Error on held-out trials of each campaign, before and after")
 
 
-def _speeds(runs: Sequence[Run]) -> Chart:
+def _speeds(runs: Sequence[Campaign]) -> Chart:
     rows = np.arange(len(runs), 0, -1, dtype=float)
     series = [
         Series((GAIT_NAMES[gait],), np.array([_speed(run, gait) for run in runs]), rows, shade, "dots")

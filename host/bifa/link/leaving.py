@@ -32,14 +32,14 @@ FIRST_ATTEMPT_S = 0.25  # the next one waits twice as long: the computer may be 
 STANDING = (STATES.index("stopped"), STATES.index("fault"))
 
 
-class Robot(Protocol):
+class Mover(Protocol):
     """What can be stopped from a signal handler."""
 
     def send_stop(self) -> None:
         """Send the stop, without waiting for anything."""
 
 
-_inside: list[Robot] = []
+_inside: list[Mover] = []
 _earlier_handlers: dict[int, Any] = {}
 _earlier_hook: list[Callable[..., Any]] = []
 _held: list[int] = []
@@ -51,7 +51,7 @@ _SET_DEATH_SIGNAL, _GET_DEATH_SIGNAL = 1, 2  # PR_SET_PDEATHSIG, PR_GET_PDEATHSI
 _DEATH: Any = getattr(signal, "SIGUSR2", None)  # a signal of its own: it also comes when the parent's thread alone ends
 
 
-def enter(robot: Robot) -> None:
+def enter(robot: Mover) -> None:
     """From now on, until `leave`, signals that end a program, or suspend it, stop `robot` at once and raise
     KeyboardInterrupt.
 
@@ -69,7 +69,7 @@ def enter(robot: Robot) -> None:
     _inside.append(robot)
 
 
-def leave(robot: Robot) -> None:
+def leave(robot: Mover) -> None:
     """`robot` has been stopped; signals mean again what they meant before."""
     _inside.remove(robot)
     if not _inside and threading.current_thread() is threading.main_thread():

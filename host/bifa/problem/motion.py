@@ -17,7 +17,7 @@ _STRAIGHT = 1.2  # times the noise that neighbouring samples show: what straight
 _Line = tuple[float, float]  # level at time 0, slope
 
 
-class Motion(NamedTuple):
+class ImposedMotion(NamedTuple):
     """`displacement_m` and `direction` (1, 0 at rest, -1), shape (n,). `turned_s`, `turned_m`: when and where it went
     straight from one direction into the other between two samples, as far as that is known."""
 
@@ -27,7 +27,7 @@ class Motion(NamedTuple):
     turned_m: tuple[float, ...] = ()
 
 
-def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> Motion:
+def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMotion:
     """The imposed motion, from its measured displacement.
 
     A cross-head that is driven at constant rates goes by straight lines, which meet where it starts, turns and stops:
@@ -37,7 +37,7 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> Motion:
     displacement_m = np.asarray(displacement_m, float)
     n = len(displacement_m)
     if n < 3:
-        return Motion(displacement_m.copy(), np.zeros(n, int))
+        return ImposedMotion(displacement_m.copy(), np.zeros(n, int))
     window = min(_DIRECTION_WINDOW, n - 1 + n % 2)
     speed = savgol_filter(displacement_m, window, 1, deriv=1) / np.median(np.diff(time_s))
     direction = np.where(np.abs(speed) > 0.25 * np.abs(speed).max(), np.sign(speed), 0).astype(int)
@@ -47,10 +47,10 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> Motion:
     for start, stop in zip(np.r_[0, edges], np.r_[edges, n], strict=True):
         if stop - start >= _SMOOTHING_WINDOW:
             smooth[start:stop] = savgol_filter(displacement_m[start:stop], _SMOOTHING_WINDOW, 1)
-    return _straight(time_s, displacement_m, direction) or Motion(smooth, direction)
+    return _straight(time_s, displacement_m, direction) or ImposedMotion(smooth, direction)
 
 
-def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> Motion | None:
+def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:
     """The motion as straight lines; None where it was not one, as what they leave shows: it may not exceed what
     neighbouring samples differ by."""
     edges = np.flatnonzero(np.diff(direction)) + 1
@@ -72,7 +72,7 @@ def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndar
     turns = [k for k, (before, after) in enumerate(pairwise(slope)) if before * after < 0.0]
     turned_s = tuple(corners[k] for k in turns)
     turned_m = tuple(float(level[k] + slope[k] * corners[k]) for k in turns)
-    return Motion(path, np.sign(slope).astype(int)[place], turned_s, turned_m)
+    return ImposedMotion(path, np.sign(slope).astype(int)[place], turned_s, turned_m)
 
 
 def _rest_before(

@@ -27,7 +27,7 @@ from bifa.simulate.stepper import (
     X_SMALL_HEAD,
     X_SMALL_TAIL,
     X_TAIL,
-    Rig,
+    Mounting,
 )
 from bifa.simulate.timeline import NO_COMMANDS, Timeline, of_gait, timeline
 
@@ -280,7 +280,7 @@ def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> Simulated
 def _marched(
     kind: int,
     flats: Sequence[Plant],
-    mounted: Sequence[Rig],
+    mounted: Sequence[Mounting],
     commands: Sequence[Timeline],
     times_s: Sequence[np.ndarray],
     tolerance_m: float,

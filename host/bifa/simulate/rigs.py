@@ -9,7 +9,7 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.simulate import layout
 from bifa.simulate.plant import Plant
-from bifa.simulate.stepper import HAS_BODY, HAS_HEAD, HAS_TAIL, Rig
+from bifa.simulate.stepper import HAS_BODY, HAS_HEAD, HAS_TAIL, Mounting
 
 CLEAR = np.zeros((0, 0))
 ACTUATORS = ("large", "small")
@@ -20,12 +20,12 @@ class SimulationError(BifaError):
     """What was asked cannot be simulated; the text says why."""
 
 
-def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR) -> Rig:
+def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR) -> Mounting:
     """The whole robot in a pipe, uphill positive."""
     if not -90.0 <= inclination_deg <= 90.0:
         raise SimulationError(f"inclination_deg = {inclination_deg:g} is outside its range -90 to 90")
     segment = _SMALL_ACTUATORS * plant.q[layout.SMALL + layout.VOLUME]
-    return Rig(
+    return Mounting(
         parts=HAS_BODY | HAS_HEAD | HAS_TAIL,
         free=0,
         wall=1,
@@ -37,20 +37,20 @@ def pipe(plant: Plant, inclination_deg: float = 0.0, terrain: np.ndarray = CLEAR
     )
 
 
-def stand(plant: Plant, actuator: str, positive_psi: float) -> Rig:
+def stand(plant: Plant, actuator: str, positive_psi: float) -> Mounting:
     """One actuator, its bigger end clamped, on a level stand."""
     if actuator not in ACTUATORS:
         raise SimulationError(f"actuator {actuator!r} is not one of {', '.join(ACTUATORS)}")
     small = plant.q[layout.SMALL + layout.VOLUME]
     parts = HAS_BODY if actuator == "large" else HAS_HEAD
-    return Rig(parts, 1, 0, 0.0, _pressure(positive_psi), _vacuum(plant), np.array([1.0, small, small]), CLEAR)
+    return Mounting(parts, 1, 0, 0.0, _pressure(positive_psi), _vacuum(plant), np.array([1.0, small, small]), CLEAR)
 
 
-def anchor(plant: Plant, pressure_psi: float) -> Rig:
+def anchor(plant: Plant, pressure_psi: float) -> Mounting:
     """A head segment in the pipe."""
     segment = _SMALL_ACTUATORS * plant.q[layout.SMALL + layout.VOLUME]
     shares = np.array([1.0, segment, segment])
-    return Rig(HAS_HEAD, 1, 1, 0.0, _pressure(pressure_psi), _vacuum(plant), shares, CLEAR)
+    return Mounting(HAS_HEAD, 1, 1, 0.0, _pressure(pressure_psi), _vacuum(plant), shares, CLEAR)
 
 
 def _vacuum(plant: Plant) -> float:

@@ -18,7 +18,7 @@ from bifa.simulate.stepper import (
     VACUUM,
     X_HEAD,
     X_SMALL_HEAD,
-    Rig,
+    Mounting,
     coefficient,
     grip,
     sources,
@@ -58,7 +58,9 @@ def under_vacuum(plant, rig, run):
 
 @kernel
 def _supplied(rig, positive_psi):
-    return Rig(rig.parts, rig.free, rig.wall, rig.incline_rad, positive_psi, rig.negative_psi, rig.share, rig.terrain)
+    return Mounting(
+        rig.parts, rig.free, rig.wall, rig.incline_rad, positive_psi, rig.negative_psi, rig.share, rig.terrain
+    )
 
 
 @merged

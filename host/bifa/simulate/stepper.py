@@ -35,7 +35,7 @@ _ALIKE = 1e-9  # relative difference of two holds that counts as none
 TOO_LONG = -1
 
 
-class Rig(NamedTuple):
+class Mounting(NamedTuple):
     """Where the robot, or a part of it, is mounted, and what feeds it.
 
     `parts`: HAS_ bits. `free` = 1: the body's smaller end moves freely, the other is clamped (step response).

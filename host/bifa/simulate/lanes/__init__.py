@@ -15,7 +15,7 @@ from bifa.simulate.entries import entries
 from bifa.simulate.lanes.kernel import ANCHOR, PROGRESS, SEEN, STEP, WALK, Experiment, Kernel, Switches, kernels
 from bifa.simulate.locomotion import READ_BODY
 from bifa.simulate.plant import Plant
-from bifa.simulate.stepper import V_HEAD, V_TAIL, X_HEAD, X_TAIL, Rig
+from bifa.simulate.stepper import V_HEAD, V_TAIL, X_HEAD, X_TAIL, Mounting
 from bifa.simulate.tables import sealed
 
 __all__ = [
@@ -87,7 +87,7 @@ def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment)
 
 
 def load(
-    plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
+    plants: Sequence[Plant], rigs: Sequence[Mounting], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
 ) -> list[np.ndarray]:
     """Rows (2, samples) of each robot's static loading: force in N, reading in psi."""
     found = _kernels_for(plants)

@@ -36,7 +36,7 @@ typedef struct {
 
 typedef struct {
     Plant plant;
-    Rig rig;
+    Mounting rig;
     Run run;
     V until;
     Schedule schedule[LANES];
@@ -78,7 +78,7 @@ static void mount(Bench *bench, const Setting *setting, const Job *job, int i) {
     plant->learnt.rows[i] = job->learnt;
     plant->learnt.terms = setting->learnt_terms;
     plant->learnt.columns = setting->learnt_columns;
-    Rig *rig = &bench->rig;
+    Mounting *rig = &bench->rig;
     rig->parts = setting->parts;
     rig->free = setting->free;
     rig->wall = setting->wall;
@@ -165,7 +165,7 @@ static int begin(Bench *bench, const Setting *setting, const Job *job, int i) {
 static void sample(Bench *bench, const Setting *setting, Mask m) {
     V row[MOST_COLUMNS];
     Plant *plant = &bench->plant;
-    Rig *rig = &bench->rig;
+    Mounting *rig = &bench->rig;
     Run *run = &bench->run;
     switch (setting->experiment) {
         case WALK: walk_row_of(m, plant, rig, run, row); break;

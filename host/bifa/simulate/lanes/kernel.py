@@ -15,7 +15,7 @@ import numpy as np
 from bifa.simulate import locomotion
 from bifa.simulate.lanes import build
 from bifa.simulate.plant import Plant
-from bifa.simulate.stepper import Rig
+from bifa.simulate.stepper import Mounting
 
 WALK, SEEN, PROGRESS, STEP, ANCHOR = range(5)
 COLUMNS = (locomotion.COLUMNS, 7, 2, 3, 5)
@@ -55,7 +55,7 @@ class Experiment:
     """What is done to each robot, `Switches` and sample times of each; and what is the same for all."""
 
     kind: int
-    rigs: Sequence[Rig]
+    rigs: Sequence[Mounting]
     switches: Sequence[Switches]
     sample_s: Sequence[np.ndarray]
     tolerance_m: float
@@ -94,7 +94,7 @@ class Kernel:
         return rows
 
     def load(
-        self, plants: Sequence[Plant], rigs: Sequence[Rig], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
+        self, plants: Sequence[Plant], rigs: Sequence[Mounting], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
     ) -> list[np.ndarray]:
         """Rows (2, samples) of a static loading for each robot, force in N and reading in psi."""
         jobs, setting, kept = _jobs(plants, rigs)
@@ -110,7 +110,7 @@ class Kernel:
             raise MemoryError("no memory for a simulation")
 
 
-def _jobs(plants: Sequence[Plant], rigs: Sequence[Rig]) -> tuple[np.ndarray, _Setting, object]:
+def _jobs(plants: Sequence[Plant], rigs: Sequence[Mounting]) -> tuple[np.ndarray, _Setting, object]:
     """The jobs' robots and mountings, the setting, and what must live as long as they do."""
     jobs = np.zeros(len(plants), _JOB)
     learnt = [plant.learnt for plant in plants]

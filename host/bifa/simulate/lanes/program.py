@@ -21,7 +21,7 @@ _RUN = {
 _SHAPES = Shapes(
     fields={
         "Plant": {"q": "F[]", "active": "Active", "body_curve": "Curve", "small_curve": "Curve", "learnt": "Learnt"},
-        "Rig": {
+        "Mounting": {
             **{name: "i" for name in ("parts", "free", "wall")},
             **{name: "F" for name in ("incline_rad", "positive_psi", "negative_psi")},
             "share": "F[]",
@@ -46,7 +46,7 @@ _INTRINSICS: dict[Any, Intrinsic] = {
     together.anyone: Intrinsic("anyone({m}, {0}, {1})", "B"),
     together.anywhere: Intrinsic("any({0})", "b"),
 }
-_BENCH = ("Plant", "Rig", "Run")
+_BENCH = ("Plant", "Mounting", "Run")
 # What drive.c calls: its name there, the function, the kinds of its arguments, and whether it is of all lanes.
 _CALLED = (
     ("delay_of", chains.delay, ("Active", "F[]", "b"), True),

@@ -1,4 +1,4 @@
-// What a kernel works on, a vector of lanes where the numba code has a number (bifa.simulate: Plant, Rig, Run).
+// What a kernel works on, a vector of lanes where the numba code has a number (bifa.simulate: Plant, Mounting, Run).
 // NUMBERS, MEMORY and the constants of the layout are defined before.
 
 typedef struct {
@@ -43,7 +43,7 @@ typedef struct {
     long parts, free, wall;
     V incline_rad, positive_psi, negative_psi, share[3];
     Terrain terrain;
-} Rig;
+} Mounting;
 
 typedef struct {
     V y[STATES], z[MEMORY], clock[3], slip[1], command[3], gravity[2], source[3];
