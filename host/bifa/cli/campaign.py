@@ -164,7 +164,7 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
     desk = Desk(lambda text: console.print(text, highlight=False), watch, Countdown(console))
     exports = partial(read_exports, bench_file) if bench_file else dict
     exports()  # what is wrong is said before anything moves
-    return desk, ByHand(desk, watch, plain, exports)
+    return desk, ByHand(desk, watch, plain, exports, console.width)
 
 
 def _kept(out: Path) -> str:

@@ -95,7 +95,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
             continue
         known = np.flatnonzero(np.isfinite(values))
         if len(known) > 1:
-            for line in panel(known.astype(float), values[known], "row", label, plain):
+            for line in panel(known.astype(float), values[known], "row", label, plain, console.width):
                 console.print(line, markup=False, highlight=False)
 
 

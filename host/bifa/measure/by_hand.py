@@ -29,9 +29,9 @@ _LOOK_S = 0.25
 
 
 class ByHand:
-    """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; `exports`: says
-    how the instruments write their files, where that is declared; `before` is called before anything is asked, so that
-    no bar redraws itself over questions and answers."""
+    """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; it has so many
+    `columns`; `exports`: says how the instruments write their files, where that is declared; `before` is called before
+    anything is asked, so that no bar redraws itself over questions and answers."""
 
     def __init__(
         self,
@@ -39,8 +39,9 @@ class ByHand:
         watch: Path | None = None,
         plain: bool = False,
         exports: Callable[[], Mapping[str, Export]] = dict,
+        columns: int = 80,
     ) -> None:
-        self._desk, self._plain = desk, plain
+        self._desk, self._plain, self._columns = desk, plain, columns
         self._instruments = OwnInstruments(desk, watch, exports)
         self.before: Callable[[], None] = lambda: None
 
@@ -92,7 +93,7 @@ class ByHand:
                 return trial
 
     def _accepted(self, rig: Rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
-        for line in text_plot(trial, self._plain):
+        for line in text_plot(trial, self._plain, self._columns):
             self._desk.say(line)
         wrong = [str(finding) for finding in check_trial(trial)]
         if misfit := misfit_of(trial, writer.trials):
