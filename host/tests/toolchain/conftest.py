@@ -1,12 +1,10 @@
-"""Makes tools/ importable, and offers a machine that has the tools which the stand-ins are made of."""
+"""A machine that has the tools which the stand-ins are made of."""
 
-import sys
 from pathlib import Path
 
 import pytest
 
 PROJECT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(PROJECT / "tools"))
 
 
 @pytest.fixture

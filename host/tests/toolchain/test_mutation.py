@@ -1,12 +1,6 @@
 """The tool that makes mutants of the safety code: what it changes, what it leaves alone, and what it says of them."""
 
-import sys
-
 import pytest
-
-from harness.native import ROOT
-
-sys.path.insert(0, str(ROOT / "tools"))
 from mutation import __main__ as command
 from mutation.mutants import mutants
 

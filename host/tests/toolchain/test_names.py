@@ -1,32 +1,25 @@
 """`make lint` holds the words of docs/glossary.md."""
 
-import sys
 from pathlib import Path
 
+import names
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 
 
-@pytest.fixture
-def names(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "tools")
-    yield __import__("names")
-    sys.modules.pop("names", None)
-
-
 @pytest.mark.parametrize(
     "source", ["def begun_anew(): pass", "crew = 1", "optimise(x)", "class ColourBar: pass", "a.centre"]
 )
-def test_a_word_that_is_not_the_fields_is_told(names, source):
+def test_a_word_that_is_not_the_fields_is_told(source):
     assert names.faults_of(source, Path("one.py")) != []
 
 
 @pytest.mark.parametrize("source", ["optimize(x)", '"colour"  # afresh', "precise = exercise(new)", "finalists"])
-def test_other_words_and_prose_are_not(names, source):
+def test_other_words_and_prose_are_not(source):
     assert names.faults_of(source, Path("one.py")) == []
 
 
-def test_every_private_word_is_in_the_glossary_under_the_fields(names):
+def test_every_private_word_is_in_the_glossary_under_the_fields():
     glossary = (ROOT / "docs/glossary.md").read_text("utf-8")
     assert [word for word in names.PRIVATE if word not in glossary] == []
