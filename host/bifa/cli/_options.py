@@ -71,9 +71,9 @@ KNOWN = typer.Option(
     autocompletion=known_names,
 )
 RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
-WATCH = typer.Option(help="Folder in which your instruments' files appear, or below it (serial port).")
-BENCH = typer.Option(help="File that says how your instruments write theirs (bifa instrument).")
-PROFILE = typer.Option(help="Of a virtual robot; ideal: the paper's equations and white noise.")
+WATCH = typer.Option(help="Folder in which your instruments save, subfolders included (serial port).")
+BENCH = typer.Option(help="File that declares how your instruments write theirs (bifa instrument).")
+PROFILE = typer.Option(help="Profile of a virtual robot; ideal: the paper's equations and white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
 

@@ -34,12 +34,16 @@ def register(app: typer.Typer) -> None:
 def campaign(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/campaign"),
     port: Annotated[str, port_option("`virtual`, a serial port, or the name of your own rig.")] = "virtual",
-    seed: Annotated[int, typer.Option(min=0, help="Of the virtual robot, its undisclosed effect, all noise.")] = 0,
-    quick: Annotated[bool, typer.Option("--quick", help="Each condition twice, not three times; faster.")] = False,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed of a virtual robot, its undisclosed effect and all noise.")
+    ] = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
+    ] = False,
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path,
-        typer.Option(help="File of what you measured once, and of how your instruments write (serial port)."),
+        typer.Option(help="What is known of your bench, and how your instruments write their files (serial port)."),
     ] = Path("bench.toml"),
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     profile: Annotated[Profile, PROFILE] = "realistic",

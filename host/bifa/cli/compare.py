@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
 
 
 def compare(
-    runs: Annotated[list[Path], typer.Argument(help="Folders of finished campaigns, two or more.", show_default=False)],
+    runs: Annotated[list[Path], typer.Argument(help="Two or more folders of finished campaigns.", show_default=False)],
     report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report.")] = None,
 ) -> None:
     """Compare the models, verdicts and gaits of several campaigns."""

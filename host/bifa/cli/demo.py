@@ -17,8 +17,12 @@ def register(app: typer.Typer) -> None:
 
 def demo(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Of the robot, its undisclosed effect and all noise.")] = 4,
-    quick: Annotated[bool, typer.Option("--quick", help="Each condition twice, not three times; faster.")] = False,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Random seed of the robot, its undisclosed effect and all noise.")
+    ] = 4,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
+    ] = False,
     profile: Annotated[Profile, PROFILE] = "realistic",
     rerun: Annotated[list[str], RERUN] = [],  # noqa: B006
 ) -> None:

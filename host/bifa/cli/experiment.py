@@ -75,25 +75,28 @@ def experiment(
     port: Annotated[str | None, PORT] = None,
     actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
-    rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed, mm/s.")] = None,
+    rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed in mm/s.")] = None,
     gait: Annotated[list[Path] | None, file_option("Gait file to walk; otherwise three built-in gaits.")] = None,
     cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk.")] = 5,
-    inclination: Annotated[float, typer.Option(help="Slope of the pipe, degrees, uphill positive.")] = 0.0,
+    inclination: Annotated[float, typer.Option(help="Pipe inclination in degrees (positive = uphill).")] = 0.0,
     repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
     quick: Annotated[
         bool, typer.Option("--quick", help="Quick run: two repeats instead of three, at higher speed.")
     ] = False,
     profile: Annotated[Profile | None, PROFILE] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of a virtual rig: its noise.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Random seed of a virtual rig's noise.")] = None,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[Path, BENCH] = Path("bench.toml"),
     instrument: Annotated[Path | None, file_option("File of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[
-        Path | None, typer.Option(help="The Uno's telemetry from the same time (bifa record).", exists=True)
+        Path | None, typer.Option(help="The Uno's telemetry of the same trial (bifa record).", exists=True)
     ] = None,
     add: Annotated[
-        bool, typer.Option("--add", help="With --instrument: to the data set OUT, as the next repeat of its condition.")
+        bool,
+        typer.Option(
+            "--add", help="With --instrument: add it to the data set OUT as the next repeat of its condition."
+        ),
     ] = False,
 ) -> None:
     """Run a characterisation experiment and write the measurements as a data set.

@@ -19,8 +19,8 @@ def register(app: typer.Typer) -> None:
 
 def flash(
     port: Annotated[str | None, port_option("The Uno's serial port; detected if left out.")] = None,
-    build_only: Annotated[bool, typer.Option("--build-only", help="Build the image, write nothing.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the tools' whole output.")] = False,
+    build_only: Annotated[bool, typer.Option("--build-only", help="Build the image but do not write it.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show the full output of the tools.")] = False,
 ) -> None:
     """Write the firmware to the Uno, and check that it answers: in a clone of the repository the one that PlatformIO
     builds there, elsewhere the one that belongs to this installation, by avrdude.

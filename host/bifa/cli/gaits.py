@@ -26,7 +26,7 @@ def gaits(
         Path | None, typer.Option(help="Folder where --make writes; the package itself if left out.")
     ] = None,
     only: Annotated[
-        list[str], typer.Option(help="Only this one; may be repeated.", metavar="GAIT", autocompletion=gait_names)
+        list[str], typer.Option(help="Only this gait; repeatable.", metavar="GAIT", autocompletion=gait_names)
     ] = [],  # noqa: B006
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches.")] = 0,
 ) -> None:

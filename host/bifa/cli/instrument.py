@@ -33,7 +33,7 @@ def instrument(
         typer.Argument(help="An export of the instrument.", show_default=False, exists=True, dir_okay=False),
     ] = None,
     role: Annotated[str | None, typer.Option(help="machine or camera; otherwise you are asked.")] = None,
-    bench: Annotated[Path, typer.Option(help="The bench's file, which takes the declaration.")] = Path("bench.toml"),
+    bench: Annotated[Path, typer.Option(help="File to write the declaration to.")] = Path("bench.toml"),
     presets: Annotated[bool, typer.Option("--presets", help="List the programs whose exports are known.")] = False,
 ) -> None:
     """Look at an instrument's export, and declare how it is written.

@@ -35,7 +35,7 @@ def monitor(
     port: Annotated[str | None, PORT] = None,
     gait: Annotated[Path | None, file_option("Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
-    web: Annotated[bool, typer.Option("--web", help="On a page in the browser, with sliders for the gait.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="Open a page in the browser, with sliders for the gait.")] = False,
     web_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = _WEB_PORT,
     model: Annotated[Path | None, file_option("Model for the page's predictions; the nominal one if left out.")] = None,
     seconds: Annotated[

@@ -44,7 +44,8 @@ def optimize(
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the search and of the sampled robots.")] = 0,
     evaluations: Annotated[
-        int | None, typer.Option(min=20, help="Most gaits to evaluate per run; 1000 for bo.", show_default=False)
+        int | None,
+        typer.Option(min=20, help="Greatest number of gaits to evaluate per run; 1000 for bo.", show_default=False),
     ] = None,
     runs: Annotated[
         int | None,
@@ -52,7 +53,9 @@ def optimize(
     ] = None,
     spread: Annotated[
         float | None,
-        typer.Option(help="Relative sd of every parameter; left out: what the model's fit knows, or a guess of 0.02."),
+        typer.Option(
+            help="Relative sd of every parameter; by default what the model's fit knows, else a guess of 0.02."
+        ),
     ] = None,
     period: Annotated[tuple[float, float], typer.Option(help="Range of the period in s.")] = (2.0, 4.0),
     dask: Annotated[str | None, typer.Option(help=cluster.HELP)] = None,

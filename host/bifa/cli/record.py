@@ -24,9 +24,12 @@ def record(
     gait: Annotated[
         Path | None, file_option("Gait to walk; otherwise the baseline, or no walk (without instruments).")
     ] = None,
-    cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk (with instruments).")] = 6,
-    repeats: Annotated[int, typer.Option(min=1, help="Walks (with instruments).")] = 1,
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="Length (without instruments); else Ctrl-C.")] = None,
+    cycles: Annotated[int, typer.Option(min=1, help="Cycles per walk (with instruments).")] = 6,
+    repeats: Annotated[int, typer.Option(min=1, help="Number of walks (with instruments).")] = 1,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="Stop after this many seconds (without instruments; default: until Ctrl-C)."),
+    ] = None,
 ) -> None:
     """Record walks. On a rig with motion capture: a data set for `bifa check` and `bifa diagnose`.
 

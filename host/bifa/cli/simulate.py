@@ -47,7 +47,9 @@ def simulate(
         Obstacle | None,
         typer.Option(help="Obstacle from the paper, placed 10 cm ahead.", show_default=False),
     ] = None,
-    buckling: Annotated[float, typer.Option(help="Force that buckles a ring of supports, N (assumed).")] = _BUCKLING_N,
+    buckling: Annotated[
+        float, typer.Option(help="Force in N that buckles a ring of supports (assumed).")
+    ] = _BUCKLING_N,
     pictures: Annotated[Path | None, PICTURES] = None,
     out: Annotated[Path | None, typer.Option(help="CSV of all channels at 100 Hz, as a data set's locomotion.")] = None,
     paper: Annotated[

@@ -30,7 +30,7 @@ def upload(
     port: Annotated[str | None, PORT] = None,
     save: Annotated[str | None, typer.Option(help="Keep it on the Uno as a preset of this name.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Then walk until Ctrl-C.")] = False,
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="With --run: walk for this long only.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="With --run: stop after this many seconds.")] = None,
 ) -> None:
     """Send a gait to the Uno and read it back; the parameters that the file does not name stay as they are.
 
