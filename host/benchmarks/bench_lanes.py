@@ -32,7 +32,7 @@ def run() -> dict[str, float]:
     near, far = _robots(_NEAR, 1 + 2 * (many.lanes - 1)), _robots(_FAR, _ROBOTS)
     for name in ("walk", "step", "pull"):
         what = _experiment(name, near)
-        numba = _best(lambda what=what: lanes._in_numba(what, 0, near[0]))
+        numba = _best(lambda what=what: lanes.in_numba(what, 0, near[0]))
         single = _best(lambda what=what: one.march(near[:1], _first(what, 1), False))
         together = _best(lambda what=what: lanes.march(near, what, True)) / len(near)
         own = _best(lambda name=name: many.march(far, _experiment(name, far), False)) / len(far)
@@ -108,7 +108,7 @@ def _first(what: lanes.Experiment, count: int) -> lanes.Experiment:
 
 
 def _mean_in_numba(what: lanes.Experiment, plants: list[simulate.Plant]) -> float:
-    return float(np.mean([_best(lambda k=k: lanes._in_numba(what, k, plants[k]), 5) for k in range(len(plants))]))
+    return float(np.mean([_best(lambda k=k: lanes.in_numba(what, k, plants[k]), 5) for k in range(len(plants))]))
 
 
 def _best(job, tries: int = _TRIES) -> float:

@@ -72,7 +72,7 @@ def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stag
 
 def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]]) -> None:
     base, completed = (load_model(inputs / f"model-{which}.toml") for which in ("base", "completed"))
-    datasets = [_with_stand_in(read_dataset(inputs / "walks-base")), read_dataset(inputs / "walks-completed")]
+    datasets = [with_stand_in(read_dataset(inputs / "walks-base")), read_dataset(inputs / "walks-completed")]
     trials = [trial for dataset in datasets for trial in dataset.trials]
     results = []
     for dataset in datasets:
@@ -142,7 +142,7 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -
     )
 
 
-def _with_stand_in(walked: Dataset) -> Dataset:
+def with_stand_in(walked: Dataset) -> Dataset:
     """Where no gait walks on the base model, the baseline was walked for both, once."""
     if any(_gait(trial) == "base" for trial in walked.trials):
         return walked

@@ -90,7 +90,7 @@ def run_campaign(
 
     console = Console()
     setup = Setup(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
-    with stoppable(lambda: f"{_kept(out)}. The same command resumes there"):
+    with stoppable(lambda: f"{kept_on_disk(out)}. The same command resumes there"):
         if setup.is_by_hand:
             setup = _attended(console, setup, watch, bench_file)
 
@@ -171,7 +171,7 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
     return desk, ByHand(desk, watch, plain, exports, console.width)
 
 
-def _kept(out: Path) -> str:
+def kept_on_disk(out: Path) -> str:
     """What an interrupted campaign has on disk, in words."""
     import json
 

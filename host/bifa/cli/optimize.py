@@ -72,7 +72,7 @@ def optimize(
     """
     from bifa.files import check_targets
 
-    folder = pictures or _beside(out)
+    folder = pictures or pictures_beside(out)
     check_targets(out, folders=() if no_pictures else (folder,), inputs=(model,))
 
     from bifa.gait import Settings, paper_space, simulations
@@ -95,7 +95,7 @@ def optimize(
             _explain(console, robot, pool, best, folder)
 
 
-def _beside(out: Path) -> Path:
+def pictures_beside(out: Path) -> Path:
     """The folder for the pictures: named as the gait file, unless that is the file itself or a data set."""
     out = named(out)
     folder = out.with_suffix("")

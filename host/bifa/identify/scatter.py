@@ -34,13 +34,13 @@ def scatter_of(fit: Fit) -> Scatter:
         "force_N": _unexplained(fit, (STATIC, ANCHOR), lambda residual: _joined(residual, "force")),
         "speed": _speed(fit),
     }
-    for name, drift in _drifts(fit).items():
+    for name, drift in session_drifts(fit).items():
         found[name] = float(np.hypot(found[name], drift))
     rounded = {name: float(f"{value:.4g}") for name, value in found.items()}
-    return replace(_timing(cast(RobotSystem, fit.structure.system)), **rounded)
+    return replace(switch_timing(cast(RobotSystem, fit.structure.system)), **rounded)
 
 
-def _drifts(fit: Fit) -> dict[str, float]:
+def session_drifts(fit: Fit) -> dict[str, float]:
     """RMS over the session of what was learnt to drift, by the scatter that it adds to: the next walk is at a place in
     another session, which nobody knows."""
     learnt = {c.site: float(np.sqrt(np.mean(c.table**2))) for c in fit.structure.corrections(fit.theta)}
@@ -57,7 +57,7 @@ def _supply_psi(fit: Fit) -> float:
     return fit.theta.get("supply_positive_psi", cast(RobotSystem, fit.structure.system).model["supply_positive_psi"])
 
 
-def _timing(system: RobotSystem) -> Scatter:
+def switch_timing(system: RobotSystem) -> Scatter:
     """That of the walks, in the mean: near the edge a quarter of a per cent of the period decides, and a few
     milliseconds do."""
     walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]

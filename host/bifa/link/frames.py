@@ -113,10 +113,10 @@ def decode(frame: bytes, session: int) -> Report | None:
     seed = {"open": OPEN_SEED, "stream": STREAM_SEED, "session": session}[message.kind]
     if len(content) != 2 + struct.calcsize(message.layout) or checks(content, seed) != check:
         return None
-    return Report(message.name, body[1], _unpack(message, content[2:]))
+    return Report(message.name, body[1], unpack(message, content[2:]))
 
 
-def _unpack(message: Message, data: bytes) -> dict[str, Any]:
+def unpack(message: Message, data: bytes) -> dict[str, Any]:
     values = list(struct.unpack(message.layout, data))
     fields = {}
     for name, count in message.fields:

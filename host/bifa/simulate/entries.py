@@ -37,15 +37,15 @@ _PLAIN = {
 }
 
 
-def _sources() -> list[str]:
+def sources() -> list[str]:
     """Of the simulator, of every effect wherever its file lies, and of the chains that join them."""
     paths = [path for path in sorted(Path(__file__).parent.glob("*.py")) if path.name not in _PLAIN]
     own = [path.read_text("utf-8") for path in paths]
     return [*own, *(inspect.getsource(module) for module in effects.modules().values()), hooks.chain_source()]
 
 
-def _entry_source() -> str:
-    lines = [f'"""Generated; sources {generated.digest(*_sources())}."""', "from numba import njit"]
+def entry_source() -> str:
+    lines = [f'"""Generated; sources {generated.digest(*sources())}."""', "from numba import njit"]
     for name, module in _ENTRIES.items():
         lines.append(f"from bifa.simulate.{module} import {name} as _{name}")
     for name, module in _ENTRIES.items():
@@ -60,4 +60,4 @@ def _arguments(module: str, name: str) -> list[str]:
     return list(inspect.signature(function.py_func).parameters)
 
 
-entries = generated.load("entries", _entry_source())
+entries = generated.load("entries", entry_source())

@@ -102,7 +102,7 @@ def walks(
 
 def _seen(flat: Plant, _: Timeline, rows: np.ndarray, time_s: np.ndarray) -> tuple[dict[str, Any], ...]:
     start = flat.q[layout.BODY + layout.CONTRACTED]
-    head_m, tail_m = (_as_stamped(flat, time_s, *rows[at : at + 2]) for at in (0, 2))
+    head_m, tail_m = (as_stamped(flat, time_s, *rows[at : at + 2]) for at in (0, 2))
     columns = {
         "time_s": time_s,
         "displacement_head_mm": (head_m - start) * _MM,
@@ -178,7 +178,7 @@ def step_responses(
 
 
 def _stepped(flat: Plant, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
-    displacement_m = _as_stamped(flat, time_s, rows[0], rows[1])
+    displacement_m = as_stamped(flat, time_s, rows[0], rows[1])
     columns = {"time_s": time_s, "displacement_mm": displacement_m * _MM, "pressure_psi": rows[2]}
     return SimulatedTrial("step_response", columns, {"velocity_m_s": rows[1]})
 
@@ -292,7 +292,7 @@ def _marched(
     return lanes.march(flats, what, together)
 
 
-def _as_stamped(flat: Plant, time_s: np.ndarray, position_m: np.ndarray, velocity_m_s: np.ndarray) -> np.ndarray:
+def as_stamped(flat: Plant, time_s: np.ndarray, position_m: np.ndarray, velocity_m_s: np.ndarray) -> np.ndarray:
     """Positions (n,) as an instrument stamps them whose clock the effects shift: what was there at other times."""
     late_s = chains.stamp(flat.active, flat.q) if flat.active & chains.STAMP else 0.0
     if late_s == 0.0 or not (np.isfinite(position_m).all() and np.isfinite(velocity_m_s).all()):

@@ -36,20 +36,20 @@ def run_checks(port: str | None) -> Iterator[Check]:
     """Make every check; the board's last, because opening its port resets it."""
     yield Check("bifa", OK, f"bifa {__version__}, Python {sys.version.split()[0]}")
     if find_project() is not None:
-        yield _guarded("PlatformIO", _platformio)
-        yield _guarded("PlatformIO's packages", _packages)
-        yield _guarded("firmware image", _image)
+        yield guarded("PlatformIO", _platformio)
+        yield guarded("PlatformIO's packages", check_packages)
+        yield guarded("firmware image", check_image)
     else:
-        yield _guarded("avrdude", lambda what: Check(what, OK, str(avrdude_program())))
-        yield _guarded("firmware image", _carried)
-    yield _guarded("virtual robot", _virtual_rig)
-    yield _guarded("serial ports", _ports)
+        yield guarded("avrdude", lambda what: Check(what, OK, str(avrdude_program())))
+        yield guarded("firmware image", _carried)
+    yield guarded("virtual robot", _virtual_rig)
+    yield guarded("serial ports", _ports)
     for program, purpose in OPTIONAL_TOOLS:
         yield _optional_tool(program, purpose)
-    yield _guarded("firmware on the board", lambda what: _board(what, port))
+    yield guarded("firmware on the board", lambda what: check_board(what, port))
 
 
-def _guarded(what: str, check: Callable[[str], Check]) -> Check:
+def guarded(what: str, check: Callable[[str], Check]) -> Check:
     """An expected error is a finding as well: its text says what to do."""
     try:
         return check(what)
@@ -65,7 +65,7 @@ def _platformio(what: str) -> Check:
     return Check(what, OK, done.stdout.strip())
 
 
-def _packages(what: str) -> Check:
+def check_packages(what: str) -> Check:
     try:
         source = json.loads((project_folder() / ".platformio" / "provisioned.json").read_text())["source"]
     except (OSError, ValueError, KeyError):
@@ -75,7 +75,7 @@ def _packages(what: str) -> Check:
     return Check(what, OK, {"registry": "from its registry"}.get(source, "stand-ins from PyPI and Debian"))
 
 
-def _image(what: str) -> Check:
+def check_image(what: str) -> Check:
     project = project_folder()
     image = image_path(project)
     if not image.is_file():
@@ -125,7 +125,7 @@ def _optional_tool(program: str, purpose: str) -> Check:
     return Check(program, OPTIONAL, "not installed", f"needed by {purpose}, which installs it")
 
 
-def _board(what: str, port: str | None) -> Check:
+def check_board(what: str, port: str | None) -> Check:
     """Ask the board who it is; only where a port is named or an Uno is plugged in."""
     if port is None and not any(candidate.board for candidate in serial_ports()):
         return Check(what, OPTIONAL, "no board to ask", "plug the Uno in, or name its port: --port")

@@ -9,8 +9,8 @@ from bifa.campaign import loop
 from bifa.campaign.loop import campaign
 from bifa.campaign.setup import Effort, Setup, about
 from bifa.campaign.stages import StageError, run_stages
-from bifa.campaign.summary import _with_stand_in
-from bifa.cli.campaign import _kept
+from bifa.campaign.summary import with_stand_in
+from bifa.cli.campaign import kept_on_disk
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
 from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench, read_exports
@@ -163,9 +163,9 @@ def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
 def test_a_baseline_that_stands_in_is_told_under_both_names():
     (walk,) = [Trial("baseline_1.csv", "locomotion", columns={}, gait=BASELINE.as_dict(), repeat=1)]
     walked = Dataset(None, "walks", {}, (walk,), {})
-    assert [trial.file for trial in _with_stand_in(walked).trials] == ["baseline_1.csv", "base_1.csv"]
+    assert [trial.file for trial in with_stand_in(walked).trials] == ["baseline_1.csv", "base_1.csv"]
     both = replace(walked, trials=(walk, replace(walk, file="base_1.csv")))
-    assert _with_stand_in(both) is both
+    assert with_stand_in(both) is both
 
 
 def test_what_to_type_for_the_same_campaign_again_has_all_that_decides_it():
@@ -179,4 +179,4 @@ def test_walks_of_a_round_under_way_are_counted_as_kept(tmp_path):
     folder = tmp_path / ".again-unfinished" / "rounds" / "walks-2.partial"
     folder.mkdir(parents=True)
     (folder / "round-2_1.csv").write_text("")
-    assert "keeps 1 trial of the stage under way" in _kept(tmp_path)
+    assert "keeps 1 trial of the stage under way" in kept_on_disk(tmp_path)

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import bifa
 from bifa.campaign.stages import StageError
 from bifa.cli import app
-from bifa.cli.optimize import _beside
+from bifa.cli.optimize import pictures_beside
 from bifa.files import TargetError
 
 COMMANDS = sorted(typer.main.get_command(app).commands)
@@ -78,9 +78,9 @@ def test_a_campaign_is_not_run_in_a_data_set(tmp_path, command):
 def test_pictures_go_neither_into_the_gait_file_nor_into_a_data_set(tmp_path):
     (tmp_path / "bench").mkdir()
     (tmp_path / "bench" / "dataset.toml").write_text("mine")
-    assert _beside(tmp_path / "gait.toml") == tmp_path / "gait"
-    assert _beside(tmp_path / "gait") == tmp_path / "gait-pictures"
-    assert _beside(tmp_path / "bench.toml") == tmp_path / "bench-pictures"
+    assert pictures_beside(tmp_path / "gait.toml") == tmp_path / "gait"
+    assert pictures_beside(tmp_path / "gait") == tmp_path / "gait-pictures"
+    assert pictures_beside(tmp_path / "bench.toml") == tmp_path / "bench-pictures"
 
 
 USAGE = [

@@ -7,7 +7,7 @@ import pytest
 
 from bifa.data import Dataset, Trial
 from bifa.errors import BifaError
-from bifa.identify.scatter import _drifts, _timing, shared_square
+from bifa.identify.scatter import session_drifts, shared_square, switch_timing
 from bifa.robot import BASELINE, load_model, nominal, save_model
 from bifa.robot.model import Scatter
 from lacuna.system import Correction
@@ -30,7 +30,7 @@ def test_the_scatter_says_how_the_uno_keeps_time():
             [{"clock_rate": 1.004, "dead_time_s": 0.004, "switch_error_s": 0.0005}, {"clock_rate": 1.002}], start=1
         )
     ]
-    timing = _timing(SimpleNamespace(dataset=Dataset(None, "day", {}, tuple(trials), {})))
+    timing = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, tuple(trials), {})))
     assert timing == Scatter(clock=0.99701, dead_time_s=0.002, switch_error_s=0.00025)
 
 
@@ -39,7 +39,7 @@ def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
     day = np.linspace(-1.0, 1.0, 65)[None]
     learnt = (Correction("vacuum_of_the_day", 0.3 * day), Correction("area_of_the_day", 0.02 * day))
     structure = SimpleNamespace(corrections=lambda theta: learnt, system=SimpleNamespace(model=nominal()))
-    drifts = _drifts(SimpleNamespace(structure=structure, theta={"body_area_N_psi": 9.0}))
+    drifts = session_drifts(SimpleNamespace(structure=structure, theta={"body_area_N_psi": 9.0}))
     rms = np.sqrt(np.mean(day**2))
     assert drifts == pytest.approx({"pressure_psi": 0.3 * rms, "force_N": 0.02 * rms * 9.0 * 8.5})
 

@@ -83,7 +83,7 @@ def test_an_unknown_start_cause_of_another_version_is_a_mismatch(board):
 
 @given(st.binary(min_size=13, max_size=13))
 def test_any_hello_can_be_read(raw):
-    Hello.of(Report("hello", 0, frames._unpack(REPORTS["hello"], raw)))
+    Hello.of(Report("hello", 0, frames.unpack(REPORTS["hello"], raw)))
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def connected() -> Uno:
 def test_any_sample_can_be_shown_and_recorded(connected, raw):
     uno = connected
     uno._last_sample = None
-    uno._take_sample(Report("sample", 0, frames._unpack(REPORTS["sample"], raw)))
+    uno._take_sample(Report("sample", 0, frames.unpack(REPORTS["sample"], raw)))
     (sample,) = uno.taken_samples()
     assert sample.state in STATES or sample.state == f"unknown ({raw[6]})"
     monitor = Monitor(uno)
@@ -113,7 +113,7 @@ def test_any_sample_can_be_shown_and_recorded(connected, raw):
 def test_any_status_can_be_read(raw):
     board = Board()
     uno = Uno(board, board)
-    uno.session.call = lambda name: Report("status_report", 0, frames._unpack(REPORTS["status_report"], raw))
+    uno.session.call = lambda name: Report("status_report", 0, frames.unpack(REPORTS["status_report"], raw))
     assert asdict(uno.status())["valves"] == raw[29]
 
 

@@ -38,10 +38,10 @@ def test_a_changed_source_gets_another_file(tmp_path, monkeypatch):
 
 
 def test_the_entries_name_depends_on_every_compiled_source():
-    sources = "".join(entries._sources())
+    sources = "".join(entries.sources())
     for told in ("def march(", "def step(", "def pressure_after(", "Dahl's equation", "def static_record("):
         assert told in sources
-    assert entries.entries.__name__.endswith(generated.digest(entries._entry_source()))
+    assert entries.entries.__name__.endswith(generated.digest(entries.entry_source()))
 
 
 @pytest.fixture

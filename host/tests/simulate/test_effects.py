@@ -15,7 +15,7 @@ from bifa.effects import EffectError, EffectParameter, PhysicalEffect
 from bifa.simulate import hooks, layout
 from bifa.simulate.paper import FAST
 from bifa.simulate.plant import plant as flat
-from bifa.simulate.records import _as_stamped
+from bifa.simulate.records import as_stamped
 
 NAMED = {
     "hysteresis", "viscoelasticity", "backlash", "area_variation", "valve_latency", "valve_asymmetry", "line_lag",
@@ -208,4 +208,4 @@ def test_a_run_that_was_given_up_is_nan_under_another_clock_too():
     shifted = flat(robot.nominal().with_effects({"instrument_shift": {"late_s": 0.01}}))
     time_s = np.arange(50) * 0.01
     given_up = np.where(time_s < 0.2, time_s, np.nan)
-    assert np.array_equal(_as_stamped(shifted, time_s, given_up, given_up), given_up, equal_nan=True)
+    assert np.array_equal(as_stamped(shifted, time_s, given_up, given_up), given_up, equal_nan=True)

@@ -86,7 +86,7 @@ def _size(rows):
 def test_lanes_and_numba_tell_the_same(effect, found):
     plants = _robots(effect)
     for name, what in _experiments(plants).items():
-        expected = [lanes._in_numba(what, k, plant) for k, plant in enumerate(plants)]
+        expected = [lanes.in_numba(what, k, plant) for k, plant in enumerate(plants)]
         for got in (found[0].march(plants, what, False), found[1].march(plants, what, False)):
             errors = [np.abs((a - b) / _size(b)).max() for a, b in zip(got, expected, strict=True)]
             # Both take the same steps, but where a rounding decides whether a step is good enough: at rest both springs
@@ -124,7 +124,7 @@ def test_every_effect_and_every_learnt_curve_at_once(found):
     what = _experiments(both)["walk"]
     ground = simulate.terrain(simulate.tunnel(0.02))
     what = replace(what, rigs=[rig._replace(terrain=ground) for rig in what.rigs])
-    expected = [lanes._in_numba(what, k, plant) for k, plant in enumerate(both)]
+    expected = [lanes.in_numba(what, k, plant) for k, plant in enumerate(both)]
     assert np.abs(expected[0] - expected[1]).max() > 1e-3
     for got in (found[0].march(both, what, False), [found[1].march([p], replace(
         what, rigs=[r], switches=[s], sample_s=[t]), False)[0]
@@ -161,14 +161,14 @@ def test_lanes_with_switches_and_samples_of_their_own(found):
     )
     got = found[0].march(plants, what, False)
     for k, rows in enumerate(got):
-        np.testing.assert_allclose(rows, lanes._in_numba(what, k, plants[k]), atol=1e-7)
+        np.testing.assert_allclose(rows, lanes.in_numba(what, k, plants[k]), atol=1e-7)
 
 
 @pytest.mark.parametrize("lanes_of", [1, 2, 4, 8])
 def test_every_width_that_this_processor_has(lanes_of, found):
     if lanes_of > build.target().lanes:
         pytest.skip("not on this processor")
-    chosen = next(t for t in (*build._TARGETS, build.single()) if t.lanes == lanes_of)
+    chosen = next(t for t in (*build.TARGETS, build.single()) if t.lanes == lanes_of)
     one = kernel.Kernel(build.library(chosen))
     plants = _robots("hysteresis")
     what = _experiments(plants)["walk"]
@@ -306,14 +306,14 @@ def test_a_translated_function_does_in_each_lane_what_python_does(function, widt
     translator = Translator(Shapes({}, {}, {}), {})
     name = translator.function(function, ("F", "F")).name
     source = (
-        f"{(build._HERE / 'vectors.h').read_text()}\n" + "\n".join(translator.texts) + "\nvoid run(const double *x, "
+        f"{(build.HERE / 'vectors.h').read_text()}\n" + "\n".join(translator.texts) + "\nvoid run(const double *x, "
         "const double *y, double *out) { V a = splat(0.0), b = a; for (int i = 0; i < LANES; i++) { "
         f"set_lane(&a, i, x[i]); set_lane(&b, i, y[i]); }} const V c = {name}(a, b); "
         "for (int i = 0; i < LANES; i++) out[i] = at_lane(c, i); }"
     )
     (tmp_path / "f.c").write_text("typedef struct { const double *at; long size; } Series;\n" + source)
-    flags = next((t.flags for t in build._TARGETS if t.lanes == width), ())
-    command = [build.compiler(), *build._FLAGS, *flags, f"-DLANES={width}", tmp_path / "f.c", "-o", tmp_path / "f.so"]
+    flags = next((t.flags for t in build.TARGETS if t.lanes == width), ())
+    command = [build.compiler(), *build.FLAGS, *flags, f"-DLANES={width}", tmp_path / "f.c", "-o", tmp_path / "f.so"]
     subprocess.run([*map(str, command), "-lm"], check=True)
     run = ctypes.CDLL(str(tmp_path / "f.so")).run
     run.argtypes = [np.ctypeslib.ndpointer(float)] * 3

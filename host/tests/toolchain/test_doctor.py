@@ -24,20 +24,20 @@ def clone(tmp_path, monkeypatch):
 
 
 def test_an_image_that_was_never_built(clone):
-    assert checks._image("image") == Check("image", MISSING, "not built", "run `pio run -e uno` or `make setup`")
+    assert checks.check_image("image") == Check("image", MISSING, "not built", "run `pio run -e uno` or `make setup`")
 
 
 def test_an_image_older_than_its_sources(clone):
     image = clone / ".pio/build/uno/firmware.elf"
     image.write_text("")
     os.utime(image, (0, 0))
-    assert checks._image("image").state == OPTIONAL
+    assert checks.check_image("image").state == OPTIONAL
 
 
 def test_an_image_newer_than_its_sources(clone):
     (clone / ".pio/build/uno/firmware.elf").write_text("")
     os.utime(clone / "lib/cpg/cpg.h", (0, 0))
-    assert checks._image("image").state == OK
+    assert checks.check_image("image").state == OK
 
 
 @pytest.mark.parametrize(
@@ -48,19 +48,19 @@ def test_platformios_packages(clone, monkeypatch, source, on_path, state):
     if source:
         (clone / ".platformio/provisioned.json").write_text(json.dumps({"source": source, "fingerprint": ""}))
     monkeypatch.setattr(checks.shutil, "which", lambda program: "/usr/bin/" + program if on_path else None)
-    assert checks._packages("packages").state == state
+    assert checks.check_packages("packages").state == state
 
 
 def test_an_expected_error_becomes_a_finding_with_its_remedy():
     def fail(what):
         raise BifaError("plug it in")
 
-    assert checks._guarded("board", fail) == Check("board", MISSING, "not in order", "plug it in")
+    assert checks.guarded("board", fail) == Check("board", MISSING, "not in order", "plug it in")
 
 
 def test_no_board_is_no_fault(monkeypatch):
     monkeypatch.setattr(checks, "serial_ports", lambda: [SerialPort("/dev/ttyUSB1", "Motion capture", None)])
-    assert checks._board("board", None).state == OPTIONAL
+    assert checks.check_board("board", None).state == OPTIONAL
 
 
 @pytest.mark.parametrize(("state", "status"), [(OK, 0), (OPTIONAL, 0), (MISSING, 1)])
@@ -74,7 +74,7 @@ def test_the_exit_status_says_whether_something_necessary_is_missing(monkeypatch
 
 @pytest.mark.uno
 def test_the_virtual_board_is_asked_who_it_is():
-    finding = checks._board("board", "virtual")
+    finding = checks.check_board("board", "virtual")
     assert finding.state == OK
     assert finding.found.startswith("firmware ")
 

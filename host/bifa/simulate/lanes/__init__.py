@@ -56,7 +56,7 @@ def march(plants: Sequence[Plant], what: Experiment, together: bool) -> list[np.
     """
     found = _kernels_for(plants)
     if found is None:
-        return [_in_numba(what, k, plant) for k, plant in enumerate(plants)]
+        return [in_numba(what, k, plant) for k, plant in enumerate(plants)]
     many, one = found
     if together and len(plants) > 1:
         return _around_the_first(many, plants, what)
@@ -106,7 +106,7 @@ def _sealed(plant: Plant) -> Plant:
     return plant._replace(body_curve=sealed(plant.body_curve.view()), small_curve=sealed(plant.small_curve.view()))
 
 
-def _in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
+def in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
     times, chamber, command = what.switches[k]
     place = (_sealed(plant), what.rigs[k], layout.state_size())
     end = (what.sample_s[k], what.tolerance_m)

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from bifa.simulate import entries, generated
 
-_FLAGS = (
+FLAGS = (
     "-O2", "-std=gnu11", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast", "-w",
 )  # fmt: skip
-_HERE = Path(__file__).parent
+HERE = Path(__file__).parent
 _OWN = ("translate.py", "program.py", "vectors.h", "tables.h", "drive.c")
 
 
@@ -29,7 +29,7 @@ class Target:
     needs: tuple[str, ...]
 
 
-_TARGETS = (
+TARGETS = (
     Target(8, ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mavx2", "-mfma"), ("avx512f", "avx512dq", "avx512vl")),
     Target(4, ("-mavx2", "-mfma"), ("avx2", "fma")),
     Target(2, (), ()),
@@ -46,7 +46,7 @@ def target() -> Target:
     from llvmlite import binding
 
     has = binding.get_host_cpu_features()
-    return next(one for one in _TARGETS if all(has.get(feature) for feature in one.needs))
+    return next(one for one in TARGETS if all(has.get(feature) for feature in one.needs))
 
 
 def single() -> Target:
@@ -64,8 +64,8 @@ def compiler() -> str:
 
 def library(chosen: Target) -> Path:
     """The compiled kernel, made now if it is missing. NoCompilerError where it is missing and cannot be made."""
-    texts = [(_HERE / name).read_text("utf-8") for name in _OWN]
-    name = f"bifa_lanes_{generated.digest(*entries._sources(), *texts, *_FLAGS, *chosen.flags)}_{chosen.lanes}.so"
+    texts = [(HERE / name).read_text("utf-8") for name in _OWN]
+    name = f"bifa_lanes_{generated.digest(*entries.sources(), *texts, *FLAGS, *chosen.flags)}_{chosen.lanes}.so"
     path = generated.folder() / name
     if not path.exists():
         compiler()
@@ -79,7 +79,7 @@ def compile_to(path: Path, chosen: Target) -> None:
     """Make a kernel; NoCompilerError where that fails."""
     from bifa.simulate.lanes import program
 
-    command = [compiler(), *_FLAGS, *chosen.flags, f"-DLANES={chosen.lanes}"]
+    command = [compiler(), *FLAGS, *chosen.flags, f"-DLANES={chosen.lanes}"]
     with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
         source, built = Path(scratch) / "lanes.c", Path(scratch) / "lanes.so"
         source.write_text(program.source(), "utf-8")
