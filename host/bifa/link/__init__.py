@@ -1,6 +1,5 @@
 """The link to the Uno: transport, frames, session, clock relation, and `Uno`, which the rest of the host uses."""
 
-from bifa.link.clock import Clock, WallClock
 from bifa.link.clock_relation import ClockRelation, HostTime
 from bifa.link.errors import (
     LinkError,
@@ -11,7 +10,7 @@ from bifa.link.errors import (
     StillMovingError,
 )
 from bifa.link.session import Counters, Hello
-from bifa.link.transport import PortGoneError, Transport
+from bifa.link.transport import Clock, PortGoneError, Transport, WallClock
 from bifa.link.units import UnoParameterError
 from bifa.link.uno import Sample, Status, Uno
 

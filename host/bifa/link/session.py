@@ -13,10 +13,9 @@ from typing import Any
 
 from bifa import __version__
 from bifa.link import frames
-from bifa.link.clock import Clock
 from bifa.link.errors import AbandonedError, MismatchError, NoAnswerError, RefusedError, RestartedError
 from bifa.link.table import COMMANDS, PROTOCOL_VERSION, START_CAUSES, TABLE_HASH
-from bifa.link.transport import Transport
+from bifa.link.transport import Clock, Transport
 from bifa.printable import printable
 
 WINDOW = 4

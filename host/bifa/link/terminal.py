@@ -2,8 +2,8 @@
 
 from contextlib import nullcontext
 
-from bifa.link.clock import Clock
 from bifa.link.errors import NoAnswerError
+from bifa.link.transport import Clock
 from bifa.link.uno import Uno
 
 SETTLE_S = 0.05

@@ -1,5 +1,7 @@
-"""The bytes between host and Uno, wherever they flow: a serial port, or a virtual Uno in virtual time."""
+"""The bytes between host and Uno, wherever they flow, and the clock beside them: a serial port and the computer's time,
+or a virtual Uno in virtual time."""
 
+import time
 from typing import Protocol
 
 from bifa.errors import BifaError
@@ -23,3 +25,25 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Let go of the port once what was written has left, as far as it goes; a second call does nothing."""
+
+
+class Clock(Protocol):
+    """Monotonic time in seconds."""
+
+    def now(self) -> float:
+        """Seconds since some fixed moment."""
+
+    def sleep(self, duration_s: float) -> None:
+        """Let time pass."""
+
+
+class WallClock:
+    """The computer's monotonic clock."""
+
+    def now(self) -> float:
+        """See Clock."""
+        return time.monotonic()
+
+    def sleep(self, duration_s: float) -> None:
+        """See Clock."""
+        time.sleep(duration_s)

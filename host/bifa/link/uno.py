@@ -8,13 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bifa.link import frames, leaving
-from bifa.link.clock import Clock
 from bifa.link.clock_relation import ClockRelation
 from bifa.link.errors import LinkError, NoAnswerError, StillMovingError
 from bifa.link.leaving import CONFIRMED_WITHIN_S
 from bifa.link.session import Counters, Hello, Session, word
 from bifa.link.table import CHAMBER_STATES, CHAMBERS, DEAD_TIME_MS, FAULTS, SAMPLE_PERIOD_MS, SCHEDULE_ENTRIES, STATES
-from bifa.link.transport import Transport
+from bifa.link.transport import Clock, Transport
 from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
 
 EEPROM_TIMEOUT_S = 10.0

@@ -7,8 +7,7 @@ from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
 
 from bifa.errors import BifaError
-from bifa.link.clock import Clock, WallClock
-from bifa.link.transport import Transport
+from bifa.link.transport import Clock, Transport, WallClock
 from bifa.rig.ports import serial_ports, uno_ports
 from bifa.rig.serial_transport import SerialTransport
 
