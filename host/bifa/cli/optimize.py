@@ -1,7 +1,8 @@
 """`bifa optimize`: from a model to the gait that a real robot will walk."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -75,19 +76,24 @@ def optimize(
     folder = pictures or pictures_beside(out)
     check_targets(out, folders=() if no_pictures else (folder,), inputs=(model,))
 
-    from bifa.gait import Settings, paper_space, simulations
-    from bifa.gait.library.scenarios import provenance
-    from bifa.robot import load_model, nominal, save_gait
     from bifa.screen import Console
 
     console = Console()
-    robot = load_model(model) if model else nominal()
-    settings = [
-        Settings(method, robust, seed + run, evaluations, spread, paper_space(period_s=period), refine=method != "bo")
-        for run in range(runs or (3 if method == "bo" else 1))
-    ]
-    with simulations(dask, tls=cluster.Tls(dask_ca, dask_cert, dask_key)) as pool:
-        best = _best(console, robot, pool, settings)
+    with ExitStack() as open_until_the_end:
+        with console.status("starting"):
+            from bifa.gait import Settings, optimize, paper_space, simulations
+            from bifa.gait.library.scenarios import provenance
+            from bifa.robot import load_model, nominal, save_gait
+
+            robot = load_model(model) if model else nominal()
+            space = paper_space(period_s=period)
+            settings = [
+                Settings(method, robust, seed + run, evaluations, spread, space, refine=method != "bo")
+                for run in range(runs or (3 if method == "bo" else 1))
+            ]
+            tls = cluster.Tls(dask_ca, dask_cert, dask_key)
+            pool = open_until_the_end.enter_context(simulations(dask, tls=tls))
+        best = _best(console, partial(optimize, robot, pool), settings)
         save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
         console.print(_summary(best))
         console.print(f"gait: {out}", highlight=False)
@@ -103,15 +109,14 @@ def pictures_beside(out: Path) -> Path:
     return out.with_name(f"{folder.name}-pictures") if taken else folder
 
 
-def _best(console: "Console", robot: "Model", pool: "Simulations", settings: "list[Settings]") -> "Optimum":
+def _best(console: "Console", search: "Callable[..., Optimum]", settings: "list[Settings]") -> "Optimum":
     """The best optimum of one search after another, each with its line."""
-    from bifa.gait import optimize
     from bifa.screen import warning
 
     optima = []
     for one in settings:
         with search_progress(console) as progress:
-            optima.append(optimize(robot, pool, one, progress(f"seed {one.seed}")))
+            optima.append(search(one, progress(f"seed {one.seed}")))
         console.print(_line(optima[-1]), highlight=False)
         if optima[-1].doubt:
             console.print(warning(str(optima[-1].doubt)), highlight=False)

@@ -62,7 +62,8 @@ def register(app: typer.Typer) -> None:
         console = Console()
         effects = dict(_effect(text) for text in effect or [])
         options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}
-        virtual: Any = open_rig("virtual", **options, firmware=firmware, eeprom=eeprom, keep_events=False)
+        with console.status("starting"):
+            virtual: Any = open_rig("virtual", **options, firmware=firmware, eeprom=eeprom, keep_events=False)
         with (
             virtual as bench,
             console.status("starting", spinner="dots") as status,
