@@ -7,19 +7,15 @@ import time
 from typing import TextIO
 
 _QUIET_S = 2.0  # what is over before then says nothing
-# At most, by the size of the sets that are tried: parents grown, effects tried on each (None: the whole library),
-# and explanations refitted: quickly, from the initial guess, and to convergence. In the first two stages effects may
-# also be begun anew.
-_STAGES = ((2, None, 24), (3, 7, 52), (3, 7, 10))
+_RACED = 6  # sets of a size that are fitted besides those of which a score says little, a library of them at most
+_FORMS = 6  # steps of trying an explanation in a form of its own
 
 
 def most_steps(effects: int) -> int:
     """How many steps a diagnosis with a library of so many effects announces at most, base fit and verdict included."""
-    total = 3
-    for parents, tried, refitted in _STAGES:
-        each = effects if tried is None else min(effects, tried)
-        total += parents * each + min(parents * each * 3, refitted)
-    return total
+    scored = 2 + 3 + 2  # libraries: of the base model, and again if it was in a wrong minimum; for pairs; for three
+    raced = 4 * (_RACED + effects) + 2 * 3 + 2 + 1
+    return 3 + 4 + scored * effects + raced + 3 * (1 + _FORMS)
 
 
 class Progress:

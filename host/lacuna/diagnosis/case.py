@@ -9,19 +9,28 @@ from typing import Any, TypeVar
 from lacuna.diagnosis.candidate import (
     LOWER,
     Candidate,
-    helps_at_once,
     judge,
-    profiles,
     sharpened_floor,
-    sketches,
 )
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, met_by_chance
 from lacuna.diagnosis.policy import Policy
+from lacuna.diagnosis.race import continued, helps_at_once
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, converged, evaluate_on, fit, foreseen, refit_on, released, renewed, spread_starts
+from lacuna.estimation.fit import (
+    Fit,
+    at_its_misfit,
+    converged,
+    evaluate_on,
+    fit,
+    foreseen,
+    refit_on,
+    released,
+    renewed,
+    spread_starts,
+)
 from lacuna.estimation.intervals import intervals
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
@@ -111,7 +120,7 @@ class Case:
         if self.system.tells_of_all and others:
             near = (fitted, evaluate_on(fitted, others))
             fitted = refit_on(fitted, (*fitted.problem.trials, *others), near=near, relative=_FINE)
-        return settle(released(fitted))
+        return settle(at_its_misfit(released(fitted)))
 
     @_once
     def intervals(self, candidate: Candidate) -> dict[str, tuple[float, float]]:
@@ -164,10 +173,10 @@ class Case:
             if name not in candidate.effects
             and (effect.apart or (effect.own and helps_at_once(parent, name, self.policy.gain)))
         ]
-        for fitted, profile in sketches(profiles(parent, able, self.split, parent.problem.floor, crew), crew):
+        for effect, fitted in zip(able, continued(parent, able, crew), strict=True):
             other = judge(fitted, self.split, self.policy, near=candidate.checked)
             if candidate.cost - other.cost > self.policy.gain and self.exceeds(candidate, other):
-                return profile.effect
+                return effect
         return None
 
     @_once

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from lacuna.check import check
-from lacuna.diagnosis.candidate import Candidate, finished_afresh
+from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.crew import Crew, Progress
@@ -23,13 +23,15 @@ from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, descr
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import POLICY, Policy
+from lacuna.diagnosis.race import from_elsewhere
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
-from lacuna.diagnosis.search import Search, screen, search
+from lacuna.diagnosis.score import score
+from lacuna.diagnosis.search import Search, search
 from lacuna.diagnosis.sign import impossible_signs
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
-from lacuna.diagnosis.stopped import STOPPED, Finished
+from lacuna.diagnosis.stopped import STOPPED, Found
 from lacuna.diagnosis.warn import warnings_of
 from lacuna.errors import TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
@@ -301,17 +303,17 @@ def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
     first = case.judge(base)
     if case.may_be_lost(first):
         crew.say("fitting the base model from elsewhere, too")
-        first = finished_afresh(first, case.split, case.seed, crew)
+        first = from_elsewhere(first, case.split, case.seed, crew)
     first = case.sharply(first)
     if case.suffices(first):
-        floor = first.fitted.problem.floor
-        return Search(first, floor, (first,), tuple(screen(first.fitted, case.split, floor))), False
-    finished = Finished(case.suffices)
+        screened = score(first.fitted, list(case.system.effects), crew).screened()
+        return Search(first, first.fitted.problem.floor, (first,), screened), False
+    found = Found()
     try:
-        return search(case, first, enough=finished, crew=crew), False
+        return search(case, first, enough=case.suffices, crew=crew, keep=found.keep), False
     except KeyboardInterrupt:
         crew.say("stopped: weighing what was found until now (Ctrl-C again gives up)")
-        return finished.search(first, case.split), True
+        return found.search(first, case.split), True
 
 
 def _verdict(

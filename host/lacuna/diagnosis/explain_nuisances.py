@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lacuna.diagnosis.candidate import finish, judge, profiles, sketches
+from lacuna.diagnosis.candidate import judge
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.decide import Choice, weigh
+from lacuna.diagnosis.race import continued, to_the_end
 from lacuna.diagnosis.search import Search, reweighed
 
 _FINISHED = 3  # of the most promising, to the end
@@ -25,10 +26,10 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> 
         parent = reweighed(parent, case.split, found.floor)
     fresh = [name for name in case.system.effects if name not in parent.effects]
     crew.say(f"asking what {followed[0].nuisance} follows")
-    near = sketches(profiles(parent.fitted, fresh, case.split, found.floor, crew), crew)
-    grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted, _ in near), key=lambda c: c.cost)
+    near = continued(parent.fitted, fresh, crew)
+    grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]
-    finished = [judge(finish(c.fitted), case.split, policy, near=c.checked) for c in promising]
+    finished = [to_the_end(c, case.split, crew) for c in promising]
     tried = {frozenset(c.effects): c for c in found.tried}
     for one in (*grown, *finished):
         same = frozenset(one.effects)

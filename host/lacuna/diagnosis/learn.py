@@ -10,9 +10,9 @@ import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.crew import Crew
-from lacuna.diagnosis.from_afar import begin, follow, isolating, promising
 from lacuna.diagnosis.linear import remaining_after, stacked
 from lacuna.diagnosis.policy import Policy
+from lacuna.diagnosis.race import cold, initial_guess
 from lacuna.diagnosis.residual_error import rms
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on, starting_point
@@ -22,7 +22,6 @@ from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 
 _MOST = 4  # curves in one correction
-_FOLLOWED = 2  # of those begun anew, to the end
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
 _SOUGHT = 8  # sites where further curves are sought
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
@@ -56,52 +55,22 @@ def learn_correction(
 ) -> Candidate | None:
     """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
     `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
-    None if none helps. Further ones are sought where the first regression promised most. Where the fits of `candidates`
-    leave so much that they may be lost, the first curve is begun anew as well."""
+    None if none helps. Further ones are sought where the first regression promised most."""
     best: Candidate | None = None
     sites = list(candidates[0].fitted.structure.system.correction_sites)
-    anew = [found for one in candidates for found in _begun_anew(one, sites, split, policy, crew)]
-    if anew and (begun := _best_of(anew, candidates, split, policy)):
-        if enough(begun):
-            return begun
-        anew = [begun]
     while best is None or len(best.fitted.structure.sites) < _MOST:
         parents = [best] if best else candidates
         promises: list[_Promise] = []
         for parent in parents:
             promises = sorted([*promises, *_promises(parent, sites, split, crew)], key=lambda p: p.cost)
             sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
-        grown = _best_grown(parents, promises[:_FITTED], split, policy, crew, anew)
+        grown = _best_grown(parents, promises[:_FITTED], split, policy, crew)
         if grown is None:
             break
-        anew = []
         best = grown
         if enough(best):
             break
     return best
-
-
-def _begun_anew(parent: Candidate, sites: Sequence[str], split: Split, policy: Policy, crew: Crew) -> list[Candidate]:
-    """`parent` with one curve more, begun at the initial guess with the parent's effects and curves as they are: a fit
-    that lacks much may be so far off that no curve on top of it helps. The few that promise most from afar, if they
-    promise to take their share away (`lacuna.diagnosis.from_afar`)."""
-    fitted, structure = parent.fitted, parent.fitted.structure
-    isolates = isolating(fitted.problem)
-    if parent.checked_error <= (0, policy.lost) or not any(isolates) or all(isolates):
-        return []
-    known = {name: value for name, value in fitted.theta.items() if name not in Structure(structure.system).names}
-    problems, starts = [], []
-    for more in ((), *((site,) for site in sites if site not in structure.sites)):
-        grown = Structure(structure.system, structure.effects, (*structure.sites, *more))
-        problems.append(Problem(grown, split.fit, fitted.problem.floor))
-        starts.append([grown.values(grown.theta(grown.start()) | known)])
-    alone, *begun = begin(crew, "restarting with", problems, starts)
-    most = (1.0 - policy.promising) * alone.glanced
-    chosen = [one for one in promising(begun, _FOLLOWED) if one.glanced < most]
-    solutions = follow(crew, "following up", chosen)
-    return [
-        judge(Fit(one.problem, solution, 1, 1), split, policy) for one, solution in zip(chosen, solutions, strict=True)
-    ]
 
 
 def _best_grown(
@@ -110,16 +79,20 @@ def _best_grown(
     split: Split,
     policy: Policy,
     crew: Crew,
-    anew: Sequence[Candidate] = (),
 ) -> Candidate | None:
     before = min(parents, key=lambda c: c.checked.cost)
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
-    solutions = crew.map("learning a curve for", names, _sketched, [(p.problem, p.start) for p in promises])
+    lost = before.checked_error > (0, policy.lost)
+    jobs = [
+        (p.problem, p.start, initial_guess(p.problem.structure, p.candidate.fitted.theta) if lost else None)
+        for p in promises
+    ]
+    solutions = crew.map("learning a curve for", names, _sketched, jobs)
     grown = [
         judge(Fit(p.problem, solution, 1, 1), split, policy) for p, solution in zip(promises, solutions, strict=True)
     ]
-    return _best_of([*grown, *anew], parents, split, policy)
+    return _best_of(grown, parents, split, policy)
 
 
 def _best_of(
@@ -141,8 +114,12 @@ def _excess(fit: Fit) -> float:
     return max(fit.cost - 0.5 * effective_samples(fit), 0.0)
 
 
-def _sketched(problem: Problem, start: Point) -> Solution:
-    return solve(problem, start, **_SKETCH)
+def _sketched(problem: Problem, start: Point, cold_values: np.ndarray | None) -> Solution:
+    """From where the parent stands; where that may be lost, cold as well."""
+    found = [solve(problem, start, **_SKETCH)]
+    if cold_values is not None:
+        found.append(cold(problem, cold_values))
+    return min(found, key=lambda s: s.cost)
 
 
 def _refined(sketched: Fit) -> Fit:

@@ -96,13 +96,10 @@ class Policy:
     promising: float = _rule(
         0.05, "of what is left", "an effect that removes less in a quick fit is not fitted to convergence", "simulation"
     )
-    hopeful: float = _rule(
-        3.0, "times the least excess of the beam", "sets that leave more are not extended", "simulation"
-    )
-    hopeless: float = _rule(
-        5.0,
-        "times the least excess finished",
-        "a rough fit that leaves more is not fitted to convergence",
+    rival: float = _rule(
+        0.3,
+        "of the gain that the best promises",
+        "beside a set that suffices, one that promises less to first order is no rival",
         "simulation",
     )
     reach: float = _rule(
@@ -114,9 +111,8 @@ class Policy:
     lost: float = _rule(
         2.0,
         "floors, RMS, on trials not fitted",
-        "if the base model leaves more there, large residuals at their full size, and no effect explains enough from"
-        " there, its fit may be so wrong that the missing effect does not improve it: effects (pairs, where one"
-        " leaves as much) are begun anew from the initial values",
+        "a fit that leaves more there, large residuals at their full size, is far from any explanation: it is not"
+        " fitted to convergence before its rivals have begun, and a curve on top of it begins cold",
         "simulation",
     )
 

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 from lacuna.diagnosis.candidate import Candidate
-from lacuna.diagnosis.search import Search, reweighed, screen
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.score import score
+from lacuna.diagnosis.search import Search, reweighed
 from lacuna.diagnosis.split import Split
 
 STOPPED = "The search was stopped by hand: the verdict is based on the best result found so far."
 
 
-class Finished:
-    """Keeps each set of effects that the search has fitted to the end, whenever it asks whether that is enough."""
+class Found:
+    """Keeps what the search has fitted, until somebody stops it."""
 
-    def __init__(self, enough: Callable[[Candidate], bool]):
-        self._enough = enough
+    def __init__(self) -> None:
         self.candidates: list[Candidate] = []
 
-    def __call__(self, candidate: Candidate) -> bool:
-        if not candidate.fitted.structure.sites:
-            self.candidates.append(candidate)
-        return self._enough(candidate)
+    def keep(self, candidates: Sequence[Candidate]) -> None:
+        self.candidates += candidates
 
     def search(self, base: Candidate, split: Split) -> Search:
         """What the search would have returned: the best candidate for each set, all against the latest floor."""
@@ -32,4 +31,5 @@ class Finished:
             known = found.setdefault(frozenset(one.effects), same)
             found[frozenset(one.effects)] = min(known, same, key=lambda c: c.cost)
         first = found[frozenset()]
-        return Search(first, floor, tuple(found.values()), tuple(screen(first.fitted, split, floor)))
+        screened = score(first.fitted, list(first.fitted.structure.system.effects), Crew(lambda _: None)).screened()
+        return Search(first, floor, tuple(found.values()), screened)

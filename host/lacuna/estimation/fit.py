@@ -11,10 +11,12 @@ import numpy as np
 
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
-from lacuna.estimation.problem import PLAIN, Point, Problem
+from lacuna.estimation.problem import PLAIN, SOFT_LIMIT, Point, Problem
 from lacuna.estimation.solve import ENOUGH, RELATIVE, Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 from lacuna.system import Channels, Record, System
+
+_MOST_AGAIN = 40  # iterations with another floor
 
 _SAME_COST = 0.02  # relative: two starts that end within this of each other found the same minimum
 _OPEN = 0.1  # scales
@@ -162,6 +164,18 @@ def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL
         if gained < fruitful * solution.cost:
             break
     return solution
+
+
+def at_its_misfit(fitted: Fit) -> Fit:
+    """The fit with the floor of a channel raised to what it leaves there, where that is beyond what counts by its
+    square: all samples are that bad then, and none of them is to be spared."""
+    squares: dict[tuple[str, str], list[np.ndarray]] = {}
+    for trial, channels in zip(fitted.problem.trials, fitted.scaled_residuals(), strict=True):
+        for channel, z in channels.items():
+            squares.setdefault((trial.experiment, channel), []).append(np.square(z[np.isfinite(z)]))
+    left = {key: float(np.sqrt(np.mean(np.concatenate(each)))) for key, each in squares.items()}
+    floor = fitted.problem.floor.raised({key: rms for key, rms in left.items() if rms > SOFT_LIMIT})
+    return fitted if floor == fitted.problem.floor else reweigh(fitted, floor, max_iterations=_MOST_AGAIN)
 
 
 def released(fitted: Fit) -> Fit:

@@ -10,18 +10,17 @@ time. What they cannot tell apart (`Parameter.elsewhere`), all trials together d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from lacuna.estimation.problem import SHARP, Problem, View
-from lacuna.estimation.solve import RELATIVE, Solution, cost_of, solve
+from lacuna.estimation.solve import RELATIVE, Solution, solve
 
 _FAR, _NEARER, _CLOSE = View(1 / 20, 30.0, 30.0), View(1 / 60, 10.0, 30.0), View(1 / 200, 3.0, 30.0)
 _ISOLATED = (_FAR, _NEARER, _CLOSE)
 _TOGETHER = (_FAR, _NEARER)
 _PLACES = View(raised=10.0)
-_NEAR: dict[str, Any] = {"max_iterations": 40, "relative": 1e-3}
+_NEAR, _MOST = 1e-3, 40  # of the cost: where a search from a distance may stop; iterations at most
 _SAME = 0.2  # scales: places that end within this of one another are one
 _BETTER = 0.9  # of the cost that the start leads to, what one from elsewhere must come down to, to be preferred
 _ENOUGH, _HOPEFUL = 0.02, 3.0  # log-likelihood, and times the least cost: what leaves more is not followed any closer
@@ -32,37 +31,13 @@ def solve_graduated(
 ) -> Solution:
     """Minimise the cost from `values`, wherever they are. Parameters of which something was known beforehand begin
     there, and stay until the others are near."""
-    return fit_together(problem, fit_isolated(problem, values), max_iterations=max_iterations, relative=relative)
-
-
-class Isolated(NamedTuple):
-    """Where the trials that isolate parameters lead, and what they then cost; 0 where there are none."""
-
-    values: np.ndarray
-    cost: float
-
-
-def fit_isolated(problem: Problem, values: np.ndarray) -> Isolated:
-    """Fit the trials that isolate parameters, from `values`: a small part of the whole work."""
-    free = _free(problem)
-    values = np.where(np.isin(np.arange(len(values)), free), values, problem.structure.prior_mean())
-    isolated = _isolated(problem)
-    if not isolated.trials:
-        return Isolated(values, 0.0)
-    values = _followed(isolated, values, _ISOLATED, free).point.values
-    found = _followed(isolated, values, (SHARP,), range(len(values)))
-    return Isolated(found.point.values, found.cost)
-
-
-def fit_together(problem: Problem, begun: Isolated, *, max_iterations: int, relative: float = RELATIVE) -> Solution:
-    """Minimise the cost of all trials from where those that isolate parameters led."""
-    values, every = begun.values, range(len(begun.values))
+    values, every = _fitted_to_isolated(problem, values), range(len(values))
     isolated = _isolated(problem)
     hidden = [j for j in every if not any(problem.structure.moves(j, t) for t in isolated.trials)]
     starts = [values, *_elsewhere(isolated, values, _free(problem))]
     # what isolated trials have fitted waits at first: a walk seen from a distance says little of it
     for view, moving in zip(_TOGETHER, (hidden, every), strict=True):
-        found = [_followed(problem, start, (view,), moving) for start in starts]
+        found = [_followed(problem, start, (view,), moving, max_iterations) for start in starts]
         least = min(one.cost for one in found)
         found = [one for one in found if one.cost <= max(_ENOUGH, _HOPEFUL * least)]
         starts = [one.point.values for one in found]
@@ -71,10 +46,15 @@ def fit_together(problem: Problem, begun: Isolated, *, max_iterations: int, rela
     return solve(problem, problem.start(best.point.values), max_iterations=max_iterations, relative=relative)
 
 
-def glance(problem: Problem, values: np.ndarray) -> float:
-    """What all trials cost at `values` from so far off that what comes at another time still counts."""
-    distant = problem.seen(_NEARER)
-    return cost_of(distant, distant.start(values))
+def _fitted_to_isolated(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Where the trials that isolate parameters lead, a small part of the whole work."""
+    free = _free(problem)
+    values = np.where(np.isin(np.arange(len(values)), free), values, problem.structure.prior_mean())
+    isolated = _isolated(problem)
+    if not isolated.trials:
+        return values
+    values = _followed(isolated, values, _ISOLATED, free).point.values
+    return _followed(isolated, values, (SHARP,), range(len(values))).point.values
 
 
 def _free(problem: Problem) -> tuple[int, ...]:
@@ -86,11 +66,13 @@ def _isolated(problem: Problem) -> Problem:
     return problem.over([t for t in problem.trials if isolates(t)])
 
 
-def _followed(problem: Problem, values: np.ndarray, views: Sequence[View], free: Sequence[int]) -> Solution:
+def _followed(
+    problem: Problem, values: np.ndarray, views: Sequence[View], free: Sequence[int], max_iterations: int = _MOST
+) -> Solution:
     """Where the search ends in the last of `views`, each begun where the one before ended."""
     for view in views:
         distant = problem.seen(view)
-        found = solve(distant, distant.start(values), free=free, **_NEAR)
+        found = solve(distant, distant.start(values), free=free, max_iterations=max_iterations, relative=_NEAR)
         values = found.point.values
     return found
 

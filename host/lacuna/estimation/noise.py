@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -73,6 +73,11 @@ class NoiseFloor:
         adds its own differences to those between runs. A channel of which the other knows nothing stays."""
         known = other.channels
         return NoiseFloor({k: min(n, known.get(k, n), key=lambda c: c.per_piece) for k, n in self.channels.items()})
+
+    def raised(self, factors: Mapping[tuple[str, str], float]) -> NoiseFloor:
+        """The floor of some channels so many times as high."""
+        known = self.channels.items()
+        return NoiseFloor({k: replace(n, sd=factors[k] * n.sd) if k in factors else n for k, n in known})
 
     def share_of(self, other: NoiseFloor) -> float:
         """The smallest ratio of this floor to `other` among the channels."""

@@ -16,7 +16,7 @@ def test_every_picture_of_the_page_is_drawn_and_shows_its_idea(monkeypatch, tmp_
     drawn = {file.name for file in tmp_path.iterdir() if file.read_bytes().startswith(b"\x89PNG")}
     assert drawn == set(re.findall(r"images/(concept-[\w-]+\.png)", PAGE.read_text(encoding="utf-8")))
     said = capsys.readouterr().out
-    fitted, unseen = _errors(said, "with asymmetric friction")[:4], _errors(said, "with asymmetric friction")[4:]
+    fitted, unseen = _errors(said, "with sensor gain")[:4], _errors(said, "with sensor gain")[4:]
     assert max(fitted) < 0.5 < 3.0 < min(unseen)
     assert max(_errors(said, "with quadratic drag")) < 0.25
     shares = [float(s) for s in re.findall(r"(?:delay|coulomb) (0\.\d+)", said)]

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from toy import ToySystem, hide
 
-from lacuna.diagnosis import candidate as candidate_module
 from lacuna.diagnosis import case as case_module
-from lacuna.diagnosis.candidate import Profile, finish_elsewhere, finished_afresh, judge, profiles
+from lacuna.diagnosis import race as race_module
+from lacuna.diagnosis.candidate import judge
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.continued import led_back
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
-from lacuna.diagnosis.search import _best_to_grow, search
+from lacuna.diagnosis.race import from_elsewhere
+from lacuna.diagnosis.score import score
+from lacuna.diagnosis.search import _led_out, _with_derivatives, search
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, fit, reweigh
-from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 
@@ -63,29 +63,15 @@ def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
     right = case.judge(case.fit_base(1))
     astray = case.judge(moved(right.fitted, 0.3))
     assert astray.cost > right.cost + 10.0
-    assert finished_afresh(astray, case.split, 0, NOBODY).cost < right.cost + 1.0
+    assert from_elsewhere(astray, case.split, 0, NOBODY).cost < right.cost + 1.0
 
 
 def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, monkeypatch):
     right = case.judge(case.fit_base(1))
     worse = moved(right.fitted, 0.1).solution
-    monkeypatch.setattr(candidate_module, "solve_graduated", lambda *_, **__: worse)
-    monkeypatch.setattr(candidate_module, "solve", lambda *_, **__: worse)
-    monkeypatch.setattr(candidate_module, "renewed", lambda *_, **__: worse)
-    assert finished_afresh(right, case.split, 0, NOBODY) is right
-
-
-def test_an_effect_that_does_nothing_at_its_best_size_is_finished_from_the_next_ones():
-    system = hide({"delay.delay_s": 0.03}, seed=32)
-    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
-    base = case.fit_base(1)
-    problem = Problem(Structure(system, ("delay",)), case.split.fit, base.problem.floor)
-    idle, active = (problem.start(np.append(base.solution.point.values, size)) for size in (0.0, 0.02))
-    lost = Fit(problem, replace(base.solution, point=idle, free=(0, 1, 2, 3), cost=cost_of(problem, idle)), 1, 1)
-    found = finish_elsewhere(lost, Profile("delay", problem, lost.cost, (idle, active)), NOBODY)
-    assert found.theta["delay.delay_s"] == pytest.approx(0.03, rel=0.1)
-    right = fit(problem.structure, case.split.fit, problem.floor, starts=[active.values])
-    assert found.cost < right.cost + 1.0
+    for name in ("solve_graduated", "solve", "renewed"):
+        monkeypatch.setattr(race_module, name, lambda *_, **__: worse)
+    assert from_elsewhere(right, case.split, 0, NOBODY) is right
 
 
 def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):
@@ -105,9 +91,9 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
     floor = right.fitted.problem.floor
     delayed = case.judge(fit(Structure(case.system, ("delay",)), case.split.fit, floor))
     astray = case.judge(moved(right.fitted, 0.3))
-    assert led_back(astray, [delayed], case.split).cost < right.cost + 1.0
-    assert led_back(astray, [], case.split) is astray
-    assert led_back(right, [delayed], case.split).cost <= right.cost
+    assert _led_out(astray, [delayed], case.split).cost < right.cost + 1.0
+    assert _led_out(astray, [], case.split) is None
+    assert _led_out(right, [delayed], case.split) is None
 
 
 @pytest.mark.slow
@@ -132,8 +118,7 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
     floor = base.problem.floor
     bare = judge(reweigh(fit(Structure(system, ("delay",)), split.fit, floor), floor, max_iterations=0), split, POLICY)
     assert not bare.fitted.solution.sensitivities
-    (grown,) = _best_to_grow({frozenset(["delay"]): bare}, 1, split, floor)
-    assert profiles(grown.fitted, ["coulomb"], split, floor, NOBODY)
+    assert score(_with_derivatives(bare).fitted, ["coulomb"], NOBODY).singles()
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,18 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from lacuna.diagnosis.candidate import profiles, sketches
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.race import _COARSE as COARSE
+from lacuna.diagnosis.race import continued
 from lacuna.diagnosis.residual_error import excess_over
+from lacuna.diagnosis.sizes import starts
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import fit, foreseen
 from lacuna.estimation.problem import Point
+from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.system import CorrectionSite, Effect, Parameter, Record, System
 
@@ -120,19 +123,16 @@ def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
     base = data.base.fitted
     holding, sliding = (base.structure.names.index(f"{name}_N") for name in ("holding", "sliding"))
 
-    def profiled(gap_N):
-        values = base.solution.point.values.copy()
-        values[holding] = values[sliding] + gap_N
-        moved = replace(base, solution=replace(base.solution, point=Point(values, base.solution.point.nuisances)))
-        return profiles(moved, ["fading"], data.case.split, base.problem.floor, NOBODY)[0]
-
-    assert not profiled(0.1).apart
-    profile = profiled(0.0)
-    assert profile.apart
-    assert len(profile.points) == 3
-    assert all(point.values[holding] > point.values[sliding] for point in profile.points)
-    (refitted, _), *_ = sketches([profile], NOBODY)
-    alone = [sketches([replace(profile, points=(point,))], NOBODY)[0][0].cost for point in profile.points]
+    values = base.solution.point.values.copy()
+    values[holding] = values[sliding]
+    one = replace(base, solution=replace(base.solution, point=Point(values, base.solution.point.nuisances)))
+    structure = Structure(data.system, ("fading",))
+    begun = starts(one, structure, "fading")
+    assert len(begun) == 3
+    assert all(each[holding] > each[sliding] for each in begun)
+    (refitted,) = continued(one, ["fading"], NOBODY)
+    problem = refitted.problem
+    alone = [solve(problem, problem.start(v, one.solution.point.nuisances), **COARSE).cost for v in begun]
     assert refitted.cost == min(alone)
     assert max(alone) > min(alone) + POLICY.gain, "only some of the sizes lead there"
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from toy import hide
 
-from lacuna.diagnosis.anew import Anew
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Comparison, choose, weigh
@@ -325,23 +324,6 @@ def test_implausible_costs_as_stated_half_a_range_outside():
         fitted = SimpleNamespace(structure=SimpleNamespace(parameters=[parameter]), theta={"mass_kg": value})
         assert implausibility(fitted, POLICY) == pytest.approx(cost)
         assert implausibility(fitted, replace(POLICY, implausible=0.0)) == 0.0
-
-
-# --- How far is the search worth its time? ---
-
-
-@pytest.mark.slow
-def test_effects_are_begun_anew_where_the_base_leaves_much(monkeypatch):
-    begun = []
-    monkeypatch.setattr(Anew, "follow", lambda self, before: begun.append(before.effects) or [])
-    system = hide({"coulomb.force_N": 0.6}, seed=5, withhold=["coulomb"])
-    left = diagnose(system, policy=replace(POLICY, lost=1e6)).search
-    assert begun == []
-    unpredicted, error = left.base.checked_error
-    assert not unpredicted
-    for lost, anew in ((1.01 * error, False), (0.99 * error, True)):
-        diagnose(system, policy=replace(POLICY, lost=lost))
-        assert bool(begun) is anew
 
 
 # --- The split ---

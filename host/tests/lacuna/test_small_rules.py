@@ -7,8 +7,8 @@ import numpy as np
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.cores import usable_cores
-from lacuna.diagnosis.candidate import sized
 from lacuna.diagnosis.next_experiment import _expected_gain
+from lacuna.diagnosis.sizes import sized
 from lacuna.estimation.autocorrelation import correlation_samples
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.estimation.structure import Structure

@@ -1,0 +1,151 @@
+"""What an effect could take away from the residual of a fit: the score that ranks everything that may be tried.
+
+A Lagrange multiplier test asks for a derivative at the absent size, where an effect that clips or slips has none. Here
+a secant stands in its place: the change of the weighted residual by the effect at each of the sizes that fits begin at.
+What the fit's own parameters and nuisances can do is projected off, and by what remains of it an effect is ranked,
+a secant as much as three times as long, none the other way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.linear import remaining_after
+from lacuna.diagnosis.sizes import starts
+from lacuna.estimation.fit import Fit
+from lacuna.estimation.problem import Point, Problem
+from lacuna.estimation.structure import Structure
+
+_LONGEST = 3.0  # times a secant, that it is followed: further it says nothing
+_ABSORBED = 0.02  # a change in the residual of which less than this share is left after the parent's is absorbed
+
+
+class Secant(NamedTuple):
+    """An effect at one of its sizes: where a fit would begin."""
+
+    effect: str
+    problem: Problem
+    start: Point
+
+
+class Promise(NamedTuple):
+    """A set of effects, where a smaller set would go on with it, and the log-likelihood that it promises to gain."""
+
+    problem: Problem
+    start: Point
+    gain: float
+
+    @property
+    def effect(self) -> str:
+        """The one that joins the others."""
+        return self.problem.structure.effects[-1]
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What the data could tell of an effect of typical size.
+
+    `visible`: standard deviations that it stands out by at the largest size tried after everything that the base can
+    imitate is taken off; `absorbed` if hardly anything is left of it at any size. `gain`: log-likelihood to first
+    order. `wrong_sign`: the share of the residual that it would remove if its bounds allowed the other sign.
+    """
+
+    effect: str
+    visible: float
+    absorbed: bool
+    gain: float
+    wrong_sign: float = 0.0
+
+    @property
+    def detectable(self) -> bool:
+        return self.visible > 5.0 and not self.absorbed
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Of every secant, shapes (m,): `whole`, the norm of what it changes the residual by; of what is left of that after
+    the parent's own parameters the `squares`, and `push`, its product with what the parent leaves, negative where it
+    takes away from it. `square`: of what the parent leaves."""
+
+    parent: Fit
+    secants: tuple[Secant, ...]
+    whole: np.ndarray
+    squares: np.ndarray
+    push: np.ndarray
+    square: float
+
+    @cached_property
+    def _seen(self) -> np.ndarray:
+        """Of which secants enough is left to say anything: of others it is what a straight line misses."""
+        return np.sqrt(self.squares) > _ABSORBED * self.whole
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """Log-likelihood that each secant would gain, as far as it is followed."""
+        far = np.where(self._seen, np.clip(-self.push / self.squares, 0.0, _LONGEST), 0.0)
+        return -(far * self.push + 0.5 * far**2 * self.squares)
+
+    def singles(self) -> list[Promise]:
+        """Each effect at its best size, the most promising first."""
+        best: dict[str, int] = {}
+        for k, secant in enumerate(self.secants):
+            if secant.effect not in best or self.gains[k] > self.gains[best[secant.effect]]:
+                best[secant.effect] = k
+        found = [Promise(*self.secants[k][1:], float(self.gains[k])) for k in best.values()]
+        return sorted(found, key=lambda one: -one.gain)
+
+    def screened(self) -> tuple[Screened, ...]:
+        """What the data could tell of each effect."""
+        found, left = [], np.sqrt(self.squares)
+        for name in dict.fromkeys(secant.effect for secant in self.secants):
+            mine = np.array([k for k, secant in enumerate(self.secants) if secant.effect == name])
+            absorbed = not self._seen[mine].any()
+            least = mine[0]  # the smallest size tells of a derivative
+            away = max(self.push[least], 0.0) ** 2 / (self.squares[least] * max(self.square, 1e-300))
+            found.append(Screened(name, float(left[mine].max()), absorbed, float(self.gains[mine].max()), float(away)))
+        return tuple(found)
+
+
+def score(parent: Fit, effects: Sequence[str], crew: Crew) -> Scores:
+    """What each of `effects` could take away from what `parent` leaves, at each of its sizes."""
+    basis, remaining = remaining_after(parent)
+    reference = np.concatenate(parent.problem.residuals(parent.solution.point))
+    system, problem = parent.structure.system, parent.problem
+    problems = [
+        Problem(Structure(system, (*parent.structure.effects, e)), problem.trials, problem.floor, problem.view)
+        for e in effects
+    ]
+    jobs = [
+        (one, starts(parent, one.structure, e), parent.solution.point.nuisances)
+        for e, one in zip(effects, problems, strict=True)
+    ]
+    moved = crew.map("scoring", [p.structure.effects for p in problems], _moved, jobs)
+    secants = tuple(
+        Secant(effect, one, start)
+        for effect, one, (begun, _) in zip(effects, problems, moved, strict=True)
+        for start in begun
+    )
+    changes = np.array([row - reference for _, rows in moved for row in rows]).reshape(len(secants), len(reference)).T
+    left = changes - basis @ (basis.T @ changes)
+    return Scores(
+        parent,
+        secants,
+        np.linalg.norm(changes, axis=0),
+        np.maximum(np.square(left).sum(axis=0), 1e-12),
+        left.T @ remaining,
+        float(remaining @ remaining),
+    )
+
+
+def _moved(
+    problem: Problem, sizes: Sequence[np.ndarray], nuisances: Sequence[np.ndarray]
+) -> tuple[list[Point], list[np.ndarray]]:
+    """Where a fit would begin at each size, and the residuals there."""
+    begun = [problem.start(values, nuisances) for values in sizes]
+    return begun, [np.concatenate(problem.residuals(start)) for start in begun]

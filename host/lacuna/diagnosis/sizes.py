@@ -1,0 +1,56 @@
+"""Where fits with an effect begin: at a grid of its sizes, of either sign, and at the frequencies of the residual."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lacuna.diagnosis.spectrum import peaks
+from lacuna.estimation.fit import Fit, starting_point
+from lacuna.estimation.structure import Structure
+from lacuna.system import Effect
+
+_PEAKS = 3  # of the residual's spectrum that a frequency begins at
+
+
+def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
+    """Starting vectors: the parent's values, the effect at a grid of sizes of either sign."""
+    described = structure.system.effects[effect]
+    base = structure.parted(starting_point(parent, structure), effect)
+    vectors = [v for factor in described.start_factors for v in sized(structure, base, effect, factor)]
+    if described.frequency is None:
+        return vectors
+    return [v for vector in vectors for v in _at_peaks(parent, structure, described, vector)]
+
+
+def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) -> list[np.ndarray]:
+    """The vector `base` with an effect at `factor` times its typical size, of either sign."""
+    described = structure.system.effects[effect]
+    parameters = described.parameters[: described.sizes]
+    at, vectors = [structure.names.index(name) for name in described.size_names], []
+    for signs in _signs(described):
+        vector = base.copy()
+        for index, parameter, sign in zip(at, parameters, signs, strict=True):
+            size = described.absent + sign * factor * (parameter.value - described.absent)
+            vector[index] = np.clip(size, parameter.lower, parameter.upper)
+        vectors.append(vector)
+    return vectors
+
+
+def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndarray) -> list[np.ndarray]:
+    """`vector` with the effect's frequency at each of the residual's most prominent ones."""
+    index = structure.names.index(f"{effect.name}.{effect.frequency}")
+    parameter = structure.parameters[index]
+    problem = parent.problem
+    found = []
+    for frequency in peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS):
+        moved = vector.copy()
+        moved[index] = frequency
+        found.append(moved)
+    return found
+
+
+def _signs(effect: Effect) -> list[tuple[float, ...]]:
+    """On which sides of their absent values the sizes may be."""
+    both_ways = all(p.lower < effect.absent < p.upper for p in effect.parameters[: effect.sizes])
+    positive = (1.0,) * effect.sizes
+    return [positive, tuple(-s for s in positive)] if both_ways else [positive]

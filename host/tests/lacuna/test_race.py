@@ -1,0 +1,189 @@
+"""Scores that rank effects, and the race that fits them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy import ToySystem, hide
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.diagnosis import race as race_module
+from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.learn import learn_correction
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.race import cold, cold_starts, initial_guess, joined, race, to_the_end
+from lacuna.diagnosis.score import score
+from lacuna.diagnosis.split import split_trials
+from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.problem import Problem
+from lacuna.estimation.solve import cost_of
+from lacuna.estimation.structure import Structure
+from lacuna.run import with_records
+
+NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
+TIME_S = np.linspace(0.0, 10.0, 200)
+SHAPES = {"a": np.cos(2 * TIME_S), "b": np.cos(3 * TIME_S), "c": np.cos(2 * TIME_S) + np.cos(3 * TIME_S), "d": TIME_S}
+
+
+def linear(sizes, seed=0, sizes_given=0.02) -> Case:
+    """A line, and what is added to it: all linear, so that first order is all there is."""
+
+    def simulate(record, theta):
+        return {"y": theta.slope * TIME_S + sum(theta[f"{name}.size"] * shape for name, shape in SHAPES.items())}
+
+    draw, records = np.random.default_rng(seed), []
+    for k in range(8):
+        y = 2.0 * TIME_S + sum(size * SHAPES[name] for name, size in sizes.items())
+        records.append({"time_s": TIME_S, "k": k, "y": y + 0.1 * draw.standard_normal(200)})
+    effects = [Effect(name, Parameter("size", "", sizes_given, -5.0, 5.0)) for name in SHAPES]
+    system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -9.0, 9.0)], effects, sensor_noise={"y": 0.1})
+    system = with_records(system, records)
+    return Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+
+
+def scored(case):
+    return score(case.fit_base(1), list(case.system.effects), NOBODY)
+
+
+def test_the_score_of_one_effect_is_what_a_fit_with_it_gains():
+    """In a linear model, within three times the size that the secant has."""
+    case = linear({"a": 0.03})
+    base = case.fit_base(1)
+    promises = score(base, list(case.system.effects), NOBODY).singles()
+    assert promises[0].effect == "a"
+    fitted = race_module.solve(promises[0].problem, promises[0].start)
+    residuals = np.concatenate(base.problem.residuals(base.solution.point))
+    assert np.abs(residuals).max() < 5.0, "hardly compressed"
+    assert promises[0].gain == pytest.approx(base.cost - fitted.cost, rel=0.05)
+
+
+@pytest.mark.parametrize("effects", [("a",), ("b", "c")])
+def test_a_secant_is_followed_only_forwards_and_not_too_far(effects):
+    found = scored(linear(dict.fromkeys(effects, 0.3)))
+    for promise in found.singles():
+        secant = next(k for k, one in enumerate(found.secants) if one.start is promise.start)
+        assert promise.gain >= 0.0
+        assert promise.gain <= -3.0 * found.push[secant] + 1e-9
+
+
+def test_what_the_base_can_do_is_absorbed_and_says_nothing():
+    found = {s.effect: s for s in scored(linear({"a": 0.03})).screened()}
+    assert found["d"].absorbed
+    assert not found["d"].detectable
+    assert found["a"].detectable
+
+
+def promises(case, base):
+    return score(base.fitted, list(case.system.effects), NOBODY).singles()
+
+
+def test_a_race_ends_where_one_is_enough_and_runs_on_where_none_is(monkeypatch):
+    case = linear({"a": 0.03})
+    base = case.judge(case.fit_base(1))
+    begun, before = [], race_module._coarse
+    monkeypatch.setattr(
+        race_module, "_coarse", lambda parent, some, *more: begun.extend(some) or before(parent, some, *more)
+    )
+    given = promises(case, base)
+    found = race(base, given, 3, split=case.split, enough=lambda c: True, crew=NOBODY)
+    least = POLICY.rival * given[0].gain
+    assert [one.gain for one in begun] == [one.gain for k, one in enumerate(given) if k < 2 or one.gain > least]
+    assert found[0].effects == ("a",)
+    begun.clear()
+    race(base, given, 3, split=case.split, enough=lambda c: False, crew=NOBODY)
+    assert len(begun) == len(given)
+
+
+class Bench(ToySystem):
+    """Steps isolate parameters; sweeps show all together."""
+
+    def isolates(self, trial):
+        return trial.experiment == "steps"
+
+
+def bench(effects, seed) -> Case:
+    hidden = hide(effects, seed=seed)
+    system = Bench(hidden.trials, hidden.effects)
+    return Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+
+
+def lost(case: Case, effects=()) -> Candidate:
+    """A fit of these effects that is nowhere near, and continues from nothing."""
+    base = case.fit_base(1)
+    problem = Problem(Structure(case.system, effects), case.split.fit, base.problem.floor)
+    point = problem.start(problem.structure.values({"mass_kg": 4.0, "stiffness_N_m": 190.0, "damping_Ns_m": 19.0}))
+    solution = replace(base.solution, point=point, cost=cost_of(problem, point), sensitivities=())
+    fitted = Fit(problem, solution, 1, 1)
+    return Candidate(fitted, evaluate_on(fitted, case.split.judging), POLICY)
+
+
+def test_a_set_begun_cold_owes_nothing_to_a_lost_parent():
+    case = bench({"delay.delay_s": 0.03}, 41)
+    astray = lost(case)
+    (one,) = score(astray.fitted, ["delay"], NOBODY).singles()
+    assert cost_of(one.problem, one.start) > 5.0 * cold(one.problem, cold_starts(one)[0]).cost
+    (found,) = race(astray, [one], 1, split=case.split, enough=case.suffices, crew=NOBODY)
+    assert found.fitted.theta["delay.delay_s"] == pytest.approx(0.03, rel=0.1)
+
+
+def test_a_set_that_costs_more_than_one_it_contains_begins_from_that_one(monkeypatch):
+    case = linear({"a": 0.03, "b": 0.02})
+    base = case.judge(case.fit_base(1))
+    one = next(e for e in promises(case, base) if e.problem.structure.effects == ("a",))
+    nowhere = race_module.solve(one.problem, one.problem.start(cold_starts(one)[0] + 3.0), max_iterations=0)
+    monkeypatch.setattr(race_module, "cold", lambda problem, values: nowhere)
+    assert nowhere.cost > base.fitted.cost
+    (found,) = race_module._coarse(base, [one], case.split, NOBODY)
+    assert found.fitted.cost < base.fitted.cost
+
+
+def test_a_limit_begins_where_it_is_declared_too():
+    def simulate(record, theta):
+        return {"y": np.minimum(theta.slope * TIME_S, theta.clip.limit)}
+
+    clip = Effect("clip", Parameter("limit", "", 10.0, 1.0, np.inf), absent=np.inf)
+    system = with_records(
+        lacuna.System(simulate, [Parameter("slope", "", 1.0, 0.1, 9.0)], [clip]),
+        [{"time_s": TIME_S, "k": k, "y": np.minimum(2.0 * TIME_S, 12.0) + 0.01 * np.cos(9 * TIME_S)} for k in range(5)],
+    )
+    case = Case(system, split_trials(system.trials), POLICY, 0)
+    (one,) = score(case.fit_base(1), ["clip"], NOBODY).singles()
+    declared = [one.problem.structure.theta(values)["clip.limit"] for values in cold_starts(one)]
+    assert 0.1 in declared
+
+
+def test_a_curve_is_begun_cold_where_what_it_stands_on_may_be_lost():
+    case = bench({"cubic_spring.stiffness_N_m3": 4000.0}, 42)
+    astray = lost(case)
+    assert astray.checked_error > (0, POLICY.lost)
+    found = learn_correction([astray], case.split, enough=case.suffices, policy=POLICY, crew=NOBODY)
+    assert found.fitted.structure.sites == ("spring",)
+    assert found.checked_error < (0, 1.5)
+
+
+def test_an_initial_guess_keeps_what_is_known_of_effects_and_curves_alone():
+    case = bench({}, 43)
+    structure = Structure(case.system, ("delay",), ("spring",))
+    known = {"mass_kg": 4.0, "delay.delay_s": 0.07, structure.names[-1]: 0.5, "coulomb.force_N": 1.0}
+    found = structure.theta(initial_guess(structure, known))
+    assert (found["mass_kg"], found["delay.delay_s"], found[structure.names[-1]]) == (1.0, 0.07, 0.5)
+
+
+def test_what_is_fitted_to_the_end_is_never_worse():
+    case = bench({"delay.delay_s": 0.03}, 44)
+    base = case.judge(case.fit_base(1))
+    assert to_the_end(base, case.split, NOBODY).cost <= base.cost
+
+
+def test_two_that_are_joined_are_as_they_are_in_each():
+    case = linear({"a": 0.03, "b": 0.02, "c": 0.01})
+    base = case.judge(case.fit_base(1))
+    fits = {p.effect: race_module.solve(p.problem, p.start) for p in promises(case, base)}
+    of = {p.effect: Fit(p.problem, fits[p.effect], 1, 1) for p in promises(case, base)}
+    both = joined(of["a"], of["b"], 5.0)
+    assert (both.problem.structure.effects, both.gain) == (("a", "b"), 5.0)
+    begun = both.problem.structure.theta(both.start.values)
+    assert {name: begun[f"{name}.size"] for name in "ab"} == {n: of[n].theta[f"{n}.size"] for n in "ab"}
