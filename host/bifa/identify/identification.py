@@ -109,7 +109,7 @@ def identify(
         uncertainty=known,
         intervals=intervals,
         statics=fit_statics(dataset),
-        open=_open(system, dataset, known),
+        open=_open(system, dataset, known, intervals),
         error=_errors(fit),
     )
 
@@ -158,10 +158,14 @@ def _model(
 _TOLD = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before
 
 
-def _open(system: RobotSystem, dataset: Dataset, known: Uncertainty) -> tuple[Open, ...]:
+def _open(
+    system: RobotSystem, dataset: Dataset, known: Uncertainty, intervals: Mapping[str, IntervalEstimate]
+) -> tuple[Open, ...]:
     prior_sd = {p.name: p.prior_sd for p in system.parameters}
     # what the data tell hardly more of than was known before is as open as what they do not tell
-    loose = {e.name for e in known.estimates if not e.determined or e.sd > _TOLD * (prior_sd[e.name] or np.inf)}
+    sd = {e.name: intervals[e.name].sd if e.name in intervals else e.sd for e in known.estimates}
+    told = {e.name for e in known.estimates if e.determined and sd[e.name] <= _TOLD * (prior_sd[e.name] or np.inf)}
+    loose = {e.name for e in known.estimates} - told
     absent = [n for n in system.model.parameters if n not in system.fitted and n not in dataset.known]
     names = [n for n in system.model.parameters if n in loose or n in absent]
     found = [Open(n, system.model.parameters[n].value, _GIVEN_BY[n]) for n in names]

@@ -2,8 +2,9 @@
 
 A hundred thousand samples make the quadratic intervals absurdly narrow: they count every sample as fresh evidence, and
 a model that is wrong by a hundredth of a newton is wrong in all of them alike. What different conditions (another
-pressure, another gait) say about a parameter tells more: the covariance clustered by condition (Huber 1967, White 1980;
-Liang and Zeger 1986) takes each condition as one piece of evidence.
+pressure, another gait) say about a parameter tells more: the jackknife over conditions, to first order (CR3: Bell and
+McCaffrey 2002; MacKinnon, Nielsen and Webb 2023). The plain sandwich (Liang and Zeger 1986) takes the residual of a
+condition for its error, though the fit has bent towards it, and of the few that there are it leaves too little.
 """
 
 from __future__ import annotations
@@ -12,35 +13,43 @@ import numpy as np
 
 from lacuna.estimation.fit import Fit
 
+_KNOWN = 1e-9  # of the best known direction's information: what is left of less without a condition is rounding
+
 
 def clustered_covariance(fit: Fit) -> np.ndarray:
-    """Sandwich covariance of the free parameters, shape (P, P), clustered by experiment and condition."""
+    """Jackknife covariance of the free parameters, shape (P, P), by experiment and condition: how far the optimum moves
+    where one of them is left out. A direction that a single condition shows has none."""
     solution = fit.solution
+    units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
     scores: dict[object, np.ndarray] = {}
-    for trial, score in zip(fit.problem.trials, _scores(fit), strict=True):
+    normals: dict[object, np.ndarray] = {}
+    for trial, score, normal in zip(fit.problem.trials, *_evidence(fit), strict=True):
         key = (trial.experiment, trial.condition)
-        scores[key] = scores.get(key, 0.0) + score
+        scores[key] = scores.get(key, 0.0) + score / units
+        normals[key] = normals.get(key, 0.0) + normal / np.outer(units, units)
     clusters = len(scores)
     if clusters < 2:
         return np.zeros_like(solution.normal)
-    meat = sum(np.outer(score, score) for score in scores.values()) * clusters / (clusters - 1)
-    units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
-    bread = np.linalg.pinv(solution.normal / np.outer(units, units), rcond=1e-12, hermitian=True)
-    return bread @ (meat / np.outer(units, units)) @ bread / np.outer(units, units)
+    whole = solution.normal / np.outer(units, units)
+    moves = np.array(
+        [np.linalg.pinv(whole - normals[key], rcond=_KNOWN, hermitian=True) @ scores[key] for key in scores]
+    )
+    return (clusters - 1) / clusters * moves.T @ moves / np.outer(units, units)
 
 
-def _scores(fit: Fit) -> list[np.ndarray]:
-    """What each trial pulls the free parameters by, shape (P,), less what its own nuisances would take up: these need
-    only be near their best values then."""
+def _evidence(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What each trial pulls the free parameters by, shape (P,), and knows of them, shape (P, P), less what its own
+    nuisances would take up: these need only be near their best values then."""
     problem, solution = fit.problem, fit.solution
-    found = []
+    scores, normals = [], []
     residuals = problem.residuals(solution.point)
     for (jacobian, own), residual, values, parameters in zip(
         solution.jacobians, residuals, solution.point.nuisances, problem.nuisances, strict=True
     ):
         precision = np.array([p.step_scale**-2.0 for p in parameters])
         means = np.array([p.value for p in parameters])
-        pull = own.T @ residual + precision * (values - means)
-        answer = np.linalg.solve(own.T @ own + np.diag(precision), pull)
-        found.append(jacobian.T @ (residual - own @ answer))
-    return found
+        inner = own.T @ own + np.diag(precision)
+        pull, shared = own.T @ residual + precision * (values - means), own.T @ jacobian
+        scores.append(jacobian.T @ residual - shared.T @ np.linalg.solve(inner, pull))
+        normals.append(jacobian.T @ jacobian - shared.T @ np.linalg.solve(inner, shared))
+    return scores, normals
