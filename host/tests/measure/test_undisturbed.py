@@ -88,3 +88,16 @@ def test_valves_that_are_not_as_commanded_are_seen_and_the_dead_time_is_none():
     ):
         with pytest.raises(DisturbedError, match="body"):
             refuse_disturbed([*steady, wrong], "running")
+
+
+def test_a_chamber_that_is_switched_twice_at_once_keeps_its_supply_for_a_while():
+    """Choked flow, 500: a gait whose tail was switched 10 ms after its start ended the campaign."""
+    on, off = sample(0, command=(1.0, 0.0, 1.0)), (1.0, 0.0, 0.0)
+    still, vented, there = 0b011001, 0b001001, 0b101001
+    late = [sample(k, command=off, valves=valves) for k, valves in enumerate((still, still, vented, there), start=1)]
+    refuse_disturbed([on, *late[:2], late[3]], "running")
+    refuse_disturbed(
+        [on, late[0], sample(2, command=off, valves=vented), sample(3, command=off, valves=there)], "running"
+    )
+    with pytest.raises(DisturbedError, match="tail to positive instead of vacuum"):
+        refuse_disturbed([on, *late[:2], sample(3, command=off, valves=still)], "running")
