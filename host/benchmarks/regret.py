@@ -6,7 +6,7 @@ Robots: the nominal one and the strong push, then specimens (5 % in every parame
 its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model file below
 DIR. The best known of a robot is the best of all its runs: of every seed, of `--long` searches of five times the
 budget, and of the peers (differential evolution, SciPy's DIRECT and SHGO) on as many evaluations as the search took in
-the mean. (nevergrad's NGOpt is not among them: every release pins a bayesian-optimization older than `bo` needs.) FILE
+the mean. (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) FILE
 has a line for each robot, with which an interrupted run goes on.
 """
 
