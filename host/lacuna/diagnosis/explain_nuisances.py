@@ -29,7 +29,7 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> 
     near = continued(parent.fitted, fresh, crew)
     grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]
-    finished = [to_the_end(c, case.split, crew) for c in promising]
+    finished = to_the_end(promising, case.split, crew)
     tried = {frozenset(c.effects): c for c in found.tried}
     for one in (*grown, *finished):
         same = frozenset(one.effects)

@@ -16,7 +16,7 @@ import numpy as np
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.score import Promise
-from lacuna.diagnosis.sizes import starts
+from lacuna.diagnosis.sizes import grown, starts
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, best_of, renewed, spread_starts
 from lacuna.estimation.graduated import solve_graduated
@@ -28,7 +28,7 @@ _COARSE: dict[str, Any] = {"max_iterations": 12, "relative": 3e-3}
 _TO_THE_END: dict[str, Any] = {"max_iterations": 40, "relative": 1e-4}
 _FIRST = 2  # promises: if the better one of them is enough, only its rivals follow
 _ELSEWHERE = 3  # places that a base model is begun from besides its initial guess
-_NEAR = 1.3  # times the cost of a converged fit: a coarse one that costs more is not followed
+NEAR = 1.3  # times the cost of a converged fit: what begins or ends beyond leads it nowhere
 
 
 def joined(one: Fit, other: Fit, gain: float) -> Promise:
@@ -81,7 +81,7 @@ def race(
     raced, rest = _coarse(parent, promises[:_FIRST], split, crew), list(promises[_FIRST:])
     keep(raced)
     if raced and min(raced, key=_cost).checked_error <= (0, policy.lost):
-        done = _to_the_end([min(raced, key=_cost)], split, crew)
+        done = to_the_end([min(raced, key=_cost)], split, crew)
         raced.remove(min(raced, key=_cost))
         keep(done)
         if enough(done[0]):
@@ -90,7 +90,7 @@ def race(
     raced = sorted([*raced, *_coarse(parent, rest, split, crew)], key=_cost)
     keep(raced)
     chosen = [c for c in raced if _worth_it(c, parent, done, enough)][: most - len(done)]
-    done += _to_the_end(chosen, split, crew)
+    done += to_the_end(chosen, split, crew)
     keep(done)
     return sorted([*done, *(c for c in raced if c not in chosen)], key=_cost)
 
@@ -130,18 +130,14 @@ def cold(problem: Problem, values: np.ndarray) -> Solution:
     return solve_graduated(problem, values, **_COARSE)
 
 
-def _to_the_end(candidates: Sequence[Candidate], split: Split, crew: Crew) -> list[Candidate]:
+def to_the_end(candidates: Sequence[Candidate], split: Split, crew: Crew) -> list[Candidate]:
+    """The explanations fitted to convergence."""
     names = [c.effects or ("nothing",) for c in candidates]
     jobs = [(c.fitted.problem, c.fitted.solution) for c in candidates]
     solutions = crew.map("finishing", names, converged, jobs)
     each = zip(candidates, solutions, strict=True)
     ended = [judge(Fit(c.fitted.problem, s, 1, 1), split, c.policy, near=c.checked) for c, s in each]
     return [min(before, after, key=_cost) for before, after in zip(candidates, ended, strict=True)]
-
-
-def to_the_end(candidate: Candidate, split: Split, crew: Crew) -> Candidate:
-    """The explanation fitted to convergence."""
-    return _to_the_end([candidate], split, crew)[0]
 
 
 def converged(problem: Problem, coarse: Solution) -> Solution:
@@ -161,7 +157,7 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, crew: Crew) ->
     names = [structure.effects or ("nothing",)] * len(begun)
     found = crew.map("from elsewhere, fitting", names, cold, [(problem, start) for start in begun])
     best = min(found, key=lambda s: s.cost)
-    if best.cost > _NEAR * fitted.cost:
+    if best.cost > NEAR * fitted.cost:
         return candidate
     ended = judge(best_of(problem, [*found, converged(problem, best)]), split, candidate.policy, near=candidate.checked)
     return min(candidate, ended, key=_cost)
@@ -169,17 +165,10 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, crew: Crew) ->
 
 def continued(parent: Fit, effects: Sequence[str], crew: Crew) -> list[Fit]:
     """Each effect more on a parent that leaves little, so that it is where it should be: a coarse fit from there."""
-    system, problem = parent.structure.system, parent.problem
-    problems = [
-        Problem(Structure(system, (*parent.structure.effects, e)), problem.trials, problem.floor) for e in effects
-    ]
+    library, nuisances = parent.structure.system.effects, parent.solution.point.nuisances
+    problems = [grown(parent, effect) for effect in effects]
     jobs = [
-        (
-            one,
-            starts(parent, one.structure, effect),
-            parent.solution.point.nuisances,
-            bool(system.effects[effect].apart),
-        )
+        (one, starts(parent, one.structure, effect), nuisances, bool(library[effect].apart))
         for effect, one in zip(effects, problems, strict=True)
     ]
     found = crew.map("trying", [p.structure.effects for p in problems], _continued, jobs)
@@ -189,9 +178,8 @@ def continued(parent: Fit, effects: Sequence[str], crew: Crew) -> list[Fit]:
 def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
     """Whether an effect, at one of the sizes that fits begin at, gains so much log-likelihood with nothing refitted but
     what it has of its own in every trial: quickly told."""
-    structure = Structure(parent.structure.system, (*parent.structure.effects, effect))
-    problem = Problem(structure, parent.problem.trials, parent.problem.floor)
-    begun = (problem.start(v, parent.solution.point.nuisances) for v in starts(parent, structure, effect))
+    problem = grown(parent, effect)
+    begun = (problem.start(v, parent.solution.point.nuisances) for v in starts(parent, problem.structure, effect))
     return any(cost_of(problem, start) < parent.cost - gain for start in begun)
 
 

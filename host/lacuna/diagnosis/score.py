@@ -17,21 +17,23 @@ import numpy as np
 
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
-from lacuna.diagnosis.sizes import starts
+from lacuna.diagnosis.sizes import grown, starts
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Point, Problem
-from lacuna.estimation.structure import Structure
 
 _LONGEST = 3.0  # times a secant, that it is followed: further it says nothing
 _ABSORBED = 0.02  # a change in the residual of which less than this share is left after the parent's is absorbed
 
 
 class Secant(NamedTuple):
-    """An effect at one of its sizes: where a fit would begin."""
+    """An effect more at one of its sizes: where a fit would begin."""
 
-    effect: str
     problem: Problem
     start: Point
+
+    @property
+    def effect(self) -> str:
+        return self.problem.structure.effects[-1]
 
 
 class Promise(NamedTuple):
@@ -97,7 +99,7 @@ class Scores:
         for k, secant in enumerate(self.secants):
             if secant.effect not in best or self.gains[k] > self.gains[best[secant.effect]]:
                 best[secant.effect] = k
-        found = [Promise(*self.secants[k][1:], float(self.gains[k])) for k in best.values()]
+        found = [Promise(*self.secants[k], float(self.gains[k])) for k in best.values()]
         return sorted(found, key=lambda one: -one.gain)
 
     def screened(self) -> tuple[Screened, ...]:
@@ -116,21 +118,13 @@ def score(parent: Fit, effects: Sequence[str], crew: Crew) -> Scores:
     """What each of `effects` could take away from what `parent` leaves, at each of its sizes."""
     basis, remaining = remaining_after(parent)
     reference = np.concatenate(parent.problem.residuals(parent.solution.point))
-    system, problem = parent.structure.system, parent.problem
-    problems = [
-        Problem(Structure(system, (*parent.structure.effects, e)), problem.trials, problem.floor, problem.view)
-        for e in effects
-    ]
+    problems = [grown(parent, effect) for effect in effects]
     jobs = [
         (one, starts(parent, one.structure, e), parent.solution.point.nuisances)
         for e, one in zip(effects, problems, strict=True)
     ]
     moved = crew.map("scoring", [p.structure.effects for p in problems], _moved, jobs)
-    secants = tuple(
-        Secant(effect, one, start)
-        for effect, one, (begun, _) in zip(effects, problems, moved, strict=True)
-        for start in begun
-    )
+    secants = tuple(Secant(one, start) for one, (begun, _) in zip(problems, moved, strict=True) for start in begun)
     changes = np.array([row - reference for _, rows in moved for row in rows]).reshape(len(secants), len(reference)).T
     left = changes - basis @ (basis.T @ changes)
     return Scores(

@@ -11,7 +11,7 @@ from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.learn import free_form
-from lacuna.diagnosis.race import joined, race
+from lacuna.diagnosis.race import NEAR, joined, race
 from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import reweigh, starting_point
@@ -25,7 +25,6 @@ _FINISHED = {1: 3, 2: 3, 3: 1}  # and of these fitted to the end
 _PARENTS, _JOINED = 2, 3  # of the best sets, those that larger ones grow from, and that are joined
 _REWEIGHED_ITERATIONS = 5
 _LEAST = 3.0  # log-likelihood: gaining less, an effect was not seen
-_NEAR = 1.3  # times the cost of the base model: what begins beyond leads it nowhere
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ def _led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Can
         start = problem.start(starting_point(one.fitted, base.fitted.structure), one.fitted.solution.point.nuisances)
         costs[one] = cost_of(problem, start)
     nearest = min(costs, key=costs.__getitem__, default=None)
-    if nearest is None or costs[nearest] > _NEAR * base.fitted.cost:
+    if nearest is None or costs[nearest] > NEAR * base.fitted.cost:
         return None
     better = refitted_without(nearest, (), split)
     return better if base.cost - better.cost > max(base.policy.promising * base.excess, _LEAST) else None

@@ -1,4 +1,4 @@
-"""Where fits with an effect begin: at a grid of its sizes, of either sign, and at the frequencies of the residual."""
+"""Where fits with one more effect begin: at a grid of sizes, of either sign, at frequencies of the residual."""
 
 from __future__ import annotations
 
@@ -6,10 +6,19 @@ import numpy as np
 
 from lacuna.diagnosis.spectrum import peaks
 from lacuna.estimation.fit import Fit, starting_point
+from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.system import Effect
 
 _PEAKS = 3  # of the residual's spectrum that a frequency begins at
+
+
+def grown(parent: Fit, effect: str) -> Problem:
+    """The problem of a fit with an effect more, on the same trials against the same floor."""
+    structure, problem = parent.structure, parent.problem
+    return Problem(
+        Structure(structure.system, (*structure.effects, effect)), problem.trials, problem.floor, problem.view
+    )
 
 
 def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:

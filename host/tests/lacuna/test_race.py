@@ -175,7 +175,7 @@ def test_an_initial_guess_keeps_what_is_known_of_effects_and_curves_alone():
 def test_what_is_fitted_to_the_end_is_never_worse():
     case = bench({"delay.delay_s": 0.03}, 44)
     base = case.judge(case.fit_base(1))
-    assert to_the_end(base, case.split, NOBODY).cost <= base.cost
+    assert to_the_end([base], case.split, NOBODY)[0].cost <= base.cost
 
 
 def test_two_that_are_joined_are_as_they_are_in_each():
