@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks import loop
 from benchmarks import records as lines
-from bifa.campaign.walks import measure_walks, speeds
+from bifa.campaign.walks import measure_walks, speed_of
 from bifa.gait.prediction import FELL, Prediction, Predictor
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.uncertainty import spread_of
@@ -83,7 +83,7 @@ def walked(folder: Path, effect: str, seed: int) -> list[Step]:
         quicker = replace(gait, period_s=gait.period_s * (1.0 - faster))
         with tempfile.TemporaryDirectory() as aside, loop.robot(effect, seed).open(_STAGE + number) as rig:
             dataset = measure_walks(rig, Path(aside) / "walks", {"g": quicker}, _CYCLES, RUNS)
-        runs = tuple(run.mean_mm_s for run in speeds(dataset)["g"])
+        runs = tuple(speed_of(trial).mean_mm_s for trial in dataset.trials)
         least = max(FELL * prediction.speed_mm_s, STANDING_MM_S)
         which = tuple(speed >= least for speed in runs)
         steps.append(Step(faster, prediction.walks_probability, prediction.interval_90_mm_s, runs, which))

@@ -29,13 +29,13 @@ from benchmarks import records as lines
 from bifa.campaign.loop import campaign, found_gait
 from bifa.campaign.setup import Effort, Setup
 from bifa.campaign.stages import Stage, run_stages
-from bifa.campaign.walks import foretold, measure_walks, planned_cycles, speeds
+from bifa.campaign.walks import foretold, measure_walks, planned_cycles, speed_of, walks_of
 from bifa.data import read_dataset
 from bifa.gait import SearchError
 from bifa.gait.prediction import FELL
 from bifa.gait.settling import STANDING_MM_S
 from bifa.robot import load_model
-from bifa.robot.gait import BASELINE, Gait, save_gait
+from bifa.robot.gait import BASELINE, save_gait
 from virtual_robot.effects import EFFECTS, LIBRARY
 
 SEEDS, FIRST_SEED, OUT = 3, 200, Path("../out/loop")
@@ -130,15 +130,13 @@ def _walk_base(folder: Path, name: str, naive: bool, setup: Setup, effort: Effor
 
 def _walked(walks: Path, model: Path, name: str) -> Walked:
     dataset = read_dataset(walks)
-    trial = next(t for t in dataset.trials if name != "baseline" or Gait(**t.gait) == BASELINE)
-    prediction = foretold(load_model(model), trial, naive=name == "naive")
-    by_gait = speeds(dataset)
-    runs = by_gait["baseline"] if name == "baseline" else [run for each in by_gait.values() for run in each]
+    trials = walks_of(BASELINE, dataset) if name == "baseline" else dataset.trials
+    prediction = foretold(load_model(model), trials[0], naive=name == "naive")
     return Walked(
         prediction.speed_mm_s,
         {str(level): prediction.interval_mm_s(level) for level in _LEVELS},
         prediction.walks_probability,
-        tuple(run.mean_mm_s for run in runs),
+        tuple(speed_of(trial).mean_mm_s for trial in trials),
     )
 
 

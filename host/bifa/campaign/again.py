@@ -18,7 +18,7 @@ import numpy as np
 
 from bifa.campaign.resolve import joined
 from bifa.campaign.stages import StageError
-from bifa.campaign.walks import foretold, predict, predicted_speed, speeds
+from bifa.campaign.walks import foretold, predict, predicted_speed, speed_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.files import write_text
 from bifa.gait.prediction import FELL
@@ -111,7 +111,7 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool
     between = residuals - residuals.mean(axis=0)
     several = len(trials) > 1
     floor = float(np.sqrt((between**2).sum(axis=0).mean() / (len(trials) - 1))) if several else None
-    measured = [speed.mean_mm_s for repeats in speeds(walks).values() for speed in repeats]
+    measured = [speed_of(trial).mean_mm_s for trial in trials]
     return Round(
         effects,
         trials[0].walked,

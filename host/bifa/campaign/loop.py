@@ -96,6 +96,7 @@ def _session(
                 name=name,
                 known=known_of(rig, known),
                 provenance=setup.settings(0),
+                record=setup.hands,
                 on_event=lambda e: told(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
 
@@ -164,7 +165,8 @@ def _walk(
         robot = load_model(inputs / model)
         cycles = {key: planned_cycles(robot, gait, effort.cycles) for key, gait in loaded.items()}
         with setup.open(number) as rig:
-            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, _told(setup, on_progress))
+            told = _told(setup, on_progress)
+            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, told, setup.hands)
 
     needs = (model, *(file for file in gaits.values() if file))
     settings = setup.settings(number) | {"effort": asdict(effort)}
@@ -210,9 +212,8 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
         with setup.open(_FURTHER + number) as rig:
-            return measure_walks(
-                rig, folder, {f"round-{number}": gait}, cycles, effort.repeats, _told(setup, on_progress)
-            )
+            gaits, told = {f"round-{number}": gait}, _told(setup, on_progress)
+            return measure_walks(rig, folder, gaits, cycles, effort.repeats, told, setup.hands)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")

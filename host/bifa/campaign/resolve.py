@@ -11,7 +11,7 @@ from typing import Any
 from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, DatasetError, read_dataset
 from bifa.measure.plan import REPEATS, PlannedTrial
-from bifa.measure.session import run_session
+from bifa.measure.session import Recorder, run_session
 from bifa.rig import Rig
 from bifa.robot.gait import Gait
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -32,6 +32,7 @@ def resolve(
     open_rig: OpenRig,
     folder: Path,
     on_progress: OnProgress = lambda what, share: None,
+    record: Recorder | None = None,
 ) -> tuple[Dataset, Diagnosis, tuple[NextExperiment, ...]]:
     """As long as `found` names an experiment that separates what it confuses, run that and diagnose again: until the
     set is one, nothing on offer separates it, or after `ROUNDS` experiments.
@@ -52,6 +53,7 @@ def resolve(
                 name=f"to tell {' and '.join(found.next.separates)} apart",
                 known=dataset.known,
                 provenance=dataset.provenance,
+                record=record,
                 on_event=lambda e: on_progress(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
         dataset = joined(dataset, read_dataset(folder / f"separate-{number}"), f"separate-{number}_")

@@ -50,10 +50,7 @@ class Setup:
 
     def open(self, stage: int) -> Rig:
         """The rig for stage number `stage`."""
-        rig = open_rig(self.port, **self._options(stage))
-        if rig.instruments is None and self.hands is not None:
-            self.hands.equip(rig)
-        return rig
+        return open_rig(self.port, **self._options(stage))
 
     def settings(self, stage: int) -> dict[str, object]:
         """What decides the stage's data, for its provenance."""

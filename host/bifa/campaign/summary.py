@@ -2,8 +2,8 @@
 
 import json
 import platform
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import bifa
 from bifa.campaign.again import read_rounds
 from bifa.campaign.page import campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
-from bifa.campaign.walks import foretold, predict, predicted_speed, speed_of, speeds
+from bifa.campaign.walks import foretold, predict, predicted_speed, speed_of, walks_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.data.dataset import labels_of
 from bifa.gait import simulations
@@ -25,7 +25,7 @@ from bifa.report.page import write_page
 from bifa.report.picture import draw_chart
 from bifa.report.walks import MEASURED, Walk, draw_walks
 from bifa.robot import Model, load_model
-from bifa.robot.gait import BASELINE, Gait
+from bifa.robot.gait import BASELINE, Gait, load_gait
 from bifa.simulate import gait_rows
 
 TITLES = {
@@ -60,7 +60,7 @@ def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stag
 
     robot: in words; made: how the campaign was made, for the report."""
     needs = ["bench", "model-base.toml", "model-completed.toml", "walks-base", "walks-completed", "rounds.json"]
-    needs += ["rounds", "model-last.toml"]
+    needs += ["gait-base.toml", "rounds", "model-last.toml"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "walk.svg", "report.html")
 
@@ -72,11 +72,13 @@ def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stag
 
 def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]]) -> None:
     base, completed = (load_model(inputs / f"model-{which}.toml") for which in ("base", "completed"))
-    datasets = [with_stand_in(read_dataset(inputs / "walks-base")), read_dataset(inputs / "walks-completed")]
-    trials = [trial for dataset in datasets for trial in dataset.trials]
-    results = []
-    for dataset in datasets:
-        results += [_result(gait, _named(dataset, gait), base, completed) for gait in speeds(dataset)]
+    datasets = {which: read_dataset(inputs / f"walks-{which}") for which in ("base", "completed")}
+    walked = {
+        "baseline": walks_of(BASELINE, datasets["base"]),
+        "base": walks_of(load_gait(inputs / "gait-base.toml"), datasets["base"]),
+        "completed": datasets["completed"].trials,
+    }
+    results = [_result(name, trials, base, completed) for name, trials in walked.items()]
     if edge := _edge(inputs):
         results.append(_result("edge", edge, base, load_model(inputs / "model-last.toml")))
     diagnosis = json.loads((inputs / "diagnosis.json").read_text())
@@ -90,31 +92,26 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
         "error": diagnosis["error"],
         "prediction_error": json.loads((inputs / "errors.json").read_text()),
         "rounds": read_rounds(inputs / "rounds.json"),
-        "robustness": _robustness(completed, trials),
+        "robustness": _robustness(completed, {name: Gait(**trials[0].walked) for name, trials in walked.items()}),
         "truth": truth,
     }
     (outputs / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
     walks = {
-        _gait(t): Walk(
-            TITLES[_gait(t)],
-            t.walked["period_s"],
-            {MEASURED: t.columns, COMPLETED: predict(completed, t), BASE: predict(base, t)},
+        name: Walk(
+            TITLES[name],
+            first.walked["period_s"],
+            {MEASURED: first.columns, COMPLETED: predict(completed, first), BASE: predict(base, first)},
         )
-        for t in trials
-        if t.repeat == 1
+        for name, (first, *_) in walked.items()
     }
     draw_walks(list(walks.values()), outputs / "walks.png")
     draw_chart(errors_chart(diagnosis["error"]), outputs / "errors.png")
     (outputs / "walk.svg").write_text(motion_of(most_missed(walks), standalone=True)[0], encoding="utf-8")
     measured = read_dataset(inputs / "bench")
     page = campaign_page(
-        summary, diagnosis, traces, walks, labels_of(measured), robot, [*_when(measured, datasets), *made, _versions()]
+        summary, diagnosis, traces, walks, labels_of(measured), robot, [*_when(measured), *made, _versions()]
     )
     write_page(page, outputs / "report.html")
-
-
-def _named(dataset: Dataset, gait: str) -> Sequence[Trial]:
-    return [t for t in dataset.trials if _gait(t) == gait]
 
 
 def _edge(inputs: Path) -> Sequence[Trial]:
@@ -142,22 +139,10 @@ def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -
     )
 
 
-def with_stand_in(walked: Dataset) -> Dataset:
-    """Where no gait walks on the base model, the baseline was walked for both, once."""
-    if any(_gait(trial) == "base" for trial in walked.trials):
-        return walked
-    again = (replace(trial, file=trial.file.replace("baseline", "base", 1)) for trial in walked.trials)
-    return replace(walked, trials=(*walked.trials, *again))
-
-
-def _gait(trial: Trial) -> str:
-    return trial.file.rsplit("_", 1)[0]
-
-
-def _when(measured: Dataset, walks: Sequence[Dataset]) -> list[tuple[str, str]]:
+def _when(measured: Dataset) -> list[tuple[str, str]]:
     """When the data was measured, by its files, and by which firmware."""
     day = datetime.fromtimestamp((measured.folder / "dataset.toml").stat().st_mtime).date().isoformat()
-    firmware = walks[0].provenance.get("firmware")
+    firmware = measured.provenance.get("firmware")
     return [("measured", day), *([("firmware", str(firmware))] if firmware else [])]
 
 
@@ -165,9 +150,8 @@ def _versions() -> tuple[str, str]:
     return "versions", f"bifa {bifa.__version__}, Python {platform.python_version()}, NumPy {np.__version__}"
 
 
-def _robustness(model: Model, trials: list[Trial]) -> dict[str, list[float]]:
+def _robustness(model: Model, gaits: Mapping[str, Gait]) -> dict[str, list[float]]:
     """Speeds in mm/s of every gait on robots that differ from the model by `SPREAD` in each parameter, sorted."""
-    gaits = {_gait(trial): Gait(**trial.walked) for trial in trials}
     robots = spread_of(model, SPREAD).plants(model, _ROBOTS, 0)
     with simulations() as runs:
         speeds = distribution(runs, robots, gait_rows(list(gaits.values())), Metric())

@@ -1,6 +1,5 @@
 """Walk gaits on a rig and compare what was measured with what the model predicts."""
 
-import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -9,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from bifa.campaign.stages import OnProgress
-from bifa.data import Dataset, DatasetWriter, Trial
+from bifa.data import Dataset, Trial
 from bifa.gait.measured import MeasuredSpeed, measured_speed
 from bifa.gait.prediction import Prediction, predict_speed
 from bifa.gait.settling import LEAST, MOST_CYCLES, Walking
 from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
-from bifa.measure.experiments import record_columns
-from bifa.measure.plan import PlannedTrial
+from bifa.measure.plan import PlannedTrial, walks
+from bifa.measure.session import Recorder, run_session, unattended
 from bifa.problem.switches import seconds_per_uno_s, valves_of
 from bifa.rig import Rig
 from bifa.robot import Model
-from bifa.robot.gait import Gait
+from bifa.robot.gait import Gait, GaitFile
 from bifa.simulate import of_gait, walk
 
 
@@ -31,42 +30,34 @@ def measure_walks(
     cycles: int | Mapping[str, int],
     repeats: int = 1,
     on_progress: OnProgress = lambda what, share: None,
+    record: Recorder | None = None,
 ) -> Dataset:
-    """Walk every gait `repeats` times on the rig for as many `cycles`, or for its own, into the data set `folder` of
-    trials named after the gaits; walks that an interrupted run has left there are not walked again.
+    """Walk every gait `repeats` times on the rig for as many `cycles`, or for its own, into the data set `folder`,
+    whose files are named after the gaits; walks that an interrupted run has left there are not walked again.
 
-    On a rig that needs nobody a walk that has not settled is walked again for twice as long, up to `MOST_CYCLES`.
+    record: None, where the rig needs nobody: a walk that has not settled is then walked again for twice as long, up to
+    `MOST_CYCLES`.
     """
-    record = getattr(rig, "recorder", None) or _settled
     each = cycles if isinstance(cycles, Mapping) else dict.fromkeys(gaits, cycles)
-    total = len(gaits) * repeats
-    with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
-        hello = uno.connect()
-        uno.clear()
-        writer = DatasetWriter(folder, "walks", {}, {"firmware": hello.firmware}, resume=True)
-        for number, (name, repeat) in enumerate(itertools.product(gaits, range(1, repeats + 1)), start=1):
-            planned = PlannedTrial("locomotion", gait=gaits[name], cycles=each[name], repeat=repeat)
-            if writer.has(planned.as_trial()):
-                continue
-
-            def show(share: float, name: str = name) -> None:
-                on_progress(name, share)
-
-            trial = record(rig, uno, planned, show, number=number, total=total, writer=writer)
-            writer.add(replace(trial, file=f"{name}_{repeat}.csv", session_order=number))
-    return writer.finish()
+    trials = [
+        walk for name, gait in gaits.items() for walk in walks(GaitFile(gait), repeats, cycles=each[name], name=name)
+    ]
+    return run_session(
+        rig,
+        folder,
+        trials,
+        name="walks",
+        known={},
+        provenance={},
+        record=record or _until_settled,
+        on_event=lambda event: on_progress(event.planned.name, event.share),
+    )
 
 
-def _walk(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The `Recorder` of walks on a rig that needs nobody."""
-    columns, extra = record_columns(rig, uno, planned, on_progress)
-    return planned.as_trial(columns, extra=extra)
-
-
-def _settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The same until the walk has settled, or has had time enough for that."""
+def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
+    """The `Recorder` of a rig that needs nobody, until the walk has settled, or has had time enough for that."""
     while True:
-        trial = _walk(rig, uno, planned, on_progress)
+        trial = unattended(rig, uno, planned, on_progress)
         short = planned.cycles < LEAST
         if short or planned.cycles >= MOST_CYCLES or speed_of(trial).walking is not Walking.UNSETTLED:
             return trial
@@ -84,20 +75,17 @@ def speed_of(trial: Trial) -> MeasuredSpeed:
     return measured_speed(trial.time_s, trial.columns["displacement_head_mm"], trial.walked["period_s"])
 
 
+def walks_of(gait: Gait, dataset: Dataset) -> list[Trial]:
+    """The trials that walked `gait`."""
+    return [trial for trial in dataset.trials if trial.gait == gait.as_dict()]
+
+
 def foretold(model: Model, trial: Trial, naive: bool = False) -> Prediction:
     """What the model says of the walk in `trial`, of which only the clock's rate is used; naive: by its covariance
     alone."""
     known = spread_of(model)
     rate = seconds_per_uno_s(trial)
     return predict_speed(model, known.naive if naive else known, Gait(**trial.walked), clock_rate=rate)
-
-
-def speeds(dataset: Dataset) -> dict[str, list[MeasuredSpeed]]:
-    """The measured speeds of each gait's repeats, by the name that `measure_walks` gave."""
-    measured: dict[str, list[MeasuredSpeed]] = {}
-    for trial in dataset.trials:
-        measured.setdefault(trial.file.rsplit("_", 1)[0], []).append(speed_of(trial))
-    return measured
 
 
 def predict(model: Model, trial: Trial) -> dict[str, Any]:

@@ -109,6 +109,8 @@ def _found(
     """The diagnosis of a data set; `resolved`: with experiments that separate, recorded into this folder."""
     from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
+    from bifa.cli.campaign import at_desk
+    from bifa.rig import is_offered
     from bifa.screen import words
 
     with console.status("starting"):
@@ -131,8 +133,9 @@ def _found(
         with workers as (executor, _):
             found = diagnosed(measured)
             if resolved is not None:
-                rigs = _rigs(measured, port, console, watch, progress)
-                _, found, _ = resolve(measured, found, diagnosed, rigs, resolved, said)
+                hands = None if is_offered(port) else at_desk(console, watch, Path("bench.toml"))[1]
+                rigs = _rigs(measured, port, progress)
+                _, found, _ = resolve(measured, found, diagnosed, rigs, resolved, said, hands)
     return found
 
 
@@ -180,21 +183,16 @@ def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
     return compared_curves(trials, predictions, labels)
 
 
-def _rigs(
-    measured: Dataset, port: str | None, console: Console, watch: Path | None, progress: Progress
-) -> Callable[[int], AbstractContextManager[Rig]]:
+def _rigs(measured: Dataset, port: str | None, progress: Progress) -> Callable[[int], AbstractContextManager[Rig]]:
     """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance; where a person
     works the instruments, no bar redraws itself over the questions."""
     from contextlib import contextmanager
-    from functools import cache
 
     from bifa.campaign.resolve import SPECIMEN
-    from bifa.cli.campaign import at_desk
     from bifa.rig import open_rig
 
     made = {**measured.provenance, **measured.provenance.get("options", {})}
     options = {key: made[key] for key in SPECIMEN if key in made} if port == "virtual" else {}
-    desk = cache(lambda: at_desk(console, watch, Path("bench.toml"))[1])  # one for all: each reads the terminal on
 
     @contextmanager
     def opened(number: int) -> Iterator[Rig]:
@@ -202,7 +200,6 @@ def _rigs(
             if rig.instruments is not None:
                 yield rig
                 return
-            desk().equip(rig)
             progress.stop()
             yield rig
         progress.start()

@@ -206,20 +206,18 @@ def _run(
     )
     errors: list[float] = []
     with open_rig(port, **options) as rig:
-        by_hand = rig.instruments is None
-        if by_hand:
-            at_desk(console, watch, bench)[1].equip(rig)
+        hands = at_desk(console, watch, bench)[1] if rig.instruments is None else None
         bars = Progress(*columns, console=console)
         task = bars.add_task(name, total=len(trials))
 
-        def show(event: "Event") -> None:
+        def on_event(event: "Event") -> None:
             bars.update(task, description=event.planned.title, completed=event.number - 1 + event.share)
-            if event.clock_error_s is not None:
-                errors.append(event.clock_error_s)
-            if event.misfit and not by_hand:
+            if event.trial is not None:
+                errors.append(event.trial.extra["clock_error_s"])
+            if event.misfit and hands is None:
                 console.print(warning(event.misfit), highlight=False)
 
-        with nullcontext() if by_hand else bars:  # a bar would redraw itself over questions and answers
+        with nullcontext() if hands else bars:  # a bar would redraw itself over questions and answers
             dataset = run_session(
                 rig,
                 out,
@@ -227,7 +225,8 @@ def _run(
                 name=f"{name} on the bench",
                 known=known_of(rig, known),
                 provenance=provenance("bifa experiment", port, options | _length_of_walks(trials)),
-                on_event=show,
+                record=hands,
+                on_event=on_event,
             )
             bars.update(task, completed=len(trials))
     console.print(f"{out}: {counted(len(dataset.trials), 'trial')}, {len(errors)} just recorded.")

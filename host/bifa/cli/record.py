@@ -58,7 +58,7 @@ def record(
         if has_instruments:
             console.print(f"gait: {gait or 'the baseline'}, {steps}", highlight=False)
             with stoppable(lambda: f"valves off; {_kept(out)}; the same command resumes"):
-                record_walks(rig, out, gait, cycles, repeats, console)
+                record_walks(rig, port, out, gait, cycles, repeats, console)
     if not has_instruments:
         console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking", highlight=False)
         record_telemetry(open_rig, port, out, gait, seconds, console)

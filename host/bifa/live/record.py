@@ -7,11 +7,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
-from rich.progress import Progress, TaskID
+from rich.progress import Progress
 from rich.status import Status
 
 from bifa.errors import BifaError
@@ -23,9 +22,6 @@ from bifa.printable import counted
 from bifa.rig import Rig, RigError, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
-
-if TYPE_CHECKING:
-    from bifa.data import DatasetWriter
 
 RETRY_S = 1.0
 RESTARTS = 3  # of a board that kept its power, while its port was away: each counts its boot number on by one
@@ -47,75 +43,44 @@ class RecordError(BifaError):
     """A recording cannot be made there."""
 
 
-def record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
+def record_walks(
+    rig: Rig, port: str | None, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console
+) -> None:
     """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
-    with locked(out):
-        _record_walks(rig, out, gait_file, cycles, repeats, console)
-
-
-def _record_walks(rig: Rig, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console) -> None:
-    from bifa.check.lag import misfit_of_last
-    from bifa.data import DatasetWriter, Trial
     from bifa.gait.measured import measured_speed
     from bifa.gait.settling import LEAST, Walking
-    from bifa.measure.experiments import record_columns
-    from bifa.measure.plan import PlannedTrial
-    from bifa.measure.session import provenance
+    from bifa.measure.known import known_of
+    from bifa.measure.plan import walks
+    from bifa.measure.session import Event, provenance, run_session
 
-    steps = read_gait_file(gait_file) if gait_file else GaitFile(BASELINE)
-    gait = steps.gait
-    writer = DatasetWriter(out, "walks", provenance=provenance("bifa record"), resume=True)
-    _check_same(writer, _settings(steps), round(cycles * gait.period_s, 2))
-    with Uno(rig.transport, rig.clock) as uno, Progress(console=console) as progress:
-        waiting = progress.add_task("waiting for the Uno", total=None)
-        hello = uno.connect()
-        progress.remove_task(waiting)
-        uno.clear()
-        if steps.others:
-            uno.upload(steps.others)
-        for repeat in range(1, repeats + 1):
-            trial = Trial(f"walk_{repeat}.csv", "locomotion", {}, repeat=repeat, **_settings(steps))
-            if writer.has(trial):
-                continue
-            task = progress.add_task(f"walk {repeat} of {repeats}", total=1.0)
-            planned = PlannedTrial("locomotion", gait=gait, cycles=cycles, repeat=repeat)
-            before = replace(uno.counters)
+    gait = read_gait_file(gait_file) if gait_file else GaitFile(BASELINE)
+    with Progress(console=console) as progress:
+        task = progress.add_task("waiting for the Uno", total=None)
 
-            def show(share: float, task: TaskID = task) -> None:
-                progress.update(task, completed=share)
-
-            columns, extra = record_columns(rig, uno, planned, show)
-            writer.add(replace(trial, columns=columns, session_order=repeat, extra=extra))
-            if wrong := misfit_of_last(writer.trials):
-                progress.console.print(warning(wrong), highlight=False)
-            progress.update(task, completed=1.0)
-            progress.console.print(f"walk {repeat}: {uno.counters.since(before).text()}")
-            if cycles >= LEAST:
-                speed = measured_speed(columns["time_s"], columns["displacement_head_mm"], gait.period_s)
+        def on_event(event: Event) -> None:
+            done = event.number - 1 + event.share
+            progress.update(task, description=f"walk {event.number} of {repeats}", total=repeats, completed=done)
+            if event.misfit:
+                progress.console.print(warning(event.misfit), highlight=False)
+            if event.trial is not None and cycles >= LEAST:
+                columns = event.trial.columns
+                speed = measured_speed(columns["time_s"], columns["displacement_head_mm"], gait.gait.period_s)
                 more = f"; walk it with --cycles {2 * cycles}" if speed.walking is Walking.UNSETTLED else ""
-                progress.console.print(f"walk {repeat}: {speed.text}{more}", highlight=False)
-    writer.finish()
+                progress.console.print(f"walk {event.number}: {speed.text}{more}", highlight=False)
+
+        dataset = run_session(
+            rig,
+            out,
+            walks(gait, repeats, cycles=cycles, name="walk"),
+            name="walks",
+            known=known_of(rig, {}),
+            provenance=provenance("bifa record", port, {"cycles": cycles, **gait.parameters}),
+            on_event=on_event,
+        )
     console.print(
-        f"{out}: {counted(repeats, 'walk')} of {cycles} cycles, firmware {hello.firmware}; "
+        f"{out}: {counted(repeats, 'walk')} of {cycles} cycles, firmware {dataset.provenance['firmware']}; "
         f"look at it with: bifa check {out}"
     )
-
-
-def _check_same(writer: "DatasetWriter", settings: dict[str, Any], duration_s: float) -> None:
-    """What an interrupted session has walked is what is asked for now."""
-    for kept in writer.trials:
-        asked = dict(kept.gait or {}), kept.pressure_psi, float(kept.time_s[-1])
-        if asked[:2] != (settings["gait"], settings["pressure_psi"]) or abs(asked[2] - duration_s) > 0.1:
-            raise RecordError(
-                f"{writer.partial} holds {kept.file} with another gait, pressure or number of cycles; go on with "
-                "the same options, name another folder, or move it away"
-            )
-
-
-def _settings(steps: GaitFile) -> dict[str, Any]:
-    """What of a gait file is a setting of the trial that it makes."""
-    beside = {key: steps.others[key] for key in ("coupling_per_s",) if key in steps.others}
-    return {"gait": {**steps.gait.as_dict(), **beside}, "pressure_psi": steps.others.get("pressure_psi")}
 
 
 def record_telemetry(

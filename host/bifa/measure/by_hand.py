@@ -1,13 +1,12 @@
 """A bench with a lab's own instruments: each trial is announced, recorded, shown, and kept or repeated.
 
-`ByHand.equip(rig)` gives a rig without instruments these; sessions then go as on any rig.
+`ByHand` is the `Recorder` of a session with these; sessions then go as on any rig.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from bifa.check import check_trial
 from bifa.check.lag import misfit_of
@@ -20,7 +19,7 @@ from bifa.measure.desk import Desk
 from bifa.measure.experiments import record_trial
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
-from bifa.measure.recording import idle
+from bifa.measure.recording import Bench, idle
 from bifa.measure.text_plot import text_plot
 from bifa.rig import Rig
 
@@ -31,7 +30,7 @@ _LOOK_S = 0.25
 class ByHand:
     """The `Recorder` of a rig whose instruments a person works. `plain`: the terminal shows ASCII only; it has so many
     `columns`; `exports`: says how the instruments write their files, where that is declared; `before` is called before
-    anything is asked, so that no bar redraws itself over questions and answers."""
+    each trial, so that no bar redraws itself over questions and answers."""
 
     def __init__(
         self,
@@ -44,12 +43,6 @@ class ByHand:
         self._desk, self._plain, self._columns = desk, plain, columns
         self._instruments = OwnInstruments(desk, watch, exports)
         self.before: Callable[[], None] = lambda: None
-
-    def equip(self, rig: Any) -> None:
-        """Let `rig`, which has no instruments of its own, use the lab's."""
-        self.before()
-        rig.instruments = self._instruments
-        rig.recorder = self
 
     def __call__(
         self,
@@ -66,44 +59,45 @@ class ByHand:
 
         Raises KeyboardInterrupt where the answer is to stop.
         """
+        self.before()
         turn = Turn(planned, number, total)
         self._instruments.begin(turn, writer.partial / RAW)
         try:
-            return self._until_kept(rig, uno, turn, on_progress, writer)
+            return self._until_kept(Bench(self._instruments, rig.clock), uno, turn, on_progress, writer)
         finally:
             self._desk.clear()
 
     def _until_kept(
-        self, rig: Rig, uno: Uno, turn: Turn, on_progress: Callable[[float], None], writer: DatasetWriter
+        self, bench: Bench, uno: Uno, turn: Turn, on_progress: Callable[[float], None], writer: DatasetWriter
     ) -> Trial:
         planned, number, total = turn.planned, turn.number, turn.total
         while True:
             self._desk.say(f"\nTrial {number} of {total}: {planned.title}")
             try:
-                trial = record_trial(rig, uno, planned, on_progress, attempts=1)
+                trial = record_trial(bench, uno, planned, on_progress, attempts=1)
             except (LinkError, PortGoneError):
                 raise
             except BifaError as error:
                 uno.halt()
-                self._review(rig, uno, turn, f"Not usable: {error}.", "Enter tries again", keep=False)
+                self._review(bench, uno, turn, f"Not usable: {error}.", "Enter tries again", keep=False)
                 uno.clear()  # it may have been stopped; the next thing asked is whether valves may switch
                 continue
-            if self._accepted(rig, uno, turn, trial, writer):
+            if self._accepted(bench, uno, turn, trial, writer):
                 self._instruments.keep(writer.partial / RAW)
                 return trial
 
-    def _accepted(self, rig: Rig, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
+    def _accepted(self, bench: Bench, uno: Uno, turn: Turn, trial: Trial, writer: DatasetWriter) -> bool:
         for line in text_plot(trial, self._plain, self._columns):
             self._desk.say(line)
         wrong = [str(finding) for finding in check_trial(trial)]
         if misfit := misfit_of(trial, writer.trials):
             wrong.append(misfit)
         seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."
-        return self._review(rig, uno, turn, seen, "Enter keeps it, r repeats it", keep=True, findings=wrong)
+        return self._review(bench, uno, turn, seen, "Enter keeps it, r repeats it", keep=True, findings=wrong)
 
     def _review(
         self,
-        rig: Rig,
+        bench: Bench,
         uno: Uno,
         turn: Turn,
         seen: str,
@@ -117,7 +111,7 @@ class ByHand:
         )
         while True:
             while (answer := self._desk.answer()) is None:
-                idle(rig, uno, _LOOK_S)
+                idle(bench, uno, _LOOK_S)
             if not answer or answer.lower() in _REPEAT:
                 return keep and not answer
             self._desk.again(answer, choice)

@@ -1,4 +1,4 @@
-"""The paper's characterisation experiments (section IV), run on a rig through the real firmware and link."""
+"""The paper's characterisation experiments (section IV), run on a bench through the real firmware and link."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from bifa.link.units import set_point_psi
 from bifa.measure.alignment import AlignmentError, camera_rate, resampled
 from bifa.measure.locomotion import noted, record_walk
 from bifa.measure.plan import PULL_MM, PlannedTrial
-from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Recording, idle, instruments_of, mount
+from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
 from bifa.measure.undisturbed import refuse_disturbed
-from bifa.rig import Rig
 
 CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
@@ -35,7 +34,7 @@ Recorded = tuple[dict[str, np.ndarray], dict[str, Any], int]  # columns, what is
 
 
 def record_trial(
-    rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
+    bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
 ) -> Trial:
     """Run one planned trial and return it as a data set holds it; the valves are off afterwards.
 
@@ -43,35 +42,25 @@ def record_trial(
     (`set_point_psi`) and, of a step, when the valves switched.
     Raises BifaError where telemetry keeps getting lost or the clocks do not line up.
     """
-    columns, extra = record_columns(rig, uno, planned, on_progress, attempts)
-    if (commanded_psi := _commanded_psi(uno, planned)) >= 0.0:  # below: the vacuum, which nothing regulates
-        extra["set_point_psi"] = round(set_point_psi(commanded_psi), 4)
-    return planned.as_trial(columns, extra=extra)
-
-
-def record_columns(
-    rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress = lambda share: None, attempts: int = ATTEMPTS
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """As `record_trial`: the columns and what is noted, without asking the Uno for anything more."""
-    instruments_of(rig)
     why = ""
     for _ in range(attempts):
         try:
-            columns, extra, lost = _RUNS[planned.experiment](rig, uno, planned, on_progress)
+            columns, extra, lost = _RUNS[planned.experiment](bench, uno, planned, on_progress)
         except AlignmentError as error:
             why = str(error)
             continue
         if not lost:
-            return columns, extra
+            noted_psi = set_point(_commanded_psi(uno, planned))
+            return planned.as_trial(columns, extra=extra | noted_psi)
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
     raise BifaError(f"{planned.title}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
 
 
-def _static(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
-    mount(rig, uno, "static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
-    instruments, chamber = instruments_of(rig), CHAMBER_OF[planned.tested]
-    _pressurise(rig, uno, chamber, planned.commanded_psi)
-    with Recording(rig, uno, on_progress) as tape:
+def _static(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
+    mount(bench, uno, "static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
+    instruments, chamber = bench.instruments, CHAMBER_OF[planned.tested]
+    _pressurise(bench, uno, chamber, planned.commanded_psi)
+    with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         instruments.move()
         tape.wait_while(lambda: instruments.moving, 2 * 54.0 / planned.commanded_mm_s)
@@ -81,16 +70,16 @@ def _static(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) ->
     return _machine_columns(tape, chamber, moved), noted(tape.clock), tape.lost_samples
 
 
-def _pull(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
-    mount(rig, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
-    instruments, psi = instruments_of(rig), planned.commanded_psi
+def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
+    mount(bench, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
+    instruments, psi = bench.instruments, planned.commanded_psi
     # Extended first: a head holds with no pressure at all, but it has to snap out for that.
-    _pressurise(rig, uno, "head", SNAP_PSI)
+    _pressurise(bench, uno, "head", SNAP_PSI)
     if psi < SNAP_PSI:
-        _pressurise(rig, uno, "head", psi, RELIEF_S)
+        _pressurise(bench, uno, "head", psi, RELIEF_S)
     elif psi > SNAP_PSI:
-        _pressurise(rig, uno, "head", psi)
-    with Recording(rig, uno, on_progress) as tape:
+        _pressurise(bench, uno, "head", psi)
+    with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         instruments.move()
         tape.wait_while(lambda: instruments.moving, PULL_MM / planned.commanded_mm_s)
@@ -101,14 +90,14 @@ def _pull(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> R
     return _machine_columns(tape, "head", moved), noted(tape.clock) | known, tape.lost_samples
 
 
-def _step(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
-    mount(rig, uno, "step_response", actuator=planned.actuator)
+def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
+    mount(bench, uno, "step_response", actuator=planned.actuator)
     chamber = CHAMBER_OF[planned.tested]
     _off(uno)
     uno.set("pressure_psi", planned.commanded_psi)
     uno.hold(chamber, "vacuum")
-    idle(rig, uno, SETTLE_S, f"The {chamber} is evacuated until it rests, contracted")
-    with Recording(rig, uno, on_progress) as tape:
+    idle(bench, uno, SETTLE_S, f"The {chamber} is evacuated until it rests, contracted")
+    with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         uno.schedule([(STEP_UP_S, chamber, "positive"), (STEP_DOWN_S, chamber, "vacuum")])
         step = f"The {chamber} steps to {planned.commanded_psi:g} psi and back to vacuum"
@@ -131,19 +120,17 @@ def _step(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> R
     return columns, noted(tape.clock) | known | camera_rate(tape.instrument_s), tape.lost_samples
 
 
-def _walk(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
-    if planned.gait is None:
-        raise BifaError(f"{planned.title}: a walk needs a gait")
-    walk = record_walk(rig, uno, planned.gait, planned.cycles, on_progress, **planned.settings)
-    return walk.columns, walk.extra, walk.lost_samples
-
-
-_RUNS: dict[str, Callable[[Rig, Uno, PlannedTrial, Progress], Recorded]] = {
+_RUNS: dict[str, Callable[[Bench, Uno, PlannedTrial, Progress], Recorded]] = {
     "static_loading": _static,
     "step_response": _step,
     "anchor_pull": _pull,
-    "locomotion": _walk,
+    "locomotion": record_walk,
 }
+
+
+def set_point(commanded_psi: float) -> dict[str, float]:
+    """What a trial notes of its pressure: the regulator's real set-point. Nothing regulates the vacuum (below 0)."""
+    return {"set_point_psi": round(set_point_psi(commanded_psi), 4)} if commanded_psi >= 0.0 else {}
 
 
 def _commanded_psi(uno: Uno, planned: PlannedTrial) -> float:
@@ -155,7 +142,7 @@ def _off(uno: Uno) -> None:
         uno.hold(chamber, "off")
 
 
-def _pressurise(rig: Rig, uno: Uno, chamber: str, pressure_psi: float, settle_s: float = SETTLE_S) -> None:
+def _pressurise(bench: Bench, uno: Uno, chamber: str, pressure_psi: float, settle_s: float = SETTLE_S) -> None:
     """Bring a chamber to a positive pressure, 0 (vented) or, for any negative one, full vacuum, and let it settle."""
     _off(uno)
     doing = f"The {chamber} is vented"
@@ -166,7 +153,7 @@ def _pressurise(rig: Rig, uno: Uno, chamber: str, pressure_psi: float, settle_s:
     elif pressure_psi < 0.0:
         uno.hold(chamber, "vacuum")
         doing = f"The {chamber} is evacuated"
-    idle(rig, uno, settle_s, f"{doing} until the pressure has settled")
+    idle(bench, uno, settle_s, f"{doing} until the pressure has settled")
 
 
 def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, float]:

@@ -35,7 +35,7 @@ from bifa.measure.alignment import (
     camera_rate,
     resampled,
 )
-from bifa.measure.experiments import CHAMBER_OF
+from bifa.measure.experiments import CHAMBER_OF, set_point
 from bifa.measure.instruments import CHANNELS
 from bifa.measure.locomotion import noted
 from bifa.measure.plan import PlannedTrial
@@ -80,7 +80,9 @@ def import_trial(
     camera = camera_rate(instrument_s) if planned.experiment in ("step_response", "locomotion") else {}
     if recorded is not None:
         planned = _next_repeat(recorded, planned)
-    trial = planned.as_trial(columns, extra=noted(clock) | {"command_age_s": PRESSURES_AFTER_S} | camera)
+    asked = {} if planned.pressure_psi is None else set_point(planned.pressure_psi)
+    extra = noted(clock) | {"command_age_s": PRESSURES_AFTER_S} | camera | asked
+    trial = planned.as_trial(columns, extra=extra)
     if recorded is None:
         name = f"{planned.experiment} from {instrument.name}"
         return read_dataset(write_dataset(folder, Dataset(folder, name, dict(known or {}), (trial,)))), clock

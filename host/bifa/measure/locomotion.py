@@ -1,7 +1,6 @@
-"""Record a walk on a rig: pressures and commands from the Uno, displacement from the motion capture."""
+"""Record a walk: pressures and commands from the Uno, displacement from the motion capture."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,73 +9,48 @@ from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, camera_rate, resampled
-from bifa.measure.recording import LEAD_S, Recording, mount
+from bifa.measure.plan import PlannedTrial
+from bifa.measure.recording import LEAD_S, Bench, Recording, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
-from bifa.rig import Rig
 from bifa.robot.cpg import CHAMBERS
-from bifa.robot.gait import Gait
 
 SAMPLE_S = 0.01
 TICK_S = 1e-3  # the Uno switches valves at its ticks
 
 
-@dataclass(frozen=True)
-class RecordedWalk:
-    """One walk: columns as a locomotion trial has them, and how well the clocks were lined up."""
-
-    columns: dict[str, np.ndarray]
-    clock: ClockLine
-    lost_samples: int
-    camera: dict[str, float]
-
-    @property
-    def extra(self) -> dict[str, float]:
-        """What a trial notes of its recording."""
-        return (
-            noted(self.clock)
-            | self.camera
-            | {
-                "switch_error_s": TICK_S / 2,
-                "command_age_s": PRESSURES_AFTER_S,
-                "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
-            }
-        )
-
-
-def noted(clock: ClockLine) -> dict[str, float]:
+def noted(clock: ClockLine) -> dict[str, Any]:
     """What every trial notes of how its clocks were lined up, and of what the Uno does besides its commands."""
     return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate, "dead_time_s": DEAD_TIME_S}
 
 
 def record_walk(
-    rig: Rig,
-    uno: Uno,
-    gait: Gait,
-    cycles: int,
-    on_progress: Callable[[float], None] = lambda share: None,
-    **settings: Any,
-) -> RecordedWalk:
-    """Walk `cycles` cycles of `gait` from rest and record it.
+    bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None]
+) -> tuple[dict[str, np.ndarray], dict[str, Any], int]:
+    """Walk from rest for as many cycles as are planned: the columns, what is noted of them, and how many samples were
+    lost. The valves are off afterwards, whatever happens.
 
-    rig: has `instruments` with a motion capture; settings go to its `mount` (e.g. inclination_deg).
-    on_progress(share) is told the share done, 0 to 1. The valves are off afterwards, whatever happens.
-
-    Lost samples are counted, and no error: see experiments.record_columns.
-    Raises BifaError where the rig has no motion capture or the clocks do not line up.
+    Raises BifaError where no gait is planned, the robot did not walk through, or the clocks do not line up.
     """
-    tape = Recording(rig, uno, on_progress)
+    if planned.gait is None:
+        raise BifaError(f"{planned.title}: a walk needs a gait")
+    period_s, cycles = planned.gait.period_s, planned.cycles
+    tape = Recording(bench, uno, on_progress)
     uno.halt()
-    mount(rig, uno, "locomotion", **settings)
-    uno.upload(gait.as_dict())
+    mount(bench, uno, "locomotion", **planned.settings)
+    uno.upload({**planned.gait.as_dict(), **planned.parameters})
     with tape:
         tape.wait(LEAD_S, report=False)
         uno.run()
-        doing = f"The robot walks {counted(cycles, 'cycle')} of {gait.period_s:g} s"
-        tape.wait(cycles * gait.period_s + LEAD_S, doing=doing)
-    return RecordedWalk(
-        _columns(tape, gait.period_s, cycles), tape.clock, tape.lost_samples, camera_rate(tape.instrument_s)
-    )
+        doing = f"The robot walks {counted(cycles, 'cycle')} of {period_s:g} s"
+        tape.wait(cycles * period_s + LEAD_S, doing=doing)
+    known = {
+        "switch_error_s": TICK_S / 2,
+        "command_age_s": PRESSURES_AFTER_S,
+        "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
+    }
+    extra = noted(tape.clock) | camera_rate(tape.instrument_s) | known
+    return _columns(tape, period_s, cycles), extra, tape.lost_samples
 
 
 def _columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:

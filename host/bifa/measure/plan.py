@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from bifa.data import Trial
-from bifa.robot.gait import BASELINE, Gait
+from bifa.data.layout import GAIT_OPTIONAL
+from bifa.robot.gait import BASELINE, Gait, GaitFile
 
 EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
 ACTUATORS = ("large", "small")
@@ -25,7 +26,9 @@ AMBLE = Gait(4.4, 240.0, 60.0, 0.56, 0.5, 0.5)
 
 @dataclass(frozen=True)
 class PlannedTrial:
-    """One recording to be made. `settings` goes to the stand (`inclination_deg`, `direction`)."""
+    """One recording to be made. `settings` goes to the stand (`inclination_deg`, `direction`); `parameters` are sent to
+    the Uno with the gait (`coupling_per_s`, `pressure_psi`); `name`: what the file is called, if not by the condition.
+    """
 
     experiment: str
     actuator: str | None = None
@@ -35,10 +38,14 @@ class PlannedTrial:
     cycles: int = 0
     repeat: int = 1
     settings: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    name: str = ""
 
     @property
     def file(self) -> str:
-        """A name that tells the condition: static_large_4psi_2mm_s_1.csv."""
+        """A name that tells the condition, static_large_4psi_2mm_s_1.csv, or baseline_1.csv."""
+        if self.name:
+            return f"{self.name}_{self.repeat}.csv"
         parts = [self.experiment.split("_")[0]]
         if self.actuator:
             parts.append(self.actuator)
@@ -74,6 +81,7 @@ class PlannedTrial:
 
     def as_trial(self, columns: Mapping[str, Any] | None = None, **fields: Any) -> Trial:
         """The trial that this becomes once it is recorded."""
+        with_gait = {key: self.parameters[key] for key in GAIT_OPTIONAL if key in self.parameters}
         return Trial(
             file=self.file,
             experiment=self.experiment,
@@ -81,11 +89,18 @@ class PlannedTrial:
             actuator=self.actuator,
             pressure_psi=self.pressure_psi,
             rate_mm_s=self.rate_mm_s,
-            gait=self.gait.as_dict() if self.gait else None,
+            gait={**self.gait.as_dict(), **with_gait} if self.gait else None,
             repeat=self.repeat,
             extra=dict(self.settings) | fields.pop("extra", {}),
             **fields,
         )
+
+
+def walks(file: GaitFile, repeats: int, **fields: Any) -> tuple[PlannedTrial, ...]:
+    """Walks of a gait file's gait, with the other parameters that it holds; `fields`: of PlannedTrial."""
+    pressure_psi = file.others.get("pressure_psi")
+    walk = PlannedTrial("locomotion", None, pressure_psi, gait=file.gait, parameters=file.others, **fields)
+    return tuple(replace(walk, repeat=repeat) for repeat in range(1, repeats + 1))
 
 
 def session(

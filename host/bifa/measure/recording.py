@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bifa.errors import BifaError
 from bifa.link import Uno
+from bifa.link.transport import Clock
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import ClockLine, align
-from bifa.measure.instruments import are_asked, attend, until_ready
+from bifa.measure.instruments import Instruments, are_asked, attend, until_ready
 from bifa.rig import Rig
 
 LEAD_S = 0.3  # recorded before and after, so that the clocks are known on both sides
@@ -19,30 +21,37 @@ _PIECE_S = 0.25
 BEFORE_MARK_S = 0.1  # that the instrument surely sees strobes before the pause
 
 
-def instruments_of(rig: Rig) -> Any:
-    """The rig's instruments; BifaError where it has none."""
+@dataclass(frozen=True)
+class Bench:
+    """What a trial is recorded on: the stand with its instruments, and the clock in whose time they and the Uno run."""
+
+    instruments: Instruments
+    clock: Clock
+
+
+def bench_of(rig: Rig) -> Bench:
+    """The bench that a rig brings; BifaError where it has no instruments."""
     if rig.instruments is None:
         raise BifaError(
             "this port has no instruments: use `--port virtual`, or record with your own and give their file "
             "with --instrument"
         )
-    return rig.instruments
+    return Bench(rig.instruments, rig.clock)
 
 
-def mount(rig: Rig, uno: Uno, experiment: str, **settings: Any) -> None:
+def mount(bench: Bench, uno: Uno, experiment: str, **settings: Any) -> None:
     """Have `experiment` put on the stand, and wait until it is there."""
-    instruments = instruments_of(rig)
-    instruments.mount(experiment, **settings)
-    until_ready(instruments, lambda: idle(rig, uno, _PIECE_S))
+    bench.instruments.mount(experiment, **settings)
+    until_ready(bench.instruments, lambda: idle(bench, uno, _PIECE_S))
 
 
-def idle(rig: Rig, uno: Uno, duration_s: float, doing: str = "") -> None:
+def idle(bench: Bench, uno: Uno, duration_s: float, doing: str = "") -> None:
     """Let time pass without letting the Uno think that the host has gone; `doing`: what the robot does meanwhile, for
     whoever works the instruments."""
-    until_s = rig.clock.now() + duration_s
-    while (left_s := until_s - rig.clock.now()) > 0:
-        attend(rig.instruments, doing, left_s)
-        rig.clock.sleep(min(left_s, _PIECE_S))
+    until_s = bench.clock.now() + duration_s
+    while (left_s := until_s - bench.clock.now()) > 0:
+        attend(bench.instruments, doing, left_s)
+        bench.clock.sleep(min(left_s, _PIECE_S))
         uno.keep_alive()
 
 
@@ -56,9 +65,9 @@ class Recording:
     AlignmentError where they cannot be.
     """
 
-    def __init__(self, rig: Rig, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
-        self._instruments = instruments_of(rig)
-        self._rig, self._uno, self._on_progress = rig, uno, on_progress
+    def __init__(self, bench: Bench, uno: Uno, on_progress: Callable[[float], None] = lambda share: None) -> None:
+        self._instruments, self._clock = bench.instruments, bench.clock
+        self._uno, self._on_progress = uno, on_progress
         self.samples: list[Any] = []
 
     def __enter__(self) -> Recording:
@@ -83,8 +92,8 @@ class Recording:
     def wait(self, duration_s: float, report: bool = True, doing: str = "") -> None:
         """Let `duration_s` pass, and keep what the Uno says meanwhile; report: how far that is, as progress;
         `doing`: as in `idle`."""
-        begun_s = self._rig.clock.now()
-        while (left_s := begun_s + duration_s - self._rig.clock.now()) > 0:
+        begun_s = self._clock.now()
+        while (left_s := begun_s + duration_s - self._clock.now()) > 0:
             attend(self._instruments, doing, left_s)
             self.samples += self._uno.samples(min(left_s, _PIECE_S))
             if report:
@@ -93,10 +102,10 @@ class Recording:
     def wait_while(self, condition: Callable[[], bool], expected_s: float) -> None:
         """Wait for as long as `condition()` holds, about `expected_s`; BifaError after three times as long, unless
         it is a person who moves things."""
-        begun_s = self._rig.clock.now()
+        begun_s = self._clock.now()
         while condition():
             self.samples += self._uno.samples(_PIECE_S)
-            elapsed_s = self._rig.clock.now() - begun_s
+            elapsed_s = self._clock.now() - begun_s
             self._on_progress(min(elapsed_s / expected_s, 1.0))
             if not are_asked(self._instruments) and elapsed_s > 3.0 * expected_s + 5.0:
                 raise BifaError(f"the cross-head is still moving after {elapsed_s:.0f} s: look at the stand")

@@ -7,7 +7,7 @@ are off when it ends.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -20,21 +20,21 @@ from bifa.link import Uno
 from bifa.lock import locked
 from bifa.measure.experiments import record_trial
 from bifa.measure.plan import PlannedTrial
+from bifa.measure.recording import bench_of
 from bifa.printable import counted
 from bifa.rig import Rig
 
 
 @dataclass(frozen=True)
 class Event:
-    """How a session is getting on: trial `number` of `total`, `share` of it done; once it is, `clock_error_s`, and what
-    is wrong with its displacement's lag beside the earlier trials' (`misfit`)."""
+    """How a session is getting on: trial `number` of `total`, `share` of it done; once it is, the `trial`, and what is
+    wrong with its displacement's lag compared with the earlier trials' (`misfit`)."""
 
     planned: PlannedTrial
     number: int
     total: int
     share: float
-    clock_error_s: float | None = None
-    skipped: bool = False
+    trial: Trial | None = None
     misfit: str | None = None
 
 
@@ -54,14 +54,9 @@ class Recorder(Protocol):
     ) -> Trial: ...
 
 
-def by_itself(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The `Recorder` of a rig that needs nobody."""
-    return record_trial(rig, uno, planned, on_progress)
-
-
-def recorder_of(rig: Rig) -> Recorder:
-    """What records on this rig: its own (`rig.recorder`, a person who works the instruments), or `by_itself`."""
-    return getattr(rig, "recorder", None) or by_itself
+def unattended(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
+    """The `Recorder` of a rig whose instruments need nobody."""
+    return record_trial(bench_of(rig), uno, planned, on_progress)
 
 
 def run_session(
@@ -72,17 +67,35 @@ def run_session(
     name: str,
     known: Mapping[str, float],
     provenance: Mapping[str, Any],
+    record: Recorder | None = None,
     on_event: Callable[[Event], None] = lambda event: None,
 ) -> Dataset:
-    """Record `trials` on `rig` into `folder`; those that an interrupted session already has are skipped.
+    """Record `trials` on `rig` into `folder`; those that an interrupted session already has are skipped. `record`:
+    None where the rig's instruments need nobody.
 
     Raises DatasetError where `folder` is a finished data set, or an unfinished one of another session or with other
     `options` in its provenance; LockedError where somebody else is recording into it.
     """
     with locked(folder):
-        writer = DatasetWriter(folder, name, known, provenance, resume=True)
-        refuse_other_settings(writer, provenance)
-        return _recorded(rig, writer, trials, on_event)
+        with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
+            hello = uno.connect()
+            writer = DatasetWriter(folder, name, known, {**provenance, "firmware": hello.firmware}, resume=True)
+            refuse_other_settings(writer, provenance)
+            uno.clear()
+            for number, planned in enumerate(trials, start=1):
+                if writer.has(planned.as_trial()):
+                    continue
+                event = Event(planned, number, len(trials), 0.0)
+                on_event(event)
+
+                def on_progress(share: float, event: Event = event) -> None:
+                    on_event(replace(event, share=share))
+
+                recorder = record or unattended
+                trial = recorder(rig, uno, planned, on_progress, number=number, total=len(trials), writer=writer)
+                writer.add(replace(trial, session_order=number))
+                on_event(replace(event, share=1.0, trial=trial, misfit=misfit_of_last(writer.trials)))
+        return writer.finish()
 
 
 def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) -> None:
@@ -108,29 +121,6 @@ def _settings(provenance: Mapping[str, Any]) -> dict[str, Any]:
     return {"virtual": provenance.get("port") == "virtual"} | dict(provenance.get("options", {}))
 
 
-def _recorded(
-    rig: Rig, writer: DatasetWriter, trials: Sequence[PlannedTrial], on_event: Callable[[Event], None]
-) -> Dataset:
-    record = recorder_of(rig)
-    with Uno(rig.transport, rig.clock, rig.next_session_seed()) as uno:
-        uno.connect()
-        uno.clear()
-        for number, planned in enumerate(trials, start=1):
-            if writer.has(planned.as_trial()):
-                on_event(Event(planned, number, len(trials), 1.0, skipped=True))
-                continue
-            on_event(Event(planned, number, len(trials), 0.0))
-
-            def show(share: float, planned: PlannedTrial = planned, number: int = number) -> None:
-                on_event(Event(planned, number, len(trials), share))
-
-            trial = record(rig, uno, planned, show, number=number, total=len(trials), writer=writer)
-            writer.add(planned.as_trial(trial.columns, session_order=number, extra=_measured(trial.extra, planned)))
-            wrong = misfit_of_last(writer.trials)
-            on_event(Event(planned, number, len(trials), 1.0, trial.extra["clock_error_s"], misfit=wrong))
-    return writer.finish()
-
-
 def provenance(
     command: str, port: str | None = None, options: Mapping[str, Any] = MappingProxyType({})
 ) -> dict[str, Any]:
@@ -141,7 +131,3 @@ def provenance(
         "port": port or "found by USB identity",
         "options": {key: value for key, value in options.items() if value is not None},
     }
-
-
-def _measured(extra: Mapping[str, Any], planned: PlannedTrial) -> dict[str, Any]:
-    return {key: value for key, value in extra.items() if key not in planned.settings}

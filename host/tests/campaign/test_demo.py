@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from bifa.campaign.walks import measure_walks, speeds
+from bifa.campaign.walks import measure_walks, speed_of
 from bifa.rig import open_rig
 from bifa.robot.gait import BASELINE
 
@@ -18,9 +18,9 @@ pytestmark = [pytest.mark.uno, pytest.mark.slow]
 def test_the_baseline_walks_as_fast_as_in_the_paper(tmp_path):
     with open_rig("virtual") as rig:
         dataset = measure_walks(rig, tmp_path / "walks", {"baseline": BASELINE}, cycles=4)
-    (speed,) = speeds(dataset)["baseline"]
-    assert speed.mean_mm_s == pytest.approx(10.8, abs=0.4)
     (trial,) = dataset.trials
+    assert speed_of(trial).mean_mm_s == pytest.approx(10.8, abs=0.4)
+    assert trial.extra["set_point_psi"] == pytest.approx(8.47, abs=0.01)
     assert trial.rate_hz == pytest.approx(100.0)
     assert set(trial.columns) >= {"displacement_tail_mm", "pressure_tail_psi", "command_tail"}
 

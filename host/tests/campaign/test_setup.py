@@ -9,12 +9,12 @@ from bifa.campaign import loop
 from bifa.campaign.loop import campaign
 from bifa.campaign.setup import Effort, Setup, about
 from bifa.campaign.stages import StageError, run_stages
-from bifa.campaign.summary import with_stand_in
+from bifa.campaign.walks import walks_of
 from bifa.cli.campaign import kept_on_disk
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
 from bifa.gait import SearchError
 from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench, read_exports
-from bifa.measure.plan import PlannedTrial
+from bifa.measure.plan import BRISK, PlannedTrial
 from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, load_gait
 
@@ -160,12 +160,14 @@ def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
     assert "none walks" in (tmp_path / f"gait-{model}.toml").read_text()
 
 
-def test_a_baseline_that_stands_in_is_told_under_both_names():
-    (walk,) = [Trial("baseline_1.csv", "locomotion", columns={}, gait=BASELINE.as_dict(), repeat=1)]
-    walked = Dataset(None, "walks", {}, (walk,), {})
-    assert [trial.file for trial in with_stand_in(walked).trials] == ["baseline_1.csv", "base_1.csv"]
-    both = replace(walked, trials=(walk, replace(walk, file="base_1.csv")))
-    assert with_stand_in(both) is both
+def test_the_walks_of_a_gait_are_found_by_the_gait_whatever_their_files_are_called():
+    """The baseline that stands in for the base model's gait is walked once, and reported for both."""
+    baseline, brisk = (
+        Trial(f"{n}.csv", "locomotion", {}, gait=gait.as_dict()) for n, gait in enumerate((BASELINE, BRISK))
+    )
+    walked = Dataset(None, "walks", {}, (baseline, brisk), {})
+    assert walks_of(BASELINE, walked) == [baseline]
+    assert walks_of(BRISK, walked) == [brisk]
 
 
 def test_what_to_type_for_the_same_campaign_again_has_all_that_decides_it():

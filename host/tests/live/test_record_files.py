@@ -1,7 +1,6 @@
 """The files of `bifa record`: their numbers, and what a full disk leaves of them; lost samples of walks."""
 
 import errno
-from types import SimpleNamespace
 
 import pytest
 
@@ -29,7 +28,7 @@ def test_a_full_disk_leaves_whole_lines_and_is_said(tmp_path):
 def test_a_walk_with_lost_samples_is_tried_again_and_then_refused(monkeypatch):
     lost = [2, 0, 1, 1, 1]
     monkeypatch.setitem(experiments._RUNS, "locomotion", lambda *_: ({}, {}, lost.pop(0)))
-    rig, planned = SimpleNamespace(instruments=object()), PlannedTrial("locomotion", gait=BASELINE, cycles=1)
-    assert experiments.record_columns(rig, None, planned) == ({}, {})
+    planned = PlannedTrial("locomotion", pressure_psi=8.5, gait=BASELINE, cycles=1)
+    assert experiments.record_trial(None, None, planned).columns == {}
     with pytest.raises(BifaError, match="3 times over: 1 samples were lost"):
-        experiments.record_columns(rig, None, planned)
+        experiments.record_trial(None, None, planned)

@@ -17,10 +17,10 @@ def test_a_recording_is_resumed_on_another_day(tmp_path, monkeypatch):
     out = tmp_path / "walks"
     with open_rig("virtual", profile="ideal", seed=3) as rig:
         monkeypatch.setattr("time.strftime", lambda *form: "2026-11-25")
-        record_walks(rig, out, None, 1, 1, Console(quiet=True))
+        record_walks(rig, "virtual", out, None, 1, 1, Console(quiet=True))
         out.rename(out.with_name("walks.partial"))  # as where the second of two walks was interrupted
         monkeypatch.setattr("time.strftime", lambda *form: "2026-11-26")
-        record_walks(rig, out, None, 1, 2, Console(quiet=True))
+        record_walks(rig, "virtual", out, None, 1, 2, Console(quiet=True))
     dataset = read_dataset(out)
     assert [trial.file for trial in dataset.trials] == ["walk_1.csv", "walk_2.csv"]
     assert dataset.provenance["recorded_at"].startswith("20")
@@ -32,11 +32,11 @@ def test_two_recordings_do_not_go_into_one_data_set(tmp_path):
         locked(tmp_path / "walks"),
         pytest.raises(LockedError, match="is being written by"),
     ):
-        record_walks(rig, tmp_path / "walks", None, 1, 1, Console(quiet=True))
+        record_walks(rig, "virtual", tmp_path / "walks", None, 1, 1, Console(quiet=True))
 
 
 def test_a_recording_says_the_speed_of_the_settled_cycles(tmp_path, capsys):
     with open_rig("virtual", profile="ideal", seed=3) as rig:
-        record_walks(rig, tmp_path / "walks", None, 5, 1, Console())
+        record_walks(rig, "virtual", tmp_path / "walks", None, 5, 1, Console())
     said = capsys.readouterr().out
     assert re.search(r"walk 1: 10\.8\d mm/s over [3-5] settled cycles", said)

@@ -37,7 +37,8 @@ class Bench:
                 return super().answer()
 
         self.counted, self.spoken_s = [], []
-        ByHand(Attended(self.said.append, self.watch, self), self.watch).equip(self.rig)
+        self.desk = Attended(self.said.append, self.watch, self)
+        self.hands = ByHand(self.desk, self.watch)
 
     def show(self, what, left_s):
         """As `Countdown`."""
@@ -48,7 +49,8 @@ class Bench:
         """As `Countdown`."""
 
     def run(self, folder, plan):
-        return run_session(self.rig, folder, plan, name="a day", known={}, provenance={"by": "a test"})
+        made = {"by": "a test"}
+        return run_session(self.rig, folder, plan, name="a day", known={}, provenance=made, record=self.hands)
 
 
 @pytest.fixture
@@ -162,7 +164,7 @@ def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_pat
         if "lacks the column force_N" in text:
             (here.watch / STATIC.file).write_text(tries[0])
 
-    here.rig.recorder._desk.say = corrected
+    here.desk.say = corrected
     assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
     assert "lacks the column force_N; it has time_s, displacement_mm, Load (N)" in "\n".join(here.said)
 
@@ -200,13 +202,13 @@ def test_a_word_that_is_no_answer_neither_keeps_nor_discards(bench, tmp_path):
     here = bench()
     words = ["no", "keep?", ""]
     here.lab.review = lambda asked: words.pop(0)
-    ask = here.rig.recorder._desk.again
+    ask = here.desk.again
 
     def again(answer, choice):
         ask(answer, choice)
         (here.watch / "answer").write_text(words.pop(0))
 
-    here.rig.recorder._desk.again = again
+    here.desk.again = again
     assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
     assert words == []
     assert "'no' is no answer here: Enter keeps it, r repeats it, q stops." in here.said

@@ -8,6 +8,7 @@ from bifa.link import RefusedError, Uno
 from bifa.link.uno import Sample
 from bifa.measure.experiments import record_trial
 from bifa.measure.plan import BRISK, PlannedTrial
+from bifa.measure.recording import bench_of
 from bifa.measure.session import run_session
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.rig import open_rig
@@ -32,7 +33,7 @@ def recorded(disturb, planned, at):
             if share > at and due:
                 due.pop()(rig, uno)
 
-        return record_trial(rig, uno, planned, on_progress, attempts=1)
+        return record_trial(bench_of(rig), uno, planned, on_progress, attempts=1)
 
 
 @pytest.mark.uno
