@@ -53,7 +53,7 @@ def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model,
             continue
         effect = names[(k - 2) % len(names)]
         place = {8: "vertical", 9: "obstacle"}.get(k % 10, "")
-        settings = replace(SCENARIOS[place].settings, evaluations=None) if place else Settings()
+        settings = SCENARIOS[place].settings if place else Settings()
         yield f"{k} {effect} {place}".strip(), specimen(k).with_effects({effect: {}}), settings
 
 
@@ -75,8 +75,8 @@ def searched(model: Model, settings: Settings, seeds: Sequence[int], long: int, 
         record[kind] = [speed for speed, _ in own]
         record[f"{kind}_s"] = (time.process_time() - start) / len(seeds)
         if not robust:
-            record["evaluations"] = round(mean(evaluations for _, evaluations in own)) or EVALUATIONS[kind]["cma"]
-        more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS[kind]["cma"], spread=SPREAD)
+            record["evaluations"] = round(mean(evaluations for _, evaluations in own)) or EVALUATIONS["cma"]
+        more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=SPREAD)
         record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
     budget = record["evaluations"]
     record["de"] = _found(model, replace(settings, robust=False, method="de", evaluations=budget), runs)[0]

@@ -7,7 +7,7 @@ import numpy as np
 
 from bifa.errors import BifaError
 from bifa.gait.methods import METHODS, Found
-from bifa.gait.methods.cma_es import climb
+from bifa.gait.methods.cma_es import basins, climb, climb_basins
 from bifa.gait.methods.common import Objective, Recorder
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
@@ -26,7 +26,7 @@ OnProgress = Callable[[str, float, float], None]
 VERIFYING_DRAWS = 1024  # robots that the chosen gait meets, all new
 _NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 6
 # Of cma the most, for a landscape with many basins: it ends when its best runs agree.
-EVALUATIONS = {"nominal": {"cma": 8000, "de": 4000, "bo": 1000}, "robust": {"cma": 1400, "de": 1400, "bo": 1000}}
+EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
 _POPULATION = 12
 
 
@@ -47,19 +47,19 @@ class Round:
 
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
 # in ten of its own robots fails would fail more often on others.
-_EXPLORE = Round(24, 0.08, 0.9, 3e-5)
+_EXPLORE = Round(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    Round(64, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 250, 0.05),
-    Round(192, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 80, 0.012),
+    Round(64, 0.0625, 0.97, 3e-5, (0.0, 0.02, 0.04), 250, 0.04),
+    Round(192, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 150, 0.015),
 )
-_SHORTLIST = Round(768, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
+_SHORTLIST = Round(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
 # on others. Slower by these parts if need be.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 768, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
-_STARTS = 12  # of the explored gaits, compared on a round's robots
+_BASINS, _STARTS = 24, 12  # of the explored gaits, compared on the first and the second round's robots
 _FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
 
 
@@ -139,13 +139,10 @@ def optimize(
     timing = spread.scatter
     metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
     settings = replace(settings, metric=metric)
-    objective: Objective
-    if settings.robust:
-        objective = _on_robots(model, runs, spread, settings, _EXPLORE, 0)
-    else:
-        objective = NominalSpeed(runs, flat, settings.space, settings.metric)
-    screen = NominalSpeed(runs, flat, settings.space, settings.metric.quicker())
-    explored = _explore(objective, screen, settings, say)
+    own = NominalSpeed(runs, flat, settings.space, metric.quicker() if settings.robust else metric)
+    explored = _explore(own, settings, say)
+    if settings.robust and explored.best_value > 0.0:
+        explored = _explore_on_robots(model, runs, spread, explored, settings, say)
     if explored.best_value <= 0.0:
         raise SearchError(
             f"none of {len(explored.values)} gaits walks without slipping; widen the space or search longer"
@@ -154,7 +151,7 @@ def optimize(
         refined = _refine_on_robots(model, runs, spread, explored, settings, say) if settings.refine else []
         gait, nominal = _robustly(model, runs, spread, explored, [explored, *refined][-1], settings, say)
     else:
-        refined = [_refine(objective, explored, settings, say)] if settings.refine else []
+        refined = [_refine(own, explored, settings, say)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, say)
     fresh = spread.plants(model, VERIFYING_DRAWS, settings.seed + 2_000_003)
     speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M))[0]
@@ -181,7 +178,7 @@ def _foretold(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, se
     return predict_speed(model, known, gait, seed=settings.seed)
 
 
-def _explore(objective: Objective, screen: Objective, settings: Settings, say: OnProgress) -> Found:
+def _explore(objective: Objective, settings: Settings, say: OnProgress) -> Found:
     budget = _budget(settings)
     return METHODS[settings.method](
         objective,
@@ -189,17 +186,36 @@ def _explore(objective: Objective, screen: Objective, settings: Settings, say: O
         budget,
         settings.seed,
         lambda count, best: say("search", min(count / budget, 1.0), best),
-        screen,
     )
 
 
+def _explore_on_robots(
+    model: Model, runs: Simulations, spread: Knowledge, explored: Found, settings: Settings, say: OnProgress
+) -> Found:
+    """CMA-ES on a few robots from the basins of the model's own speed: from slower copies too, since there the fastest
+    are beyond the cliff of most robots, whose objective is 0."""
+    objective, budget = _on_robots(model, runs, spread, settings, _EXPLORE, 0), _scaled(_EXPLORE.evaluations, settings)
+    recorder = Recorder(
+        objective, settings.space.wraps, lambda count, best: say("search on robots", min(count / budget, 1.0), best)
+    )
+    recorder(np.concatenate(_at_periods(_EXPLORE, settings.space, basins(explored, settings.space.wraps, _BASINS))))
+    if not settings.refine:
+        return recorder.found()
+    return climb_basins(recorder, settings.space.wraps, budget, settings.seed, _POPULATION, _EXPLORE.step)
+
+
 def _budget(settings: Settings) -> int:
-    return settings.evaluations or EVALUATIONS["robust" if settings.robust else "nominal"][settings.method]
+    return settings.evaluations or EVALUATIONS[settings.method]
+
+
+def _scaled(evaluations: int, settings: Settings) -> int:
+    """As many more or fewer than usual as of the method's."""
+    return max(2 * _POPULATION, round(evaluations * _budget(settings) / EVALUATIONS[settings.method]))
 
 
 def _refine(objective: Objective, explored: Found, settings: Settings, say: OnProgress) -> Found:
     """CMA-ES from the best."""
-    share = min(_FINAL, _budget(settings) // 3)
+    share = _scaled(_FINAL, settings)
     recorder = Recorder(
         objective,
         settings.space.wraps,
@@ -217,7 +233,7 @@ def _refine_on_robots(
     found, starts = [explored], _STARTS
     for number, stage in enumerate(_REFINE, start=1):
         objective = _on_robots(model, runs, spread, settings, stage, number)
-        budget = max(2 * _POPULATION, min(stage.evaluations, _budget(settings) // 4))
+        budget = _scaled(stage.evaluations, settings)
 
         def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
             say(f"refine {number}", min(count / budget, 1.0), best)

@@ -28,7 +28,7 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario(
             "obstacle",
             "through the paper's 97 mm tunnel: full strokes, so that the supports bend",
-            Settings(metric=Passage(), space=paper_space(period_s=(4.0, 8.0)), evaluations=300),
+            Settings(metric=Passage(), space=paper_space(period_s=(4.0, 8.0))),
         ),
         Scenario(
             "vertical",
@@ -39,7 +39,7 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario(
             "quiet",
             "at most three valve switches in four seconds: a period of 8 s or more",
-            Settings(space=paper_space(period_s=(8.0, 12.0)), evaluations=300),
+            Settings(space=paper_space(period_s=(8.0, 12.0))),
         ),
     )
 }

@@ -21,7 +21,6 @@ def bayesian_optimization(
     evaluations: int,
     seed: int,
     report: Report | None = None,
-    screen: Objective | None = None,
 ) -> Found:
     """Maximise `objective` with `evaluations` calls, one at a time; `wraps` (dimensions,) marks full turns.
 

@@ -26,28 +26,28 @@ def cma_es(
     evaluations: int,
     seed: int,
     report: Report | None = None,
-    screen: Objective | None = None,
     population: int = 12,
 ) -> Found:
     """Maximise `objective` in at most about `evaluations` calls, fewer where the landscape is simple; `wraps`
-    (dimensions,) marks full turns.
-
-    screen: a cheaper objective for the space-filling sample; its best basins are then compared by `objective`.
-    """
+    (dimensions,) marks full turns."""
     recorder = Recorder(objective, wraps, report)
-    looked = Recorder(screen, wraps) if screen else recorder
-    _sample(looked, len(wraps), seed, 8 * evaluations if screen else evaluations)
-    if screen:
-        recorder(_starts(looked.found(), [], wraps, 4 * _CLIMBS))
+    _sample(recorder, len(wraps), seed, evaluations)
+    return climb_basins(recorder, wraps, evaluations, seed, population)
+
+
+def climb_basins(
+    recorder: Recorder, wraps: np.ndarray, evaluations: int, seed: int, population: int = 12, step: float = _STEP
+) -> Found:
+    """Runs of CMA-ES from the best basins among what was recorded, until the best two agree, all basins were tried, or
+    about `evaluations` are recorded."""
     tried: list[np.ndarray] = []
     ends: list[float] = []
     while recorder.count < evaluations and not agree(ends):
-        seen = recorder.found() if screen is None else recorder.found().joined(looked.found())
-        starts = _starts(seen, tried, wraps, _CLIMBS)
+        starts = basins(recorder.found(), wraps, _CLIMBS, tried)
         if not len(starts):
             break
         tried += list(starts)
-        ends += climb_together(recorder, starts, evaluations - recorder.count, seed + len(tried), population)
+        ends += climb_together(recorder, starts, evaluations - recorder.count, seed + len(tried), population, step)
     return recorder.found(tuple(sorted(ends, reverse=True)))
 
 
@@ -60,9 +60,9 @@ def _sample(recorder: Recorder, dimensions: int, seed: int, evaluations: int) ->
         values = np.concatenate([values, recorder(sobol.random(len(values)))])
 
 
-def _starts(seen: Found, tried: Sequence[np.ndarray], wraps: np.ndarray, count: int) -> np.ndarray:
+def basins(seen: Found, wraps: np.ndarray, count: int, tried: Sequence[np.ndarray] = ()) -> np.ndarray:
     """The best points that no other near them beats, each the top of a basin as far as was seen, and that are in none
-    of the basins tried; then the best of the others."""
+    of the basins tried; then the best of the others. At most `count`, (m, dimensions)."""
     tops = _tops(seen, wraps)
     first = Found(seen.points[tops], seen.values[tops]).finalists(count, _APART, wraps, avoid=tried)
     if len(first) >= count:

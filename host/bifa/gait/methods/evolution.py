@@ -12,7 +12,6 @@ def differential_evolution(
     evaluations: int,
     seed: int,
     report: Report | None = None,
-    screen: Objective | None = None,
     population: int = 50,
 ) -> Found:
     """Maximise `objective` with about `evaluations` calls; `wraps` (dimensions,) marks full turns.
