@@ -62,6 +62,8 @@ def record_walks(
             progress.update(task, description=f"walk {event.number} of {repeats}", total=repeats, completed=done)
             if event.misfit:
                 progress.console.print(warning(event.misfit), highlight=False)
+            if event.link is not None:
+                progress.console.print(f"walk {event.number}: {event.link.text()}")
             if event.trial is not None and cycles >= LEAST:
                 columns = event.trial.columns
                 speed = measured_speed(columns["time_s"], columns["displacement_head_mm"], gait.gait.period_s)
@@ -105,7 +107,7 @@ def record_telemetry(
     try:
         with locked(out):
             while time.monotonic() < end_s:
-                path = _next_file(out)
+                path = next_file(out)
                 try:
                     recorder.record_until_gone(path)
                 except GONE as error:
@@ -153,7 +155,7 @@ class _Recorder:
                         uno.upload(self._parameters)
                     uno.stream(True)
                     marked = uno.mark_strobe()
-                    with _telemetry_file(path) as file:
+                    with telemetry_file(path) as file:
                         writer = csv.writer(file)
                         writer.writerow(HEADER)
                         if self._parameters:
@@ -183,12 +185,12 @@ class _Recorder:
     def _record(self, uno: Uno, writer: Any, file: TextIO, status: Status, marked: int) -> None:
         try:
             while time.monotonic() < self._end_s:
-                writer.writerows(_row(uno, sample, marked) for sample in uno.samples(0.5))
+                writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.samples(0.5))
                 file.flush()
                 status.update(f"recording  {uno.counters.text()}")
                 self._walk_if_told(uno)
         finally:
-            writer.writerows(_row(uno, sample, marked) for sample in uno.taken_samples())
+            writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.taken_samples())
 
     def _walk_if_told(self, uno: Uno) -> None:
         if not self._desk.is_asking or (answer := self._desk.answer()) is None:
@@ -203,14 +205,14 @@ class _Recorder:
             self._console.print(str(error))
 
 
-def _next_file(out: Path) -> Path:
+def next_file(out: Path) -> Path:
     """After the last one, whatever is missing before it."""
     numbers = [path.stem.removeprefix("telemetry_") for path in out.glob("telemetry_*.csv")]
     return out / f"telemetry_{1 + max((int(n) for n in numbers if n.isdecimal()), default=0)}.csv"
 
 
 @contextmanager
-def _telemetry_file(path: Path) -> Iterator[TextIO]:
+def telemetry_file(path: Path) -> Iterator[TextIO]:
     """A new file; on a full disk it ends with its last whole line, and RecordError says so."""
     file = None
     try:
@@ -229,7 +231,7 @@ def _telemetry_file(path: Path) -> Iterator[TextIO]:
         ) from None
 
 
-def _row(uno: Uno, sample: Sample, marked: int) -> list[Any]:
+def telemetry_row(uno: Uno, sample: Sample, marked: int) -> list[Any]:
     time_s = sample.time_us / 1e6
     # An empty field where a chamber is off: neither positive nor vacuum.
     commands = ["" if command != command else f"{command:g}" for command in sample.command]

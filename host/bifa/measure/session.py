@@ -17,6 +17,7 @@ import bifa
 from bifa.check.lag import misfit_of_last
 from bifa.data import Dataset, DatasetError, DatasetWriter, Trial
 from bifa.link import Uno
+from bifa.link.session import Counters
 from bifa.lock import locked
 from bifa.measure.experiments import record_trial
 from bifa.measure.plan import PlannedTrial
@@ -27,14 +28,16 @@ from bifa.rig import Rig
 
 @dataclass(frozen=True)
 class Event:
-    """How a session is getting on: trial `number` of `total`, `share` of it done; once it is, the `trial`, and what is
-    wrong with its displacement's lag compared with the earlier trials' (`misfit`)."""
+    """How a session is getting on: trial `number` of `total`, `share` of it done; once it is, the `trial`, what the
+    `link` has been through meanwhile, and what is wrong with the displacement's lag compared with the earlier trials'
+    (`misfit`)."""
 
     planned: PlannedTrial
     number: int
     total: int
     share: float
     trial: Trial | None = None
+    link: Counters | None = None
     misfit: str | None = None
 
 
@@ -85,7 +88,7 @@ def run_session(
             for number, planned in enumerate(trials, start=1):
                 if writer.has(planned.as_trial()):
                     continue
-                event = Event(planned, number, len(trials), 0.0)
+                before, event = replace(uno.counters), Event(planned, number, len(trials), 0.0)
                 on_event(event)
 
                 def on_progress(share: float, event: Event = event) -> None:
@@ -94,7 +97,8 @@ def run_session(
                 recorder = record or unattended
                 trial = recorder(rig, uno, planned, on_progress, number=number, total=len(trials), writer=writer)
                 writer.add(replace(trial, session_order=number))
-                on_event(replace(event, share=1.0, trial=trial, misfit=misfit_of_last(writer.trials)))
+                link, misfit = uno.counters.since(before), misfit_of_last(writer.trials)
+                on_event(replace(event, share=1.0, trial=trial, link=link, misfit=misfit))
         return writer.finish()
 
 
