@@ -149,7 +149,7 @@ def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
 def another_blas(probed: dict | None = None) -> Environment:
     """The environment that differs from this machine's own in nothing but the kernels of its linear algebra."""
     own = {ALIKE.get(kernel, kernel) for kernel in (probed or probe({**os.environ}))["blas"]}
-    able = _features()["features"]
+    able = features()["features"]
     others = [name for name in ("Haswell", "Nehalem", "SkylakeX") if name not in own and KERNELS[name] in able]
     kernel = (others or ["Nehalem"])[0]  # where none can be had, `settings` says so
     return Environment("another BLAS", f"BLAS {kernel} in place of {', '.join(map(str, sorted(own, key=str)))}", kernel)
@@ -191,7 +191,7 @@ def settings(environment: Environment) -> tuple[dict[str, str], set[int]]:
     cores = set(sorted(os.sched_getaffinity(0))[: environment.cores])
     if platform.machine() not in ("x86_64", "AMD64"):
         raise RefusedError(f"the kernels chosen are those of x86-64, this is {platform.machine()}")
-    here = _features()
+    here = features()
     if environment.kernel:
         needed = KERNELS[environment.kernel]
         if needed not in here["features"]:
@@ -222,7 +222,7 @@ def probe(variables: dict[str, str], cores: set[int] | None = None) -> dict:
     return json.loads(done.stdout)
 
 
-def _features() -> dict[str, list[str]]:
+def features() -> dict[str, list[str]]:
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
     return {"features": [name for name, there in __cpu_features__.items() if there], "dispatched": __cpu_dispatch__}

@@ -80,7 +80,7 @@ def searched(model: Model, settings: Settings, seeds: Sequence[int], long: int, 
         record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
     budget = record["evaluations"]
     record["de"] = _found(model, replace(settings, robust=False, method="de", evaluations=budget), runs)[0]
-    for name, minimize in _PEERS.items():
+    for name, minimize in PEERS.items():
         record[name] = peer(minimize, model, settings, budget, runs)
     return record
 
@@ -94,7 +94,7 @@ def _found(model: Model, settings: Settings, runs: Simulations) -> tuple[float, 
     return (found.quantile_mm_s if settings.robust else found.nominal_mm_s), found.evaluations
 
 
-_PEERS: dict[str, Callable[..., object]] = {
+PEERS: dict[str, Callable[..., object]] = {
     "direct": lambda speed, box, budget: direct(speed, box, maxfun=budget, maxiter=budget),
     "shgo": lambda speed, box, budget: shgo(speed, box, n=budget // 4, sampling_method="sobol"),
 }
@@ -126,7 +126,7 @@ def regrets(record: dict) -> list[float]:
     """Of every seed, nominal and robust, the part by which it is slower than the best known."""
     found = []
     for kind in ("nominal", "robust"):
-        others = [record[name] for name in ("de", *_PEERS)] if kind == "nominal" else []
+        others = [record[name] for name in ("de", *PEERS)] if kind == "nominal" else []
         best = max([*record[kind], *record[f"{kind}_long"], *others])
         found += [0.0 if best <= 0.0 else 1.0 - speed / best for speed in record[kind]]
     return found
@@ -138,7 +138,7 @@ def row(name: str, record: dict) -> str:
     for kind in ("nominal", "robust"):
         best = max([*record[kind], *record[f"{kind}_long"]])
         text += f"{min(record[kind]):9.2f}{best:9.2f}{record[f'{kind}_s']:7.1f}"
-    peers = "".join(f"{record[name]:9.2f}" for name in ("de", *_PEERS))
+    peers = "".join(f"{record[name]:9.2f}" for name in ("de", *PEERS))
     return text + f"{record['evaluations']:8}{peers}{100 * max(regrets(record)):9.2f}"
 
 

@@ -30,7 +30,8 @@ _LOOK_S = 0.05
 
 
 class Lab:
-    """Answers each question once. `spoil(step, asked, record)` may change what is saved, to see it refused."""
+    """Answers each question once, by the method of its step's name. `spoil(asked, record)` may change what is saved, to
+    see it refused."""
 
     def __init__(
         self,
@@ -56,7 +57,7 @@ class Lab:
         if stamp == self._done:
             return
         with self._rig.world.turn:
-            answer = getattr(self, f"_{asked['step']}")(asked)
+            answer = getattr(self, asked["step"])(asked)
         if answer is None:
             return  # under way
         self._done = stamp
@@ -65,10 +66,10 @@ class Lab:
         aside.write_text(answer)
         os.replace(aside, self._folder / "answer")
 
-    def _known(self, asked: dict) -> str:
+    def known(self, asked: dict) -> str:
         return ""
 
-    def _mount(self, asked: dict) -> str:
+    def mount(self, asked: dict) -> str:
         settings = {k: v for k, v in asked["settings"].items() if k in _MOUNTED_BY[asked["experiment"]]}
         if asked["experiment"] == "anchor_pull":
             settings["travel_mm"] = 40.0
@@ -76,17 +77,17 @@ class Lab:
         self._moved = False
         return ""
 
-    def _start(self, asked: dict) -> str:
+    def start(self, asked: dict) -> str:
         self._stand.start()
         return ""
 
-    def _move(self, asked: dict) -> str | None:
+    def move(self, asked: dict) -> str | None:
         if not self._moved:
             self._stand.move()
             self._moved = True
         return None if self._stand.moving else ""
 
-    def _save(self, asked: dict) -> str:
+    def save(self, asked: dict) -> str:
         record = self._spoil(asked, self._stand.stop())
         name = Path(asked["file"]).stem
         if self._bench is not None:
@@ -114,9 +115,6 @@ class Lab:
         np.savetxt(path.with_suffix(".sync.csv"), edges, "%.6f", header="sync_time_s", comments="")
         path.write_bytes(EXPORTS[program].write(record))
         return ""
-
-    def _review(self, asked: dict) -> str:
-        return self.review(asked)
 
 
 def main() -> None:

@@ -302,11 +302,11 @@ def _refuse_settings(tables: Mapping[str, Table]) -> None:
 
 
 def _csv(file: Path) -> Table:
-    columns = _numbers_alone(file) or _cell_by_cell(file)
+    columns = numbers_alone(file) or cell_by_cell(file)
     return _of_columns({"condition": _stem(file.stem)[0]} | columns, file.stem)
 
 
-def _numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
+def numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
     """The columns of a file that has one line of names and below it plain numbers only, which NumPy reads at a tenth
     of the cost; None of any other, which is gone through cell by cell."""
     with file.open("rb") as lines:
@@ -333,7 +333,7 @@ def _numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
     return {name: values[:, place].copy() for place, name in enumerate(names)}
 
 
-def _cell_by_cell(file: Path) -> dict[str, np.ndarray]:
+def cell_by_cell(file: Path) -> dict[str, np.ndarray]:
     (_, names), *rows = _lines(file)
     names = [name.strip() for name in names]
     for mark, what in ((";", "semicolons"), ("\t", "tabs")):

@@ -39,16 +39,16 @@ def provision() -> str:
     source = "registry" if registry.answers(registry.package_urls()) else "stand-ins"
     if source == "registry":
         (CORE_DIR / stand_ins.SETTINGS_FILE).unlink(missing_ok=True)
-        _install_from_registry()
+        install_from_registry()
     else:
         _refuse_foreign_core_dir()
-        _install_avr_tools()
+        install_avr_tools()
         stand_ins.lay_out(CORE_DIR)
     decision.Decision(source, decision.fingerprint(CORE_DIR)).save(CORE_DIR)
     return source
 
 
-def _install_from_registry() -> None:
+def install_from_registry() -> None:
     """Download now, so that nothing is downloaded at run time."""
     if subprocess.run([sys.executable, "-m", "platformio", "pkg", "install"], cwd=PROJECT).returncode:
         raise ProvisionError("PlatformIO could not install its packages; see its message above")
@@ -60,7 +60,7 @@ def _refuse_foreign_core_dir() -> None:
         raise ProvisionError("PLATFORMIO_CORE_DIR is set and would hide the stand-ins in .platformio; unset it")
 
 
-def _install_avr_tools() -> None:
+def install_avr_tools() -> None:
     if subprocess.run([PROJECT / "tools" / "system-packages.sh", "avr"]).returncode:
         raise ProvisionError("the AVR tools are missing; see the line above")
 

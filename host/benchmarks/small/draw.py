@@ -60,7 +60,7 @@ def drawn(truth: str, seed: int) -> tuple[Offered, Sealed]:
     """The set of this seed, the same on every call. `truth`: "single", "none", "outside" (one effect, not on offer),
     "pair", or "decoys" (twenty that are not there, beside one effect or nothing). Raises UntellableError."""
     attempt = which(truth, seed)
-    found = _attempt(truth, seed, attempt, tellable=lambda *given: True)
+    found = one_draw(truth, seed, attempt, tellable=lambda *given: True)
     if found is None:
         raise UntellableError(f"{truth} {seed}: draw {attempt} is not what it was when it was told")
     return found
@@ -76,7 +76,7 @@ def which(truth: str, seed: int) -> int:
 def sought(truth: str, seed: int) -> int:
     """The same by trying them. Raises UntellableError."""
     for attempt in range(_ATTEMPTS):
-        if _attempt(truth, seed, attempt, tellable):
+        if one_draw(truth, seed, attempt, tellable):
             return attempt
     raise UntellableError(f"{truth} {seed} ({_kind(seed).key}): nothing came out in {_ATTEMPTS} draws")
 
@@ -90,7 +90,7 @@ def _kind(seed: int) -> Kind:
     return list(KINDS.values())[seed % len(KINDS)]
 
 
-def _attempt(truth: str, seed: int, attempt: int, tellable: Callable[..., bool]) -> tuple[Offered, Sealed] | None:
+def one_draw(truth: str, seed: int, attempt: int, tellable: Callable[..., bool]) -> tuple[Offered, Sealed] | None:
     """A draw; None if it cannot be told."""
     draw = np.random.default_rng([seed, TRUTHS.index(truth), attempt])
     kind, turn, key = _kind(seed), seed // len(KINDS), f"{truth} {seed}"

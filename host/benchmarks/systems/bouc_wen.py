@@ -22,7 +22,7 @@ SAMPLE_S, SAMPLES, NOISE_MM = 1 / 750, 750, 8e-3
 TRUTH = (2.0, 10.0, 5e4, 5e4, 0.8e3, -1.1e3, 0.0, 0.0, 0.0, 0.0, 0.02, 0.0)
 
 
-_MODEL = ("_rate", "_moved", "_between", "_position_m")
+_MODEL = ("_rate", "_moved", "_between", "position_m")
 _SHAPES = ("_hysteresis", "_relaxation")
 
 
@@ -46,7 +46,7 @@ def _between(force, at):
 
 
 @numba.njit(nogil=True, cache=True)
-def _position_m(force, steps, m, c, k, alpha, gamma, delta, coulomb, cubic, drag, maxwell, tau, delay_s):
+def position_m(force, steps, m, c, k, alpha, gamma, delta, coulomb, cubic, drag, maxwell, tau, delay_s):
     p = (m, c, k, alpha, gamma, delta, coulomb, cubic, drag, maxwell, tau)
     found, state, h = np.empty(len(force)), (0.0, 0.0, 0.0, 0.0), 1 / 750 / steps
     for i in range(len(force)):
@@ -64,7 +64,7 @@ def _position_m(force, steps, m, c, k, alpha, gamma, delta, coulomb, cubic, drag
 
 def simulate(record, theta):
     """Displacement from rest, freely; `theta` in the order in which its parameters are declared."""
-    return {"displacement_mm": 1e3 * _position_m(record["force_N"], 4, *theta.values())}
+    return {"displacement_mm": 1e3 * position_m(record["force_N"], 4, *theta.values())}
 
 
 PARAMETERS = (
@@ -123,7 +123,7 @@ def _multisine(draw: np.random.Generator, rms_N: float) -> np.ndarray:
 
 
 def _measured(draw: np.random.Generator, shape: str, size_N: float, force_N: np.ndarray, run: int) -> Record:
-    clean_mm = 1e3 * _position_m(force_N, 20, *TRUTH)
+    clean_mm = 1e3 * position_m(force_N, 20, *TRUTH)
     noise_mm = NOISE_MM * draw.standard_normal(SAMPLES)
     channels = {"displacement_mm": clean_mm + noise_mm}
     return Record(f"{shape} {size_N:g} N, run {run}", shape, size_N, _times(), channels, inputs={"force_N": force_N})

@@ -26,7 +26,7 @@ NOISE_V, PROCESS_V = 0.02, 1e-3  # of the sensor; of both levels, each second
 
 
 @numba.njit(nogil=True, cache=True)
-def _levels(pump_V, noise, k1, k3, k4, brim, share, leak, dead_V, full_V, lag_s, offset_V, drain):
+def levels(pump_V, noise, k1, k3, k4, brim, share, leak, dead_V, full_V, lag_s, offset_V, drain):
     found, steps = np.empty(len(pump_V)), 8
     h, x1, x2, pumped = 4.0 / steps, 0.0, 0.0, 0.0
     for i in range(len(pump_V)):
@@ -45,7 +45,7 @@ def _levels(pump_V, noise, k1, k3, k4, brim, share, leak, dead_V, full_V, lag_s,
 def simulate(record, theta):
     """Level of the lower tank, freely, both tanks empty at first; `theta` in the order of its declaration."""
     pump_V = record["pump_V"]
-    return {"level_V": _levels(pump_V, np.zeros((len(pump_V), 2)), *theta.values())}
+    return {"level_V": levels(pump_V, np.zeros((len(pump_V), 2)), *theta.values())}
 
 
 PARAMETERS = (
@@ -80,7 +80,7 @@ def problem(seed: int = 0) -> Problem:
         truth=frozenset({"overflow"}),
         fitted=(_measured(draw, "first"),),
         held_out=(_measured(draw, "second"),),
-        model_lines=lines_of(sys.modules[__name__], ("_levels", "simulate", "PARAMETERS", "_share", "EFFECTS")),
+        model_lines=lines_of(sys.modules[__name__], ("levels", "simulate", "PARAMETERS", "_share", "EFFECTS")),
         no_terms="no derivatives: a level is not measured",
         cut=lambda records: segments({"time_s": records[0].time_s, **records[0].inputs, **records[0].channels}),
     )
@@ -93,5 +93,5 @@ def _measured(draw: np.random.Generator, name: str) -> Record:
     shape = np.sin(2 * np.pi * (tones * time_s + draw.random(tones.shape))).sum(0)
     pump_V = np.clip(3.3 + 1.3 * shape / np.std(shape), 0.0, 10.0)
     process = PROCESS_V * draw.standard_normal((SAMPLES, 2))
-    level_V = _levels(pump_V, process, *TRUTH) + NOISE_V * draw.standard_normal(SAMPLES)
+    level_V = levels(pump_V, process, *TRUTH) + NOISE_V * draw.standard_normal(SAMPLES)
     return Record(name, "run", name, time_s, {"level_V": level_V}, inputs={"pump_V": pump_V})

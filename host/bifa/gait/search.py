@@ -47,7 +47,7 @@ class Round:
 
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
 # in ten of its own robots fails would fail more often on others.
-_EXPLORE = Round(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
+EXPLORE = Round(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
@@ -142,14 +142,14 @@ def optimize(
     own = NominalSpeed(runs, flat, settings.space, metric.quicker() if settings.robust else metric)
     explored = _explore(own, settings, say)
     if settings.robust and explored.best_value > 0.0:
-        explored = _explore_on_robots(model, runs, spread, explored, settings, say)
+        explored = explore_on_robots(model, runs, spread, explored, settings, say)
     if explored.best_value <= 0.0:
         raise SearchError(
             f"none of {len(explored.values)} gaits walks without slipping; widen the space or search longer"
         )
     if settings.robust:
         refined = _refine_on_robots(model, runs, spread, explored, settings, say) if settings.refine else []
-        gait, nominal = _robustly(model, runs, spread, explored, [explored, *refined][-1], settings, say)
+        gait, nominal = best_of_finalists(model, runs, spread, explored, [explored, *refined][-1], settings, say)
     else:
         refined = [_refine(own, explored, settings, say)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, say)
@@ -189,19 +189,19 @@ def _explore(objective: Objective, settings: Settings, say: OnProgress) -> Found
     )
 
 
-def _explore_on_robots(
+def explore_on_robots(
     model: Model, runs: Simulations, spread: Knowledge, explored: Found, settings: Settings, say: OnProgress
 ) -> Found:
     """CMA-ES on a few robots from the basins of the model's own speed: from slower copies too, since there the fastest
     are beyond the cliff of most robots, whose objective is 0."""
-    objective, budget = _on_robots(model, runs, spread, settings, _EXPLORE, 0), _scaled(_EXPLORE.evaluations, settings)
+    objective, budget = on_robots(model, runs, spread, settings, EXPLORE, 0), _scaled(EXPLORE.evaluations, settings)
     recorder = Recorder(
         objective, settings.space.wraps, lambda count, best: say("search on robots", min(count / budget, 1.0), best)
     )
-    recorder(np.concatenate(_at_periods(_EXPLORE, settings.space, basins(explored, settings.space.wraps, _BASINS))))
+    recorder(np.concatenate(_at_periods(EXPLORE, settings.space, basins(explored, settings.space.wraps, _BASINS))))
     if not settings.refine:
         return recorder.found()
-    return climb_basins(recorder, settings.space.wraps, budget, settings.seed, _POPULATION, _EXPLORE.step)
+    return climb_basins(recorder, settings.space.wraps, budget, settings.seed, _POPULATION, EXPLORE.step)
 
 
 def _budget(settings: Settings) -> int:
@@ -232,7 +232,7 @@ def _refine_on_robots(
     what was best on few robots may owe it to them."""
     found, starts = [explored], _STARTS
     for number, stage in enumerate(_REFINE, start=1):
-        objective = _on_robots(model, runs, spread, settings, stage, number)
+        objective = on_robots(model, runs, spread, settings, stage, number)
         budget = _scaled(stage.evaluations, settings)
 
         def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
@@ -247,7 +247,7 @@ def _refine_on_robots(
     return found[1:]
 
 
-def _on_robots(
+def on_robots(
     model: Model, runs: Simulations, spread: Knowledge, settings: Settings, stage: Round, number: int
 ) -> RobustSpeed:
     """The objective of a round, on robots of its own."""
@@ -267,7 +267,7 @@ def _nominally(
     return _best(rows, speeds)
 
 
-def _robustly(
+def best_of_finalists(
     model: Model,
     runs: Simulations,
     spread: Knowledge,
@@ -279,7 +279,7 @@ def _robustly(
     """The best of the finalists, over robots that the search did not meet, that stands the check; slower copies of it
     follow, for the case that all are beyond the cliff. Where none stands, the one that walks best on average."""
     groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=0.003))
-    objective = _on_robots(model, runs, spread, settings, _SHORTLIST, 3)
+    objective = on_robots(model, runs, spread, settings, _SHORTLIST, 3)
     shortlist = np.concatenate(groups)
     # One by one: what is worse than the best so far meets few robots, the hardest first.
     values = np.concatenate([objective(point[None]) for point in shortlist])

@@ -139,7 +139,7 @@ def _orphaned(number: int, frame: FrameType | None) -> None:
 def _watch_parent() -> None:
     if sys.platform != "linux" or signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         return
-    if _death_signal() != 0 or signal.getsignal(_DEATH) is not signal.SIG_DFL:
+    if death_signal() != 0 or signal.getsignal(_DEATH) is not signal.SIG_DFL:
         return
     _parents.append(os.getppid())
     signal.signal(_DEATH, _orphaned)
@@ -153,7 +153,7 @@ def _watch_parent_no_more() -> None:
         _parents.pop()
 
 
-def _death_signal() -> int | None:
+def death_signal() -> int | None:
     """What the parent's death sends to this process now, 0: nothing; None where that cannot be chosen."""
     now = ctypes.c_int()
     return now.value if _prctl(_GET_DEATH_SIGNAL, ctypes.byref(now)) == 0 else None

@@ -112,8 +112,8 @@ class Session:
         self.on_renewed: Callable[[], None] = lambda: None
         self._random = random.Random(seed)
         self._splitter = frames.Splitter()
-        self._key = 0
-        self._sequence = 0
+        self.key = 0
+        self.sequence = 0
         self._outstanding: deque[_Request] = deque()
         self._hellos: deque[Hello] = deque(maxlen=8)
         self._go_back = False
@@ -138,7 +138,7 @@ class Session:
         Raises MismatchError when the image is another version, NoAnswerError when nothing answers.
         """
         deadline = self.clock.now() + timeout_s
-        self._key = 0
+        self.key = 0
         hello = self._greet("version", (), deadline)
         if (hello.protocol, hello.table_hash) != (PROTOCOL_VERSION, TABLE_HASH):
             raise MismatchError(
@@ -150,8 +150,8 @@ class Session:
         key = self._random.randrange(1, 0x10000)
         while hello.session_key != key:
             hello = self._greet("connect", (hello.boot_nonce, key), deadline)
-        self._key = key
-        self._sequence = 0
+        self.key = key
+        self.sequence = 0
         self._outstanding.clear()
         self._is_calling = False
         self.hello = hello
@@ -190,14 +190,15 @@ class Session:
             if kind == "line":
                 self.lines.append(printable(content.decode("ascii", "replace")))
                 continue
-            report = frames.decode(content, frames.session_seed(self._key))
+            report = frames.decode(content, frames.session_seed(self.key))
             if report is None:
                 self.counters.bad += 1
                 continue
             self.counters.frames += 1
-            self._take(report, now)
+            self.take(report, now)
 
-    def _take(self, report: frames.Report, now: float) -> None:
+    def take(self, report: frames.Report, now: float) -> None:
+        """A report that has arrived: a sample, a greeting, or the answer to a request."""
         if report.name == "sample":
             self.on_sample(report)
         elif report.name == "hello":
@@ -274,9 +275,9 @@ class Session:
         return answers
 
     def _request(self, name: str, values: tuple[Any, ...]) -> _Request:
-        sequence = self._sequence
-        self._sequence = (sequence + 1) % 256
-        data = frames.encode(COMMANDS[name], sequence, values, frames.session_seed(self._key))
+        sequence = self.sequence
+        self.sequence = (sequence + 1) % 256
+        data = frames.encode(COMMANDS[name], sequence, values, frames.session_seed(self.key))
         return _Request(name, data, sequence, self.clock.now())
 
     def _send_due(self, queue: deque[Any]) -> None:
@@ -304,7 +305,7 @@ class Session:
         """RestartedError if the Uno has greeted, and not for this session."""
         while self._hellos:
             hello = self._hellos.popleft()
-            if hello.session_key != self._key:
+            if hello.session_key != self.key:
                 self._outstanding.clear()
                 is_same = self.hello is not None and hello.boot_nonce == self.hello.boot_nonce
                 what = "lost the session" if is_same else "restarted"

@@ -18,7 +18,7 @@ class CycleSpeed:
         self._begin()
 
     def _begin(self) -> None:
-        self._path: deque[tuple[float, float, float]] = deque()  # cycles, time, position: of the last one
+        self.path: deque[tuple[float, float, float]] = deque()  # cycles, time, position: of the last one
         self._ends: deque[tuple[float, float]] = deque(maxlen=MOST_CYCLES + 1)  # of cycles: time, position
         self._phase_rad: float | None = None
         self._cycles = 0.0
@@ -26,25 +26,25 @@ class CycleSpeed:
 
     def take(self, is_walking: bool, time_s: float, phase_rad: float, position_mm: float) -> None:
         """One look: the body's phase and where the head is. A robot that stands, or starts anew, has no cycle."""
-        if not is_walking or (self._path and time_s < self._path[-1][1]):
+        if not is_walking or (self.path and time_s < self.path[-1][1]):
             self._begin()
             return
         self._cycles += (phase_rad - (self._phase_rad or 0.0)) % (2 * math.pi) / (2 * math.pi)
-        before, self._phase_rad = self._path[-1] if self._path else None, phase_rad
-        self._path.append((self._cycles, time_s, position_mm))
+        before, self._phase_rad = self.path[-1] if self.path else None, phase_rad
+        self.path.append((self._cycles, time_s, position_mm))
         if before is not None and math.floor(self._cycles) > math.floor(before[0]):
-            self._ends.append(_between(before, self._path[-1], float(math.floor(self._cycles))))
+            self._ends.append(_between(before, self.path[-1], float(math.floor(self._cycles))))
             self.settled = self._judged()
-        while len(self._path) > 2 and self._path[1][0] <= self._cycles - 1.0:
-            self._path.popleft()
+        while len(self.path) > 2 and self.path[1][0] <= self._cycles - 1.0:
+            self.path.popleft()
 
     @property
     def mm_s(self) -> float | None:
         """Over the last whole cycle, from where it was a cycle ago between two looks."""
-        if not self._path or (began := self._cycles - 1.0) < self._path[0][0]:
+        if not self.path or (began := self._cycles - 1.0) < self.path[0][0]:
             return None
-        then_s, then_mm = _between(self._path[0], self._path[1], began)
-        _, now_s, now_mm = self._path[-1]
+        then_s, then_mm = _between(self.path[0], self.path[1], began)
+        _, now_s, now_mm = self.path[-1]
         return (now_mm - then_mm) / (now_s - then_s) if now_s > then_s else None
 
     def _judged(self) -> str:

@@ -45,7 +45,7 @@ def record_trial(
     why = ""
     for _ in range(attempts):
         try:
-            columns, extra, lost = _RUNS[planned.experiment](bench, uno, planned, on_progress)
+            columns, extra, lost = RUNS[planned.experiment](bench, uno, planned, on_progress)
         except AlignmentError as error:
             why = str(error)
             continue
@@ -120,7 +120,7 @@ def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     return columns, noted(tape.clock) | known | camera_rate(tape.instrument_s), tape.lost_samples
 
 
-_RUNS: dict[str, Callable[[Bench, Uno, PlannedTrial, Progress], Recorded]] = {
+RUNS: dict[str, Callable[[Bench, Uno, PlannedTrial, Progress], Recorded]] = {
     "static_loading": _static,
     "step_response": _step,
     "anchor_pull": _pull,

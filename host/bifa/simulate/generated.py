@@ -38,7 +38,7 @@ def folder() -> Path:
         if os.access(chosen, os.W_OK):
             return chosen
     try:
-        return _temporary_folder()
+        return temporary_folder()
     except OSError as error:
         raise OSError("no folder can be written for compiled code; set BIFA_CACHE_DIR") from error
 
@@ -48,7 +48,7 @@ def _users_cache() -> Path:
 
 
 @functools.cache
-def _temporary_folder() -> Path:
+def temporary_folder() -> Path:
     """One for every process if only this user can write there, since its code is executed; else this process's own."""
     candidate = Path(tempfile.gettempdir()) / f"bifa-{os.getuid() if hasattr(os, 'getuid') else 0}"
     with contextlib.suppress(OSError):

@@ -48,7 +48,7 @@ ACTUATORS = 3  # body, head, tail
 
 
 @cache
-def _indices() -> dict[str, int]:
+def parameter_indices() -> dict[str, int]:
     table = dict(ROBOT_NAMES)
     for name, place in BLOCK_NAMES.items():
         table[f"body_{name}"] = BODY + place
@@ -60,13 +60,13 @@ def _indices() -> dict[str, int]:
 
 def index(name: str) -> int:
     """Place of a parameter (`mu_k`, `hysteresis.force_N`) in `q`."""
-    return _indices()[name]
+    return parameter_indices()[name]
 
 
 @cache
 def size() -> int:
     """Length of `q`."""
-    return max(_indices().values()) + 1
+    return max(parameter_indices().values()) + 1
 
 
 @cache
@@ -76,7 +76,7 @@ def effect_bit(name: str) -> int:
 
 
 @cache
-def _slots() -> dict[str, int]:
+def effect_slots() -> dict[str, int]:
     slots, used = {}, 0
     for effect in effects.library().values():
         slots[effect.name] = used * ACTUATORS
@@ -86,9 +86,9 @@ def _slots() -> dict[str, int]:
 
 def state_slot(effect: str) -> int:
     """First of the effect's three remembered numbers (body, head, tail) in `z`."""
-    return _slots()[effect]
+    return effect_slots()[effect]
 
 
 def state_size() -> int:
     """Length of `z`."""
-    return _slots()[""]
+    return effect_slots()[""]

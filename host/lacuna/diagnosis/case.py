@@ -206,13 +206,13 @@ class Case:
         both = [([mine], [others])]
         if unseen := self.split.unseen:
             both.append(([evaluate_on(mine, unseen)], [evaluate_on(others, unseen)]))
-        return self._exceeds(*both)
+        return self.exceeds_on_all(*both)
 
     def exceeds(self, candidate: Candidate, better: Candidate) -> bool:
         """The same of the explanations as they are, on the trials that they are judged on."""
-        return self._exceeds(([candidate.fitted], [better.fitted]), (candidate.judged, better.judged))
+        return self.exceeds_on_all(([candidate.fitted], [better.fitted]), (candidate.judged, better.judged))
 
-    def _exceeds(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
+    def exceeds_on_all(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
         """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
         would have left so if a run's factors had to be foreseen, which a few runs of one pair may be by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)

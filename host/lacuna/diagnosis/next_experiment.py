@@ -36,7 +36,7 @@ def next_experiment(rivals: Sequence[Candidate], floor: NoiseFloor, dispersion: 
     for offer in system.candidate_experiments():
         predictions = [_predict(c, offer) for c in rivals]
         gains = [
-            _expected_gain(a, b, offer, floor) / dispersion for k, a in enumerate(predictions) for b in predictions[:k]
+            expected_gain(a, b, offer, floor) / dispersion for k, a in enumerate(predictions) for b in predictions[:k]
         ]
         if min(gains) > best.gain:
             names = tuple(sorted({name for c in rivals for name in c.effects} - _shared(rivals)))
@@ -54,7 +54,7 @@ def _predict(candidate: Candidate, offer: CandidateExperiment) -> Channels:
     return fitted.structure.system.predict(theta, candidate.effects, offer.trial)
 
 
-def _expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: NoiseFloor) -> float:
+def expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: NoiseFloor) -> float:
     """Half the squared difference in standard deviations, thinned to independent pieces."""
     total = 0.0
     for channel in a:

@@ -24,7 +24,7 @@ from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
 
-_COARSE: dict[str, Any] = {"max_iterations": 12, "relative": 3e-3}
+COARSE: dict[str, Any] = {"max_iterations": 12, "relative": 3e-3}
 _TO_THE_END: dict[str, Any] = {"max_iterations": 40, "relative": 1e-4}
 _FIRST = 2  # promises: if the better one of them is enough, only its rivals follow
 _ELSEWHERE = 3  # places that a base model is begun from besides its initial guess
@@ -78,7 +78,7 @@ def race(
     """`promises`, the most promising first, fitted coarsely, and the best of them, `most` at most, to the end. `keep`
     is called with what there is, in case that somebody stops the race."""
     policy, done = parent.policy, []
-    raced, rest = _coarse(parent, promises[:_FIRST], split, crew), list(promises[_FIRST:])
+    raced, rest = coarse_fits(parent, promises[:_FIRST], split, crew), list(promises[_FIRST:])
     keep(raced)
     if raced and min(raced, key=_cost).checked_error <= (0, policy.lost):
         done = to_the_end([min(raced, key=_cost)], split, crew)
@@ -87,7 +87,7 @@ def race(
         if enough(done[0]):
             least = policy.rival * max(one.gain for one in promises)
             rest = [one for one in rest if one.gain > least]
-    raced = sorted([*raced, *_coarse(parent, rest, split, crew)], key=_cost)
+    raced = sorted([*raced, *coarse_fits(parent, rest, split, crew)], key=_cost)
     keep(raced)
     chosen = [c for c in raced if _worth_it(c, parent, done, enough)][: most - len(done)]
     done += to_the_end(chosen, split, crew)
@@ -110,7 +110,7 @@ def _cost(candidate: Candidate) -> float:
     return candidate.cost
 
 
-def _coarse(parent: Candidate, promises: Sequence[Promise], split: Split, crew: Crew) -> list[Candidate]:
+def coarse_fits(parent: Candidate, promises: Sequence[Promise], split: Split, crew: Crew) -> list[Candidate]:
     names = [one.problem.structure.effects for one in promises]
     jobs = [(one.problem, cold_starts(one), one.start, parent.fitted.cost) for one in promises]
     solutions = crew.map("fitting", names, _begun, jobs)
@@ -122,12 +122,12 @@ def _begun(problem: Problem, begins: Sequence[np.ndarray], warm: Point, containe
     found = min((cold(problem, values) for values in begins), key=lambda s: s.cost)
     if found.cost <= contained:
         return found
-    return min(found, solve(problem, warm, **_COARSE), key=lambda s: s.cost)
+    return min(found, solve(problem, warm, **COARSE), key=lambda s: s.cost)
 
 
 def cold(problem: Problem, values: np.ndarray) -> Solution:
     """A coarse fit that owes nothing to earlier ones."""
-    return solve_graduated(problem, values, **_COARSE)
+    return solve_graduated(problem, values, **COARSE)
 
 
 def to_the_end(candidates: Sequence[Candidate], split: Split, crew: Crew) -> list[Candidate]:
@@ -186,4 +186,4 @@ def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
 def _continued(problem: Problem, sizes: Sequence[np.ndarray], nuisances: Sequence[np.ndarray], apart: bool) -> Solution:
     """From the best size, or from each where the effect has nothing to do as yet and no size tells."""
     begun = sorted((problem.start(values, nuisances) for values in sizes), key=lambda start: cost_of(problem, start))
-    return min((solve(problem, start, **_COARSE) for start in begun[: None if apart else 1]), key=lambda s: s.cost)
+    return min((solve(problem, start, **COARSE) for start in begun[: None if apart else 1]), key=lambda s: s.cost)

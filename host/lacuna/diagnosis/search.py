@@ -75,7 +75,7 @@ def search(
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     freed: list[Candidate] = []
     found = raced(first, _singles(scores))
-    if better := _led_out(first, found, split):
+    if better := led_out(first, found, split):
         crew.say("the base model was in a wrong minimum: from the better one")
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
@@ -138,7 +138,7 @@ def _larger(
     size, always, offers = len(best.effects) + 1, [], []
     for parent in ranked[:_PARENTS]:
         fresh = [e for e in library if e not in parent.effects]
-        for promise in score(_with_derivatives(parent).fitted, fresh, crew).singles():
+        for promise in score(with_derivatives(parent).fitted, fresh, crew).singles():
             gain = best.fitted.cost - parent.fitted.cost + promise.gain
             offers.append(promise._replace(gain=gain))
             if parent is best and _blind(library[promise.effect]):
@@ -159,7 +159,7 @@ def _larger(
     return sorted(chosen.values(), key=lambda one: -one.gain)
 
 
-def _with_derivatives(candidate: Candidate) -> Candidate:
+def with_derivatives(candidate: Candidate) -> Candidate:
     """Some may have come up as they were weighed again, and have none."""
     if candidate.fitted.solution.sensitivities:
         return candidate
@@ -167,7 +167,7 @@ def _with_derivatives(candidate: Candidate) -> Candidate:
     return Candidate(fitted, candidate.checked, candidate.policy)
 
 
-def _led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Candidate | None:
+def led_out(base: Candidate, singles: Sequence[Candidate], split: Split) -> Candidate | None:
     """The base model from where a fit with one effect leads it, whichever is nearest, if that explains more: then what
     these seemed to explain was the base fit's failure, or some of it."""
     problem = base.fitted.problem

@@ -38,7 +38,7 @@ def test_a_peer_has_no_more_than_its_budget_and_is_judged_by_the_finer_metric(na
             spent.append(speed(point))
             return spent[-1]
 
-        return regret._PEERS[name](one, box, budget)
+        return regret.PEERS[name](one, box, budget)
 
     with simulations() as runs:
         found = regret.peer(counted, nominal(), Settings(), 200, runs)

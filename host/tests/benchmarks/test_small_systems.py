@@ -289,7 +289,7 @@ def test_what_is_found_out_is_added_in_order(tmp_path, monkeypatch):
 
 
 def test_a_draw_that_came_out_otherwise_is_no_set(monkeypatch):
-    monkeypatch.setattr(drawing, "_told", lambda: {"single 7000": 0})
-    monkeypatch.setattr(drawing, "_attempt", lambda *given, tellable: None)
+    monkeypatch.setattr(drawing, "which", lambda *given: 0)
+    monkeypatch.setattr(drawing, "one_draw", lambda *given, tellable: None)
     with pytest.raises(drawing.UntellableError, match="is not what it was"):
         drawn("single", 7000)

@@ -164,7 +164,7 @@ def test_lines_are_those_of_code(tmp_path, monkeypatch):
 
 def test_the_coarser_integrator_of_the_hysteresis_errs_far_less_than_the_noise():
     made = bouc_wen.problem().fitted[0]
-    fine, coarse = (bouc_wen._position_m(made["force_N"], steps, *bouc_wen.TRUTH) for steps in (20, 4))
+    fine, coarse = (bouc_wen.position_m(made["force_N"], steps, *bouc_wen.TRUTH) for steps in (20, 4))
     assert np.max(np.abs(1e3 * (fine - coarse))) < 0.1 * bouc_wen.NOISE_MM
 
 
@@ -172,7 +172,7 @@ def test_what_the_pump_gives_is_in_the_tanks():
     """With the lower outlet shut and no brim: the sum of both levels is what was pumped, sample by sample."""
     pump_V = tanks.problem().fitted[0]["pump_V"]
     shut = (0.05, 0.0, 0.04, np.inf, 0.0, 0.0, 0.0, np.inf, 0.0, 0.0, 0.0)
-    lower = tanks._levels(pump_V, np.zeros((len(pump_V), 2)), *shut)
+    lower = tanks.levels(pump_V, np.zeros((len(pump_V), 2)), *shut)
     pumped = np.concatenate([[0.0], 0.04 * tanks.SAMPLE_S * np.cumsum(pump_V)[:-1]])
     upper = pumped - lower
     assert np.all(upper > -1e-9)

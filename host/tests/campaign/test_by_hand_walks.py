@@ -66,13 +66,15 @@ def walks(lab, folder, said, stop_at=None):
 def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
     fed = []
 
-    def diagnosed(dataset, setup, on_progress):
+    def diagnosed(dataset, **_):
         fed.append({trial.file for trial in dataset.trials})
         return SimpleNamespace(effects=[SimpleNamespace(name="stribeck")], final=ROBOT)
 
-    monkeypatch.setattr(loop, "_diagnosed", diagnosed)
+    monkeypatch.setattr(loop, "prepare", lambda dataset: dataset)
+    monkeypatch.setattr(loop, "diagnose", diagnosed)
     monkeypatch.setattr(loop, "completed_model", lambda final: final)
-    monkeypatch.setattr(loop, "_gait_of", lambda *_: (FASTER, {}))
+    monkeypatch.setattr(loop, "found_gait", lambda *_: SimpleNamespace(gait=FASTER))
+    monkeypatch.setattr(loop, "provenance", lambda *_: {})
 
     first = []
     with pytest.raises(KeyboardInterrupt):

@@ -116,7 +116,7 @@ def test_stop_that_is_typed_behind_a_torn_frame_is_carried_out(bench):
 
 def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench):
     uno = connected(bench.board)
-    seed, sequence = frames.session_seed(uno.session._key), uno.session._sequence
+    seed, sequence = frames.session_seed(uno.session.key), uno.session.sequence
     status, clear = (
         frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("status", "clear"))
     )

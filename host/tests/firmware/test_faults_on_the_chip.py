@@ -173,7 +173,7 @@ def test_what_waits_when_a_fault_comes_does_not_undo_it(bench, first, lose, name
 
 def test_clear_frames_that_wait_when_a_fault_comes_do_not_undo_it(bench):
     uno = connected(bench.board)
-    seed, sequence = frames.session_seed(uno.session._key), uno.session._sequence
+    seed, sequence = frames.session_seed(uno.session.key), uno.session.sequence
     waiting = [frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("clear", "run"))]
     bench.board.send(b"help\n" * 4 + b"".join(waiting))
     lose_a_sensor(bench)

@@ -6,7 +6,7 @@ from typing import get_args
 import pytest
 from typer.testing import CliRunner
 
-from bifa.cli import _options, app
+from bifa.cli import app, optimize
 from bifa.errors import BifaError
 from bifa.gait.methods import METHODS
 from bifa.robot import load_gait, nominal, save_model
@@ -51,7 +51,7 @@ def test_a_method_that_does_not_exist_is_refused_before_anything_is_loaded(tmp_p
     result = invoke("optimize", "--out", tmp_path / "gait.toml", "--method", "sgd")
     assert result.exit_code == 2
     assert "'sgd' is not one of 'cma', 'de'" in result.output
-    assert tuple(METHODS) == get_args(_options.Method)
+    assert tuple(METHODS) == get_args(optimize.Method)
 
 
 def test_a_folder_that_is_not_there_is_noticed_before_the_search(tmp_path):

@@ -30,11 +30,11 @@ def simulate(record, theta):
     power = np.sign(power) * np.maximum(np.abs(power) - theta.dead_band.half_W, 0.0)
     limit = theta.get("saturation.limit_W", 0.0) or 1.0 / max(theta.get("saturation.per_limit_1_W", 0.0), 1e-12)
     power = limit * np.tanh(power / limit) if np.isfinite(limit) else power
-    temperature = _lag(theta.gain_K_W * power, theta.tau_s)
-    return {"temperature_K": _lag(temperature, theta.sensor_lag.lag_s)}
+    temperature = lag(theta.gain_K_W * power, theta.tau_s)
+    return {"temperature_K": lag(temperature, theta.sensor_lag.lag_s)}
 
 
-def _lag(samples, tau_s):
+def lag(samples, tau_s):
     keep = np.exp(-SAMPLE_S / tau_s) if tau_s > 0.0 else 0.0
     return lfilter([1.0 - keep], [1.0, -keep], samples)
 

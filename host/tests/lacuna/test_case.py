@@ -15,7 +15,7 @@ from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import from_elsewhere
 from lacuna.diagnosis.score import score
-from lacuna.diagnosis.search import _led_out, _with_derivatives, search
+from lacuna.diagnosis.search import led_out, search, with_derivatives
 from lacuna.diagnosis.split import split_trials
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.solve import cost_of
@@ -91,9 +91,9 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
     floor = right.fitted.problem.floor
     delayed = case.judge(fit(Structure(case.system, ("delay",)), case.split.fit, floor))
     astray = case.judge(moved(right.fitted, 0.3))
-    assert _led_out(astray, [delayed], case.split).cost < right.cost + 1.0
-    assert _led_out(astray, [], case.split) is None
-    assert _led_out(right, [delayed], case.split) is None
+    assert led_out(astray, [delayed], case.split).cost < right.cost + 1.0
+    assert led_out(astray, [], case.split) is None
+    assert led_out(right, [delayed], case.split) is None
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
     floor = base.problem.floor
     bare = judge(reweigh(fit(Structure(system, ("delay",)), split.fit, floor), floor, max_iterations=0), split, POLICY)
     assert not bare.fitted.solution.sensitivities
-    assert score(_with_derivatives(bare).fitted, ["coulomb"], NOBODY).singles()
+    assert score(with_derivatives(bare).fitted, ["coulomb"], NOBODY).singles()
 
 
 @pytest.mark.parametrize(
@@ -134,4 +134,4 @@ def test_what_has_to_be_foreseen_counts_only_where_it_is_so_of_every_pair(monkey
     )
     system = hide({})
     case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
-    assert case._exceeds(*pairs) is exceeds
+    assert case.exceeds_on_all(*pairs) is exceeds

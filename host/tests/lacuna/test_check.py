@@ -181,7 +181,7 @@ def test_refuses_to_guess_which_column_is_predicted():
 
 
 def _bare(record, theta):
-    return heater._lag(theta.gain_K_W * record["power_W"], theta.tau_s)
+    return heater.lag(theta.gain_K_W * record["power_W"], theta.tau_s)
 
 
 # -- declarations of a plain function -------------------------------------------------------------------------
@@ -336,7 +336,7 @@ def test_warns_of_a_direction_that_the_data_leave_open():
     """A gain and the scale of what it multiplies cancel."""
 
     def simulate(record, theta):
-        return {"temperature_K": heater._lag(theta.gain_K_W * theta.volts * record["power_W"], theta.tau_s)}
+        return {"temperature_K": heater.lag(theta.gain_K_W * theta.volts * record["power_W"], theta.tau_s)}
 
     parameters = (*heater.PARAMETERS, Parameter("volts", "", 1.0, 0.01, 100.0))
     said = warned(lacuna.System(simulate, parameters), heater.records(repeats=2, seed=3))
@@ -345,7 +345,7 @@ def test_warns_of_a_direction_that_the_data_leave_open():
 
 def test_warns_of_a_nuisance_at_its_limit():
     def simulate(record, theta):
-        return {"temperature_K": heater._lag(theta.gain_K_W * record["power_W"], theta.tau_s) + theta.drift_K}
+        return {"temperature_K": heater.lag(theta.gain_K_W * record["power_W"], theta.tau_s) + theta.drift_K}
 
     records = heater.records(repeats=2, seed=3)
     records["steps_4W_1"]["temperature_K"] = records["steps_4W_1"]["temperature_K"] + 5.0

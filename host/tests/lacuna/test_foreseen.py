@@ -12,8 +12,7 @@ from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
-from lacuna.diagnosis.race import _COARSE as COARSE
-from lacuna.diagnosis.race import continued
+from lacuna.diagnosis.race import COARSE, continued
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.sizes import starts
 from lacuna.diagnosis.split import split_trials

@@ -83,9 +83,9 @@ def promises(case, base):
 def test_a_race_ends_where_one_is_enough_and_runs_on_where_none_is(monkeypatch):
     case = linear({"a": 0.03})
     base = case.judge(case.fit_base(1))
-    begun, before = [], race_module._coarse
+    begun, before = [], race_module.coarse_fits
     monkeypatch.setattr(
-        race_module, "_coarse", lambda parent, some, *more: begun.extend(some) or before(parent, some, *more)
+        race_module, "coarse_fits", lambda parent, some, *more: begun.extend(some) or before(parent, some, *more)
     )
     given = promises(case, base)
     found = race(base, given, 3, split=case.split, enough=lambda c: True, crew=NOBODY)
@@ -136,7 +136,7 @@ def test_a_set_that_costs_more_than_one_it_contains_begins_from_that_one(monkeyp
     nowhere = race_module.solve(one.problem, one.problem.start(cold_starts(one)[0] + 3.0), max_iterations=0)
     monkeypatch.setattr(race_module, "cold", lambda problem, values: nowhere)
     assert nowhere.cost > base.fitted.cost
-    (found,) = race_module._coarse(base, [one], case.split, NOBODY)
+    (found,) = race_module.coarse_fits(base, [one], case.split, NOBODY)
     assert found.fitted.cost < base.fitted.cost
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lacuna.decimals import decimal
-from lacuna.records import RecordError, Table, _cell_by_cell, _numbers_alone, read, segments, windows
+from lacuna.records import RecordError, Table, cell_by_cell, numbers_alone, read, segments, windows
 
 ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
 
@@ -271,7 +271,7 @@ def test_plain_numbers_are_read_at_once_as_they_are_cell_by_cell(rows, end):
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "a.csv"
         file.write_bytes(text.encode())
-        fast, slow = _numbers_alone(file), _cell_by_cell(file)
+        fast, slow = numbers_alone(file), cell_by_cell(file)
     assert fast is not None
     assert {name: values.tolist() for name, values in fast.items()} == {n: v.tolist() for n, v in slow.items()}
 
@@ -281,4 +281,4 @@ def test_plain_numbers_are_read_at_once_as_they_are_cell_by_cell(rows, end):
 )
 def test_anything_else_is_gone_through_cell_by_cell(tmp_path, text):
     (tmp_path / "a.csv").write_text(text)
-    assert _numbers_alone(tmp_path / "a.csv") is None
+    assert numbers_alone(tmp_path / "a.csv") is None

@@ -7,7 +7,7 @@ import numpy as np
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.cores import usable_cores
-from lacuna.diagnosis.next_experiment import _expected_gain
+from lacuna.diagnosis.next_experiment import expected_gain
 from lacuna.diagnosis.sizes import sized
 from lacuna.estimation.autocorrelation import correlation_samples
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
@@ -37,7 +37,7 @@ def test_an_experiment_never_run_is_weighed_by_what_its_channel_has_had_elsewher
 
     def gain(experiment):
         trial = Record("next", experiment, "", np.arange(10.0), {"y": np.full(10, np.nan)})
-        return _expected_gain(a, b, CandidateExperiment(experiment, {}, trial), floor)
+        return expected_gain(a, b, CandidateExperiment(experiment, {}, trial), floor)
 
     assert gain("pull") == 20.0
     assert gain("step") == gain("walk") == 5.0

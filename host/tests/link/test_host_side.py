@@ -95,7 +95,7 @@ SAMPLE = {"state": 0, "pressure_mpsi": (0, 0, 0), "phase": (0, 0, 0), "command":
 def heard(uno: Uno, number: int) -> None:
     """The sample of that number arrives, as it looks on the wire."""
     wire = {"sequence": number % 65536, "time_us": (number * 10_000 + 3_000) % 2**32}
-    uno._take_sample(Report("sample", number % 256, SAMPLE | wire))
+    uno.session.on_sample(Report("sample", number % 256, SAMPLE | wire))
 
 
 class HostClock:
@@ -111,8 +111,8 @@ class HostClock:
 @given(st.lists(st.integers(1, 420_000), min_size=1, max_size=20), st.integers(0, 2**20), st.booleans())
 def test_a_pause_is_counted_however_long_it_was(gaps, first, is_asleep):
     """Up to 70 minutes, which is 6 times round the number and nearly once round the time, with the host asleep."""
-    uno, clock = Uno(Board(), HostClock()), HostClock()
-    uno._clock = clock
+    clock = HostClock()
+    uno = Uno(Board(), clock)
     number = first
     heard(uno, number)
     for gap in gaps:
@@ -128,8 +128,8 @@ def test_a_pause_is_counted_however_long_it_was(gaps, first, is_asleep):
 
 @pytest.mark.parametrize("pause_s", [328, 400, 655, 2160, 4000, 4300, 10_000, 100_000])
 def test_time_goes_on_after_a_pause(pause_s):
-    uno, clock = Uno(Board(), HostClock()), HostClock()
-    uno._clock = clock
+    clock = HostClock()
+    uno = Uno(Board(), clock)
     for number in (0, 1, 100 * pause_s, 100 * pause_s + 1):
         clock.now_s = number * 0.01 * 1.005  # an Uno's clock is good to 0.5 %
         heard(uno, number)

@@ -130,7 +130,7 @@ def test_signals_mean_afterwards_what_they_meant_before(board):
     before = [signal.getsignal(number) for number in SIGNALS]
     talk(board)
     assert [signal.getsignal(number) for number in SIGNALS] == before
-    assert leaving._death_signal() in (0, None)
+    assert leaving.death_signal() in (0, None)
 
 
 class Dying:

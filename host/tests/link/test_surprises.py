@@ -14,7 +14,7 @@ from bifa.link.frames import Report
 from bifa.link.session import Hello, Session
 from bifa.link.table import COMMANDS, REPORTS, STATES
 from bifa.live.monitor import Monitor
-from bifa.live.record import HEADER, _row
+from bifa.live.record import HEADER, telemetry_row
 from bifa.printable import printable
 from bifa.screen import Console
 from harness.board import Board
@@ -98,15 +98,15 @@ def connected() -> Uno:
 @settings(max_examples=30)
 def test_any_sample_can_be_shown_and_recorded(connected, raw):
     uno = connected
-    uno._last_sample = None
-    uno._take_sample(Report("sample", 0, frames.unpack(REPORTS["sample"], raw)))
+    uno.connect()  # no sample came before
+    uno.session.on_sample(Report("sample", 0, frames.unpack(REPORTS["sample"], raw)))
     (sample,) = uno.taken_samples()
     assert sample.state in STATES or sample.state == f"unknown ({raw[6]})"
     monitor = Monitor(uno)
     monitor.take([sample])
     with Console(width=80).capture() as _:
         Console(width=80).print(monitor.draw(80))
-    assert len(_row(uno, sample, 0)) == len(HEADER)
+    assert len(telemetry_row(uno, sample, 0)) == len(HEADER)
 
 
 @given(st.binary(min_size=43, max_size=43))
@@ -192,12 +192,12 @@ def test_an_answer_of_another_kind_is_none(board, ask):
     """Each is asked again, and then said not to have been answered."""
     uno = Uno(board, board)
     uno.connect()
-    take = uno.session._take
+    take = uno.session.take
 
     def another(report, now_s):
         take(Report("done", report.sequence, {"result": 0}) if report.name.endswith("_report") else report, now_s)
 
-    uno.session._take = another
+    uno.session.take = another
     with pytest.raises(NoAnswerError, match=r"[1-9]\d* bad frames"):
         ask(uno)
 

@@ -49,4 +49,4 @@ def test_a_robot_that_stands_and_walks_on_begins_anew(looks):
 
 
 def test_only_the_last_cycle_is_remembered_look_by_look(looks):
-    assert len(seen(looks)._path) < 1.2 * 10 * GAIT.period_s
+    assert len(seen(looks).path) < 1.2 * 10 * GAIT.period_s

@@ -68,7 +68,7 @@ def test_what_is_no_request_ends_its_page(page, live, text):
     one.send(TextMessage(text))
     assert [message for message in one.messages(5) if "id" in message] == []
     assert "that is no request" in one.closed.reason
-    assert live._pilot.stops == []
+    assert live.pilot.stops == []
 
 
 def test_bytes_end_their_page_and_do_nothing(page, live):
@@ -76,7 +76,7 @@ def test_bytes_end_their_page_and_do_nothing(page, live):
     one.state()
     one.send(BytesMessage(b'{"id": 1, "do": "stop"}'))
     assert list(one.messages(5)) == []
-    assert live._pilot.stops == []
+    assert live.pilot.stops == []
 
 
 @pytest.mark.parametrize("stop", ["false", 0, None, []])
@@ -102,7 +102,7 @@ def test_what_is_not_known_is_refused_with_what_there_is(page):
 @pytest.mark.parametrize("body", ["", "{}", "[]", "{", "[" * 100_000])
 def test_a_stop_stops_whatever_comes_with_it(port, live, body):
     assert posted(port, "stop", body) == 200
-    assert len(live._pilot.stops) == 1
+    assert len(live.pilot.stops) == 1
 
 
 @pytest.mark.parametrize("token", [None, "of-an-earlier-server"])
@@ -112,10 +112,10 @@ def test_a_stop_needs_no_token_and_all_else_does(page, port, live, token):
     assert (you["is_owner"], you["is_stale"]) == (False, token is not None)
     for name in ("run", "apply", "save", "clear", "load", "closing", "draft"):
         assert "open the page by the address" in one.answer(one.ask(name, stop=False, gait={}))["error"]
-    assert live._pilot.stops == []
+    assert live.pilot.stops == []
     assert "confirms" in one.answer(one.ask("stop"))["said"]
     assert posted(port, "stop") == 200
-    assert len(live._pilot.stops) == 2
+    assert len(live.pilot.stops) == 2
 
 
 def test_a_page_from_elsewhere_is_not_heard(page, port, live):
@@ -123,7 +123,7 @@ def test_a_page_from_elsewhere_is_not_heard(page, port, live):
     assert list(one.messages(5)) == []
     assert one.closed is not None
     assert posted(port, "stop", Host="evil.example") == 400
-    assert live._pilot.stops == []
+    assert live.pilot.stops == []
 
 
 def test_a_message_that_is_too_long_ends_its_page_alone(page):
@@ -164,7 +164,7 @@ def test_who_does_not_read_the_page_does_not_make_the_server_hold_it(port, live)
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         time.sleep(0.5)
-        [transport] = live.gate._strangers
+        [transport] = live.gate.strangers
         assert transport.get_write_buffer_size() < 300_000
         assert posted(port, "stop") == 200
 
@@ -172,15 +172,15 @@ def test_who_does_not_read_the_page_does_not_make_the_server_hold_it(port, live)
 def test_a_page_may_come_while_the_last_reports_are_waited_for(live):
     class Messages:
         def empty(self) -> bool:
-            live._pages.add(Slow())  # as another thread does
+            live.pages.add(Slow())  # as another thread does
             return True
 
     class Slow:
         messages = Messages()
 
-    live._pages.add(Slow())
+    live.pages.add(Slow())
     live.flush(0.1)
-    assert len(live._pages) > 1
+    assert len(live.pages) > 1
 
 
 def test_every_page_is_told_the_same(live, page):

@@ -5,20 +5,20 @@ import errno
 import pytest
 
 from bifa.errors import BifaError
-from bifa.live.record import RecordError, _next_file, _telemetry_file
+from bifa.live.record import RecordError, next_file, telemetry_file
 from bifa.measure import experiments
 from bifa.measure.plan import BASELINE, PlannedTrial
 
 
 def test_numbers_go_on_after_the_largest(tmp_path):
     (tmp_path / "telemetry_2.csv").touch()
-    assert _next_file(tmp_path).name == "telemetry_3.csv"
+    assert next_file(tmp_path).name == "telemetry_3.csv"
 
 
 def test_a_full_disk_leaves_whole_lines_and_is_said(tmp_path):
     path = tmp_path / "telemetry_1.csv"
     kept = pytest.raises(RecordError, match="1 samples so far are kept")
-    with kept, _telemetry_file(path) as file:
+    with kept, telemetry_file(path) as file:
         file.write("time_s\n0.01\n0.0")
         file.flush()
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -27,7 +27,7 @@ def test_a_full_disk_leaves_whole_lines_and_is_said(tmp_path):
 
 def test_a_walk_with_lost_samples_is_tried_again_and_then_refused(monkeypatch):
     lost = [2, 0, 1, 1, 1]
-    monkeypatch.setitem(experiments._RUNS, "locomotion", lambda *_: ({}, {}, lost.pop(0)))
+    monkeypatch.setitem(experiments.RUNS, "locomotion", lambda *_: ({}, {}, lost.pop(0)))
     planned = PlannedTrial("locomotion", pressure_psi=8.5, gait=BASELINE, cycles=1)
     assert experiments.record_trial(None, None, planned).columns == {}
     with pytest.raises(BifaError, match="3 times over: 1 samples were lost"):

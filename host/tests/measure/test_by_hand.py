@@ -146,7 +146,7 @@ def test_what_seems_to_be_a_mistake_is_said_while_it_can_be_put_right(bench, tmp
 
 def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_path):
     here = bench()
-    save, tries = here.lab._save, []
+    save, tries = here.lab.save, []
 
     def save_badly_first(asked):
         save(asked) if not tries else None
@@ -156,7 +156,7 @@ def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_pat
             path.write_text(tries[0].replace("force_N", "Load (N)"))
         return ""
 
-    here.lab._save = save_badly_first
+    here.lab.save = save_badly_first
     say = here.said.append
 
     def corrected(text):
@@ -216,7 +216,7 @@ def test_a_word_that_is_no_answer_neither_keeps_nor_discards(bench, tmp_path):
 
 def test_a_trial_that_was_stopped_is_not_kept_and_is_tried_again_once_somebody_says_so(bench, tmp_path):
     here = bench()
-    move, moved = here.lab._move, []
+    move, moved = here.lab.move, []
 
     def stop_once(asked):
         if not moved:
@@ -224,7 +224,7 @@ def test_a_trial_that_was_stopped_is_not_kept_and_is_tried_again_once_somebody_s
         moved.append(1)
         return move(asked)
 
-    here.lab._move = stop_once
+    here.lab.move = stop_once
     assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
     assert "Not usable: " in "\n".join(here.said)
     assert "the robot was stopped instead of holding" in "\n".join(here.said)

@@ -14,31 +14,44 @@ from bifa.measure.plan import PlannedTrial
 from harness.exports import EXPORTS
 
 
+class Typing(Desk):
+    """A desk at which these lines are typed, each in answer to a question."""
+
+    def __init__(self, say, *lines):
+        super().__init__(say)
+        self.lines = list(lines)
+
+    def answer(self):
+        return self.lines.pop(0) if self.lines else None
+
+
 @pytest.fixture
 def said():
     return []
 
 
-@pytest.fixture
-def instruments(said, tmp_path):
-    own = OwnInstruments(Desk(said.append))
-    own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 2, 2), tmp_path / "raw")
-    own._experiment = "anchor_pull"
+def recorded(own, kept):
+    """Have a pull mounted, started and its record asked for."""
+    own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 2, 2), kept)
+    own.mount("anchor_pull")
+    own.start()
+    own.save()
     return own
 
 
 @pytest.mark.parametrize("typed", ["~nouser/x.csv", "x" * 400])
-def test_a_path_that_cannot_be_is_no_file(instruments, said, typed):
-    assert not instruments._take_named(typed)
+def test_a_path_that_cannot_be_is_no_file(said, tmp_path, typed):
+    assert not recorded(OwnInstruments(Typing(said.append, typed)), tmp_path / "raw").ready
     assert "There is no file" in said[-1]
 
 
-def test_an_earlier_trials_record_is_refused(instruments, said, tmp_path):
+def test_an_earlier_trials_record_is_refused(said, tmp_path):
     (tmp_path / "raw").mkdir()
     for path in (tmp_path / "raw" / "anchor_first.csv", tmp_path / "again.csv"):
         path.write_text("time_s,displacement_mm,force_N\n1,2,3\n2,3,4\n")
         path.with_suffix(".sync.csv").write_text("sync_time_s\n1\n2\n")
-    assert not instruments._take_named(str(tmp_path / "again.csv"))
+    typing = Typing(said.append, str(tmp_path / "again.csv"))
+    assert not recorded(OwnInstruments(typing), tmp_path / "raw").ready
     assert "an earlier trial, anchor_first.csv" in said[-1]
 
 
@@ -56,24 +69,19 @@ def watching(said, tmp_path):
         folder = tmp_path / "records"
         folder.mkdir()
         (tmp_path / "bench.toml").write_text(declaration)
-        own = OwnInstruments(Desk(said.append), folder, partial(read_exports, tmp_path / "bench.toml"))
-        own._declared = own._exports()
-        own.begin(Turn(PlannedTrial("anchor_pull", None, 8.5, 20.0), 1, 1), tmp_path / "raw")
-        own._experiment = "anchor_pull"
-        own._step = "start"
-        own._known, own._told = dict(own._signatures()), dict(own._alone())
-        own._step = "save"
+        own = OwnInstruments(Typing(said.append), folder, partial(read_exports, tmp_path / "bench.toml"))
+        recorded(own, tmp_path / "raw")
+        said.clear()
         return own, folder
 
     return begin
 
 
-def looked(own, until, seconds=2.0):
-    """Look as a session does, until something is so; False if it is not in time."""
+def looked(own, until=lambda: False, seconds=2.0):
+    """Look as a session does, until there is a record or something is so; False if it is not in time."""
     ends = time.monotonic() + seconds
     while time.monotonic() < ends:
-        own._take_new()
-        if until():
+        if own.ready or until():
             return True
         time.sleep(0.1)
     return False
@@ -87,7 +95,7 @@ def test_a_declared_record_is_seen_by_any_suffix_and_in_subfolders(watching, sai
     path = folder / place / f"pull{EXPORTS[name].suffix}"
     path.write_bytes(EXPORTS[name].write(RECORD))
     path.with_suffix(".sync.csv").write_text(SYNC)
-    assert looked(own, lambda: own._record is not None), said
+    assert looked(own), said
     np.testing.assert_allclose(own.stop()["force_N"], RECORD["force_N"], atol=2e-3)
     own.keep(folder.parent / "raw")
     kept = {file.name for file in (folder.parent / "raw").iterdir()}
@@ -103,7 +111,7 @@ def test_a_workbook_is_seen(watching, said):
     table = pandas.DataFrame(dict(zip("txF", RECORD.values(), strict=True)))
     (folder / "pull.sync.csv").write_text(SYNC)
     table.to_excel(folder / "pull.xlsx", index=False)
-    assert looked(own, lambda: own._record is not None), said
+    assert looked(own), said
 
 
 @pytest.mark.parametrize(
@@ -146,7 +154,7 @@ def test_a_record_that_has_its_own_sync_needs_no_second_file(watching, said):
     high = (millis % 10 < 3) * 5
     rows = "".join(f"{t},{t / 100:.3f},{t / 50:.3f},{v}\n" for t, v in zip(millis, high, strict=True))
     (folder / "log.txt").write_text("millis,position_mm,force_N,d10\n" + rows)
-    assert looked(own, lambda: own._record is not None), said
+    assert looked(own), said
     np.testing.assert_allclose(np.diff(own.stop()["sync_time_s"]), 0.01)
 
 
@@ -158,4 +166,4 @@ def test_a_declaration_may_be_put_right_while_its_file_waits(watching, said, tmp
     (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testexpert"\n')
     assert looked(own, lambda: "'testexpert' is unknown" in said[-1])
     (tmp_path / "bench.toml").write_text('[instrument.machine]\npreset = "testxpert"\n')
-    assert looked(own, lambda: own._record is not None), said
+    assert looked(own), said

@@ -167,7 +167,7 @@ def test_a_quick_session_measures_what_a_verdict_needs():
 def first_strobe_s(rig):
     """When the board's first strobe rises, on the bench's own clock: nobody has counted yet."""
     rig.instruments.start()
-    clock = rig.instruments._clock
+    clock = rig.instruments.clock
     rig.clock.sleep(0.05)
     return true_s(clock, rig.instruments.stop()["sync_time_s"])[0]
 
@@ -187,7 +187,7 @@ def test_every_edge_is_the_sample_that_the_uno_says(seed):
         for _ in range(10):
             rig.clock.sleep(0.001)
             with Recording(bench_of(rig), uno) as tape:
-                clock = rig.instruments._clock
+                clock = rig.instruments.clock
                 tape.wait(0.5)
             edges_s = tape.record["sync_time_s"]
             truth_s = 0.01 + (true_s(clock, edges_s) - first_s) * uno_rate

@@ -51,9 +51,9 @@ def no_cache(tmp_path, monkeypatch) -> Path:
     (tmp_path / "tmp").mkdir()
     monkeypatch.setenv("BIFA_CACHE_DIR", str(tmp_path / "file" / "cache"))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
-    generated._temporary_folder.cache_clear()
+    generated.temporary_folder.cache_clear()
     yield tmp_path / "tmp"
-    generated._temporary_folder.cache_clear()
+    generated.temporary_folder.cache_clear()
 
 
 def _privately(folder: Path) -> bool:
@@ -64,14 +64,14 @@ def test_without_a_cache_code_lives_in_a_private_temporary_folder(no_cache):
     folder = generated.folder()
     assert folder.parent == no_cache
     assert _privately(folder)
-    generated._temporary_folder.cache_clear()
+    generated.temporary_folder.cache_clear()
     assert generated.folder() == folder, "another process finds what was compiled"
 
 
 def test_code_is_not_taken_from_a_temporary_folder_that_others_may_write(no_cache):
     planted = generated.folder()
     planted.chmod(0o777)
-    generated._temporary_folder.cache_clear()
+    generated.temporary_folder.cache_clear()
     assert generated.folder() != planted
     assert _privately(generated.folder())
     assert generated.folder() == generated.folder()
@@ -82,7 +82,7 @@ def test_nor_through_a_link_that_others_may_lead_elsewhere(no_cache, tmp_path):
     generated.folder().rmdir()
     planted = no_cache / f"bifa-{generated.os.getuid()}"
     planted.symlink_to(tmp_path / "private")
-    generated._temporary_folder.cache_clear()
+    generated.temporary_folder.cache_clear()
     assert generated.folder() != planted
 
 

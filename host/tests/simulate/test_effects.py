@@ -149,7 +149,7 @@ def with_new_effect(monkeypatch):
         found = dict(effects.modules()) | {"swelling": _new_effect(**functions)}
         monkeypatch.setattr(effects, "modules", lambda: found)
         monkeypatch.setattr(effects, "library", lambda: {name: module.EFFECT for name, module in found.items()})
-        for cached in (layout._indices, layout._slots, layout.effect_bit):
+        for cached in (layout.parameter_indices, layout.effect_slots, layout.effect_bit):
             monkeypatch.setattr(layout, cached.__name__, inspect.unwrap(cached))
         return hooks.chain_source()
 

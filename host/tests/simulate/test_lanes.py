@@ -103,7 +103,7 @@ def test_static_loadings_are_those_of_numba(effect, actuator, found):
     mounted = [rigs.stand(p, actuator, 4.0) for p in plants]
     got = found[0].load(plants, mounted, paths, TIME_S)
     for plant, rig, path, rows in zip(plants, mounted, paths, got, strict=True):
-        expected = entries.static_record(lanes._sealed(plant), rig, layout.state_size(), path, TIME_S).T
+        expected = entries.static_record(lanes.sealed_plant(plant), rig, layout.state_size(), path, TIME_S).T
         np.testing.assert_allclose(rows, expected, atol=1e-9)
 
 

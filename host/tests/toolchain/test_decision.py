@@ -15,8 +15,8 @@ def world(core_dir, monkeypatch):
     monkeypatch.delenv("PLATFORMIO_CORE_DIR", raising=False)
     monkeypatch.setattr(sys, "argv", ["provision"])
     monkeypatch.setattr(provisioning, "CORE_DIR", core_dir)
-    monkeypatch.setattr(provisioning, "_install_from_registry", lambda: done.append("registry"))
-    monkeypatch.setattr(provisioning, "_install_avr_tools", lambda: done.append("avr"))
+    monkeypatch.setattr(provisioning, "install_from_registry", lambda: done.append("registry"))
+    monkeypatch.setattr(provisioning, "install_avr_tools", lambda: done.append("avr"))
     monkeypatch.setattr(stand_ins, "lay_out", lambda folder: done.append("stand-ins"))
     return done
 

@@ -62,7 +62,7 @@ def test_instructions_that_are_not_there_are_not_asked_for(monkeypatch):
 
 @pytest.mark.parametrize("own", ["Haswell", "Zen", "SkylakeX", "Nehalem", "Prescott"])
 def test_another_blas_is_not_this_machines_own_nor_its_twin(own, monkeypatch):
-    monkeypatch.setattr(portability, "_features", lambda: {"features": ["SSE42", "AVX2", "AVX512_SKX"]})
+    monkeypatch.setattr(portability, "features", lambda: {"features": ["SSE42", "AVX2", "AVX512_SKX"]})
     kernel = portability.another_blas({"blas": [own]}).kernel
     assert kernel in portability.KERNELS
     assert kernel != portability.ALIKE.get(own, own)

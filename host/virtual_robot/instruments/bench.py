@@ -48,7 +48,7 @@ class Instruments:
         self._random = random
         self._clock_resolution_s = clock_resolution_s
         self.mounted_s = 0.0
-        self._clock: InstrumentClock | None = None
+        self.clock: InstrumentClock | None = None
         self._experiment = "locomotion"
         self._settings = dict(_SETTINGS["locomotion"])
 
@@ -60,7 +60,7 @@ class Instruments:
         """
         self._settings = _checked(experiment, settings)
         self._experiment = experiment
-        self._clock = None
+        self.clock = None
         self._plant.set_trial(
             friction_factor=float(1.0 + self._wobble * self._random.standard_normal()),
             inclination_deg=self._settings.get("inclination_deg", 0.0),
@@ -75,8 +75,8 @@ class Instruments:
         """Begin a record: camera at 100 Hz, machines at 50 Hz, by the instrument's own clock."""
         self._plant.advance(self._now_s)
         self._plant.take_strobes()
-        self._clock = InstrumentClock.draw(self._now_s, self._random, resolution_s=self._clock_resolution_s)
-        period_s = self._clock.true_period(1.0 / self._rate_hz)
+        self.clock = InstrumentClock.draw(self._now_s, self._random, resolution_s=self._clock_resolution_s)
+        period_s = self.clock.true_period(1.0 / self._rate_hz)
         self._plant.watch(period_s, self._now_s + float(self._random.uniform(0.0, period_s)))
 
     def move(self) -> None:
@@ -96,13 +96,13 @@ class Instruments:
     def stop(self) -> dict[str, np.ndarray]:
         """End the record: `time_s` and `sync_time_s` (rising edges of the strobe) by its own clock, and what it
         measured: displacement_head_mm and displacement_tail_mm (locomotion), displacement_mm, force_N."""
-        if self._clock is None:
+        if self.clock is None:
             raise StandError("no record has been started")
         self._plant.advance(self._now_s)
         rows = self._plant.take_watched()
         strobes = self._plant.take_strobes()
         self._plant.watch(0.0, 0.0)
-        clock, self._clock = self._clock, None
+        clock, self.clock = self.clock, None
         jitter = _SYNC_JITTER_S * self._random.standard_normal(len(strobes))
         return {
             "time_s": clock.own(rows["time_s"]),

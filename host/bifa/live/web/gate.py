@@ -23,7 +23,7 @@ class Gate:
 
     def __init__(self, most_strangers: int = MOST_STRANGERS) -> None:
         self._most_strangers = most_strangers
-        self._strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # the oldest first
+        self.strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # the oldest first
 
         class Http(H11Protocol):
             def connection_made(http, transport: Any) -> None:  # noqa: N805
@@ -47,25 +47,25 @@ class Gate:
 
     def prove(self, client: tuple[str, int]) -> None:
         """Whoever is connected from `client` has shown the token."""
-        for transport in [t for t in self._strangers if t.get_extra_info("peername") == tuple(client)]:
+        for transport in [t for t in self.strangers if t.get_extra_info("peername") == tuple(client)]:
             self._forget(transport)
 
     def _enter(self, http: H11Protocol) -> None:
-        while len(self._strangers) >= self._most_strangers:
-            self._end(next(iter(self._strangers)))
+        while len(self.strangers) >= self._most_strangers:
+            self._end(next(iter(self.strangers)))
         loop = asyncio.get_running_loop()
-        self._strangers[http.transport] = loop.call_later(HEADERS_WITHIN_S, self._look_for_headers, http)
+        self.strangers[http.transport] = loop.call_later(HEADERS_WITHIN_S, self._look_for_headers, http)
 
     def _look_for_headers(self, http: H11Protocol) -> None:
         transport = http.transport
         if http.scope is None:
             self._end(transport)
-        elif transport in self._strangers:
+        elif transport in self.strangers:
             left_s = ANSWERED_WITHIN_S - HEADERS_WITHIN_S
-            self._strangers[transport] = asyncio.get_running_loop().call_later(left_s, self._end, transport)
+            self.strangers[transport] = asyncio.get_running_loop().call_later(left_s, self._end, transport)
 
     def _watches(self, transport: asyncio.Transport) -> None:
-        if timer := self._strangers.get(transport):
+        if timer := self.strangers.get(transport):
             timer.cancel()
 
     def _end(self, transport: asyncio.Transport) -> None:
@@ -73,5 +73,5 @@ class Gate:
         transport.abort()
 
     def _forget(self, transport: asyncio.Transport) -> None:
-        if timer := self._strangers.pop(transport, None):
+        if timer := self.strangers.pop(transport, None):
             timer.cancel()

@@ -92,10 +92,10 @@ class LivePage:
 
     def __init__(self, pilot: Pilot, page: str, model: Model) -> None:
         """page: the HTML document; model: what predicts the speeds."""
-        self._pilot, self._page, self._foretelling = pilot, page.encode(), Foretelling(model)
+        self.pilot, self._page, self._foretelling = pilot, page.encode(), Foretelling(model)
         self.token = secrets.token_urlsafe(16)
         self.gate = Gate()
-        self._pages: set[Page] = set()
+        self.pages: set[Page] = set()
         self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
@@ -117,7 +117,7 @@ class LivePage:
 
     def is_watched(self) -> bool:
         """Whether a page is open whose owner would see what it shows; from any thread."""
-        return any(page.is_owner for page in list(self._pages))
+        return any(page.is_owner for page in list(self.pages))
 
     def tell(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
         """To every page; from any thread."""
@@ -129,7 +129,7 @@ class LivePage:
         """Wait until every page has been told everything, or `timeout_s`."""
         until_s = time.monotonic() + timeout_s
         time.sleep(_HANDED_OVER_S)
-        while any(not page.messages.empty() for page in list(self._pages)) and time.monotonic() < until_s:
+        while any(not page.messages.empty() for page in list(self.pages)) and time.monotonic() < until_s:
             time.sleep(_HANDED_OVER_S)
 
     def app(self) -> Starlette:
@@ -154,7 +154,7 @@ class LivePage:
 
     def _change(self, changes: Mapping[str, Any], samples: list[dict[str, Any]] | None = None) -> None:
         message = json.dumps(self.state.change(changes, samples))
-        for page in self._pages:
+        for page in self.pages:
             page.tell(message)
 
     def _draft(self, gait: dict[str, float], by: int) -> str:
@@ -200,7 +200,7 @@ class LivePage:
             self.gate.prove(socket.client)
         you = {"number": page.number, "is_owner": page.is_owner, "is_stale": bool(given) and not page.is_owner}
         page.tell({"you": you} | self.state.whole())
-        self._pages.add(page)
+        self.pages.add(page)
         sending = asyncio.create_task(_send(socket, page))
         try:
             while True:
@@ -211,7 +211,7 @@ class LivePage:
             await _refused(socket, str(error))
         finally:
             sending.cancel()
-            self._pages.discard(page)
+            self.pages.discard(page)
             if page.is_owner and not self.is_watched():
                 asyncio.get_running_loop().call_later(_BACK_WITHIN_S, self._closed)
 
@@ -219,7 +219,7 @@ class LivePage:
         """The last page is gone, and nobody has come back. A robot that stands is left alone."""
         moves = self.state.content["robot"] in MOVING
         if moves and self.state.content["stops_when_closed"] and not self.is_watched():
-            self._pilot.stop("the last page was closed").add_done_callback(_seen)
+            self.pilot.stop("the last page was closed").add_done_callback(_seen)
 
     # -- asking -----------------------------------------------------------------------------------------------
 
@@ -239,8 +239,8 @@ class LivePage:
 
     def _do(self, page: Page, number: Any, name: str, asked: Mapping[str, Any]) -> None:
         acts: dict[str, Callable[[], Awaitable[str] | str]] = {
-            "run": lambda: _waited(self._pilot.ask(lambda uno: uno.run()), "walking"),
-            "clear": lambda: _waited(self._pilot.ask(lambda uno: uno.clear()), "released: it may walk again"),
+            "run": lambda: _waited(self.pilot.ask(lambda uno: uno.run()), "walking"),
+            "clear": lambda: _waited(self.pilot.ask(lambda uno: uno.clear()), "released: it may walk again"),
             "apply": lambda: self._apply(_gait(asked)),
             "save": lambda: self._save(_gait(asked), str(asked.get("preset", ""))),
             "load": lambda: self._load(str(asked.get("preset", ""))),
@@ -268,12 +268,12 @@ class LivePage:
         task.add_done_callback(page.answers.discard)
 
     def _apply(self, gait: Gait) -> Awaitable[str]:
-        done = self._pilot.ask(lambda uno: uno.upload(gait.as_dict()), changes=True)
+        done = self.pilot.ask(lambda uno: uno.upload(gait.as_dict()), changes=True)
         return _waited(done, "applied; a walking robot takes it at its next cycle")
 
     def _save(self, gait: Gait, name: str) -> Awaitable[str]:
         return _waited(
-            self._pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=name), changes=True), f"saved as {name}"
+            self.pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=name), changes=True), f"saved as {name}"
         )
 
     def _load(self, preset: str) -> Awaitable[str]:
@@ -281,7 +281,7 @@ class LivePage:
             uno.load(preset)
             return uno.parameters()
 
-        loaded = self._pilot.ask(load, changes=True)
+        loaded = self.pilot.ask(load, changes=True)
 
         async def shown() -> str:
             said = await _waited(loaded, f"loaded {preset}; a walking robot takes it at its next cycle")
@@ -299,7 +299,7 @@ class LivePage:
 
     def _stop(self, by: str) -> Awaitable[str]:
         """Sent when this returns; the answer comes when the Uno has confirmed."""
-        future = self._pilot.stop(by)
+        future = self.pilot.stop(by)
 
         async def confirmed() -> str:
             await asyncio.wait_for(asyncio.shield(asyncio.wrap_future(future)), _ANSWER_S)

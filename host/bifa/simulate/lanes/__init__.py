@@ -94,13 +94,13 @@ def load(
     if found is None:
         size = layout.state_size()
         return [
-            entries.static_record(_sealed(plant), rig, size, path, sample_s).T
+            entries.static_record(sealed_plant(plant), rig, size, path, sample_s).T
             for plant, rig, path in zip(plants, rigs, paths_m, strict=True)
         ]
     return found[len(plants) < _WORTH_LANES].load(plants, rigs, paths_m, sample_s)
 
 
-def _sealed(plant: Plant) -> Plant:
+def sealed_plant(plant: Plant) -> Plant:
     """The same with tables that are read-only, as they are no longer after a journey between processes: numba would
     compile everything once more for those that can be written."""
     return plant._replace(body_curve=sealed(plant.body_curve.view()), small_curve=sealed(plant.small_curve.view()))
@@ -108,7 +108,7 @@ def _sealed(plant: Plant) -> Plant:
 
 def in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
     times, chamber, command = what.switches[k]
-    place = (_sealed(plant), what.rigs[k], layout.state_size())
+    place = (sealed_plant(plant), what.rigs[k], layout.state_size())
     end = (what.sample_s[k], what.tolerance_m)
     if what.kind == STEP:
         return entries.step_record(*place, times, command, *end).T

@@ -1,0 +1,57 @@
+"""Tests come in by the public door: python tools/private.py. They use no name that begins with an underscore."""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+TESTS = ROOT / "host" / "tests"
+PATCHED = re.compile(r"(?:bifa|lacuna|harness|benchmarks|virtual_robot)\..*\._[a-z]\w*|_[a-z]\w*")
+OF_TUPLES = {"_replace", "_asdict", "_fields"}  # public, whatever they are called
+
+
+def main() -> int:
+    """Say where a test uses a name that its owner keeps to itself."""
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {name} is private: test it through what is public, or make it public"
+        for path in sorted(TESTS.rglob("*.py"))
+        for line, name in private_names(ast.parse(path.read_text("utf-8")))
+    ]
+    print("\n".join(found), end="\n" if found else "")
+    return 1 if found else 0
+
+
+def private_names(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Lines and names of what is imported, read or patched from elsewhere and begins with an underscore; what a file
+    defines itself is its own."""
+    own = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute) and _is_own(node.value)}
+    own |= {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            yield from ((node.lineno, alias.name) for alias in node.names if _is_private(alias.name))
+        elif isinstance(node, ast.Attribute) and _is_private(node.attr) and node.attr not in own | OF_TUPLES:
+            yield node.lineno, ast.unparse(node)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("setattr", "setitem", "patch")):
+            yield from ((node.lineno, text.value) for text in node.args if _is_patched(text))
+
+
+def _is_own(value: ast.expr) -> bool:
+    return isinstance(value, ast.Name) and value.id in ("self", "cls")
+
+
+def _is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__")
+
+
+def _is_patched(argument: ast.expr) -> bool:
+    return (
+        isinstance(argument, ast.Constant)
+        and isinstance(argument.value, str)
+        and bool(PATCHED.fullmatch(argument.value))
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
