@@ -1,13 +1,15 @@
 """How far gait searches end from the best that is known, robot by robot and seed by seed.
 
-    python -m benchmarks.regret [--robots 60] [--seeds 5] [--models DIR] [--long 5] [--records FILE] [--print]
+    python -m benchmarks.regret [--robots 60] [--seeds 5] [--long 5] [--fully 60] [--models DIR]
+                               [--records FILE] [--print]
 
 Robots: the nominal one and the strong push, then specimens (5 % in every parameter) with each effect of the library at
 its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model file below
 DIR. The best known of a robot is the best of all its runs: of every seed, of `--long` searches of five times the
 budget, and of the peers (differential evolution, SciPy's DIRECT and SHGO) on as many evaluations as the search took in
-the mean. (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) FILE
-has a line for each robot, with which an interrupted run goes on.
+the mean. (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust
+searches and peers take ten times as long as nominal searches: `--fully` says on how many of the robots, evenly spread,
+they are tried. FILE has a line for each robot, with which an interrupted run goes on.
 """
 
 from __future__ import annotations
@@ -65,11 +67,14 @@ def specimen(seed: int) -> Model:
     return nominal().with_values(values)
 
 
-def searched(model: Model, settings: Settings, seeds: Sequence[int], long: int, runs: Simulations) -> dict[str, Any]:
+def searched(
+    model: Model, settings: Settings, seeds: Sequence[int], long: int, runs: Simulations, fully: bool = True
+) -> dict[str, Any]:
     """Speeds of each seed, nominal and robust, of the long runs and of the peers; processor seconds a search, and how
-    many evaluations a nominal one took in the mean, which the peers have as well."""
+    many evaluations a nominal one took in the mean, which the peers have as well. Not `fully`: the nominal ones only.
+    """
     record: dict[str, Any] = {}
-    for kind, robust in (("nominal", False), ("robust", True)):
+    for kind, robust in (("nominal", False), ("robust", True))[: 1 + fully]:
         start = time.process_time()
         own = [_found(model, replace(settings, robust=robust, seed=seed, spread=SPREAD), runs) for seed in seeds]
         record[kind] = [speed for speed, _ in own]
@@ -78,6 +83,8 @@ def searched(model: Model, settings: Settings, seeds: Sequence[int], long: int, 
             record["evaluations"] = round(mean(evaluations for _, evaluations in own)) or EVALUATIONS["cma"]
         more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=SPREAD)
         record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
+    if not fully:
+        return record
     budget = record["evaluations"]
     record["de"] = _found(model, replace(settings, robust=False, method="de", evaluations=budget), runs)[0]
     for name, minimize in PEERS.items():
@@ -125,8 +132,8 @@ def peer(minimize: Callable[..., object], model: Model, settings: Settings, budg
 def regrets(record: dict) -> list[float]:
     """Of every seed, nominal and robust, the part by which it is slower than the best known."""
     found = []
-    for kind in ("nominal", "robust"):
-        others = [record[name] for name in ("de", *PEERS)] if kind == "nominal" else []
+    for kind in (kind for kind in ("nominal", "robust") if kind in record):
+        others = [record[name] for name in ("de", *PEERS) if name in record] if kind == "nominal" else []
         best = max([*record[kind], *record[f"{kind}_long"], *others])
         found += [0.0 if best <= 0.0 else 1.0 - speed / best for speed in record[kind]]
     return found
@@ -136,9 +143,12 @@ def row(name: str, record: dict) -> str:
     """A line of the table: the worst of the seeds and the best known, nominal and robust; the peers."""
     text = f"{name:34}"
     for kind in ("nominal", "robust"):
+        if kind not in record:
+            text += 25 * " "
+            continue
         best = max([*record[kind], *record[f"{kind}_long"]])
         text += f"{min(record[kind]):9.2f}{best:9.2f}{record[f'{kind}_s']:7.1f}"
-    peers = "".join(f"{record[name]:9.2f}" for name in ("de", *PEERS))
+    peers = "".join(f"{record[name]:9.2f}" if name in record else 9 * " " for name in ("de", *PEERS))
     return text + f"{record['evaluations']:8}{peers}{100 * max(regrets(record)):9.2f}"
 
 
@@ -151,21 +161,29 @@ HEADING = (
 
 
 def run(
-    count: int, seeds: int, long: int, models: Path | None = None, kept: Path | None = None, only_print: bool = False
+    count: int,
+    seeds: int,
+    long: int,
+    models: Path | None = None,
+    kept: Path | None = None,
+    only_print: bool = False,
+    every: int | None = None,
 ) -> dict[str, float]:
-    """Print the table, a line as each robot ends; returns the figures flat. Ctrl-C sums up what there is."""
+    """Print the table, a line as each robot ends; returns the figures flat. Ctrl-C sums up what there is. `every`: how
+    many of them are searched fully; None: all."""
     known = lines.read(kept, lambda record: record["robot"]) if kept else {}
     print(HEADING)
     found: list[dict] = []
+    every = count if every is None else every
     try:
         with simulations() as runs:
-            for name, model, settings in robots(count, models):
+            for number, (name, model, settings) in enumerate(robots(count, models)):
                 record = known.get(name)
                 if record is None and only_print:
                     continue
                 if record is None:
-                    record = {"robot": name} | searched(model, settings, range(seeds), long, runs)
-                    known[name] = record
+                    fully = number * every // count > (number - 1) * every // count
+                    known[name] = record = {"robot": name} | searched(model, settings, range(seeds), long, runs, fully)
                     if kept:
                         lines.write(kept, known.values())
                 found.append(record)
@@ -179,7 +197,10 @@ def summed_up(found: Sequence[dict]) -> dict[str, float]:
     """Worst regret and the share of searches over one per cent; printed and returned."""
     every = [regret for record in found for regret in regrets(record)]
     worst, share = max(every), mean(regret > ALLOWED for regret in every)
-    print(f"regret over {len(every)} searches: worst {100 * worst:.2f} %, over 1 %: {100 * share:.1f} %")
+    print(
+        f"regret over {len(every)} searches of {len(found)} robots: worst {100 * worst:.2f} %, "
+        f"over 1 %: {100 * share:.1f} %"
+    )
     return {"gait_regret_worst": worst, "gait_regret_share_over_1_percent": share, "gait_regret_robots": len(found)}
 
 
@@ -190,11 +211,12 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=ROBOTS)
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--long", type=int, default=LONG, help="searches of five times the budget, of each kind")
+    parser.add_argument("--fully", type=int, help="of how many robots robust searches and peers as well; default: all")
     parser.add_argument("--models", type=Path, help="folder below which model-*.toml are searched as well")
     parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
     parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
     options = parser.parse_args()
-    run(options.robots, options.seeds, options.long, options.models, options.records, options.print)
+    run(options.robots, options.seeds, options.long, options.models, options.records, options.print, options.fully)
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ EXPLORE = Round(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    Round(64, 0.0625, 0.97, 3e-5, (0.0, 0.02, 0.04), 250, 0.04),
+    Round(64, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 350, 0.05),
     Round(192, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 150, 0.015),
 )
 _SHORTLIST = Round(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))

@@ -19,7 +19,7 @@ from lacuna.estimation.fit import Fit
 from lacuna.system import Channels
 
 _AS_EXPECTED = 5  # runs that count as having varied by what is expected beforehand
-_SIDE = 0.95  # below the upper end of an interval of 90 %, where t and normal distribution are made to meet
+_SIDE = 0.95  # of a distribution is below the upper end of its 90 % interval
 _LAST = 50  # samples of a walk, over which its end is averaged
 
 
@@ -113,8 +113,7 @@ def _joined(residual: Channels, quantity: str) -> np.ndarray:
 
 
 def _speed(fit: Fit) -> float:
-    """By what part of the way walks end ahead of or behind the model, alike in every repeat. Few gaits tell an RMS
-    badly: Student's t of as many says how far off the next gait may be."""
+    """By what part of the way walks end ahead of or behind the model, alike in every repeat."""
     ways = {w.name: _end(w.channels) for w in fit.problem.trials if w.experiment == WALK}
     residuals = fit.residuals()
     conditions: dict[object, list[np.ndarray]] = {}
@@ -123,11 +122,16 @@ def _speed(fit: Fit) -> float:
             off = np.array([_end(residuals[trial.name]) / ways[trial.name]])
             if np.isfinite(off).all():
                 conditions.setdefault(trial.condition, []).append(off)
-    shared = [shared_square(repeats) for repeats in conditions.values()]
-    if not shared:
+    return of_few([shared_square(repeats) for repeats in conditions.values()])
+
+
+def of_few(squares: Sequence[float]) -> float:
+    """Standard deviation of which a normal distribution has the same 90 % interval as Student's t, which says how far
+    off the next gait may be: a few tell an RMS badly. 0 of none."""
+    if not squares:
         return 0.0
-    wider = t.ppf(_SIDE, len(shared)) / norm.ppf(_SIDE)
-    return float(wider * np.sqrt(max(float(np.mean(shared)), 0.0)))
+    wider = t.ppf(_SIDE, len(squares)) / norm.ppf(_SIDE)
+    return float(wider * np.sqrt(max(float(np.mean(squares)), 0.0)))
 
 
 def _end(channels: Channels) -> float:

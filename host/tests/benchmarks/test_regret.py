@@ -29,6 +29,12 @@ def test_regret_is_against_the_best_of_all_runs_and_peers():
     assert row.split()[-5:] == ["1500", "23.20", "11.00", "12.00", f"{100 * max(found):.2f}"]
 
 
+def test_a_robot_that_was_not_searched_fully_counts_with_its_nominal_searches():
+    record = {key: RECORD[key] for key in ("robot", "nominal", "nominal_s", "nominal_long", "evaluations")}
+    assert regret.regrets(record) == pytest.approx([1.0 - 23.0 / 23.1, 1.0 - 22.0 / 23.1])
+    assert len(regret.row("nominal", record)) == len(regret.row("nominal", RECORD))
+
+
 @pytest.mark.parametrize("name", ["direct", "shgo"])
 def test_a_peer_has_no_more_than_its_budget_and_is_judged_by_the_finer_metric(name):
     spent = []
