@@ -14,6 +14,7 @@ import numpy as np
 
 from lacuna.coordinates import PLAIN, Coordinate, of_effect, of_parameter
 from lacuna.errors import DeclarationError, LacunaError, MisuseError
+from lacuna.held import Held
 from lacuna.records import Stretch
 from lacuna.system import (
     LEARNT,
@@ -72,6 +73,8 @@ class FunctionSystem(System):
     - `experiments`: `CandidateExperiment`s that could be run next.
     - `spare`: conditions that are never fitted, so that they judge; () for none. By default, of three or more repeated
       conditions the one in the middle.
+    - `fixed`: values of parameters that are known and not fitted. `tied`: parameters that always equal another one,
+      which it names. Of the base model, or what shapes an effect (`coulomb.speed_m_s`), not what sizes it.
 
     Raises DeclarationError if names conflict.
     """
@@ -95,6 +98,8 @@ class FunctionSystem(System):
         curves: Iterable[CorrectionSite] = (),
         experiments: Iterable[CandidateExperiment] = (),
         spare: Iterable[Hashable] | None = None,
+        fixed: Mapping[str, float] | None = None,
+        tied: Mapping[str, str] | None = None,
     ):
         self.simulate, self.name = simulate, name or getattr(simulate, "__name__", "system")
         self.outputs = (outputs,) if isinstance(outputs, str) else tuple(outputs)
@@ -105,16 +110,20 @@ class FunctionSystem(System):
         _check_names([p.name for p in given], "parameter")
         _check_names([e.name for e in library], "effect")
         _all_different([*(p.name for p in given), *(e.name for e in library), *(s.name for s in sites)], "name")
-        for p in given:
+        self.held = Held(dict(fixed or {}), dict(tied or {}))
+        self.held.check(given, library)
+        free = self.held.free(given)
+        for p in free:
             if p.at_least is not None:
-                _check_known(f"at_least of {p.name}", [p.at_least], [q.name for q in given], "is no parameter")
-        ordered = {p.name for p in given if p.at_least} | {p.at_least for p in given}
-        self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in given}
-        self.parameters = tuple(self._coordinates[p.name].of(p) for p in given)
+                _check_known(f"at_least of {p.name}", [p.at_least], [q.name for q in free], "is not fitted")
+        ordered = {p.name for p in free if p.at_least} | {p.at_least for p in free}
+        self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in free}
+        self.parameters = tuple(self._coordinates[p.name].of(p) for p in free)
         self.effects: dict[str, Effect] = {}
-        self._off: dict[str, float] = {}  # every effect's parameters as they are when it is off, as told
+        # Every parameter as it is while nothing is fitted: an effect's as they are when it is off.
+        self._off: dict[str, float] = {p.name: p.value for p in given}
         for effect in library:
-            self.effects[effect.name], coordinates = of_effect(effect)
+            self.effects[effect.name], coordinates = of_effect(self.held.without(effect))
             if not np.isfinite(self.effects[effect.name].absent):
                 raise DeclarationError(
                     f"effect {effect.name} is absent at infinity: its size has to keep its sign, so let one of its"
@@ -195,9 +204,10 @@ class FunctionSystem(System):
 
     def values(self, theta: Theta, corrections: Sequence[Correction] = ()) -> Values:
         """The values passed to `simulate` for a fitted `theta`: the user's parameters, curves, absent effects off."""
-        found = Values({p.name: 0.0 for p in self.parameters} | self._off)
+        found = Values(self._off)
         for name, value in theta.items():
             found[name] = self.told(name, value)
+        self.held.fill(found)
         if self._sites:
             learnt = {c.site: c.table for c in corrections}
             found |= {name: Curve(site, learnt.get(name)) for name, site in self._sites.items()}

@@ -34,6 +34,9 @@ class Model:
         self._corrections = fitted.structure.corrections(fitted.theta)
         names = [p.name for p in fitted.structure.parameters if not is_learnt(p.name)]
         self.theta = Values({name: system.told(name, fitted.theta[name]) for name in names})
+        if isinstance(system, FunctionSystem):
+            values = system.values(fitted.theta)
+            self.theta |= {name: values[name] for name in system.held.of(self._effects)}
 
     def __call__(self, record: Any, theta: Mapping[str, float] | None = None) -> Any:
         if not isinstance(self._system, FunctionSystem):

@@ -1,0 +1,63 @@
+"""Parameters that are not fitted: fixed at a value that is known, or tied to another parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from numbers import Real
+
+from lacuna.errors import DeclarationError
+from lacuna.system import Effect, Parameter
+
+
+@dataclass(frozen=True)
+class Held:
+    """`fixed`: value by name. `tied`: by name, the parameter that it always equals."""
+
+    fixed: Mapping[str, float]
+    tied: Mapping[str, str]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.fixed or name in self.tied
+
+    def fill(self, values: dict[str, float]) -> None:
+        """Set what is held in `values`, which has all the others."""
+        values.update(self.fixed)
+        values.update({name: values[other] for name, other in self.tied.items()})
+
+    def free(self, parameters: Iterable[Parameter]) -> list[Parameter]:
+        """Those that are fitted."""
+        return [p for p in parameters if p.name not in self]
+
+    def without(self, effect: Effect) -> Effect:
+        """`effect` with those of its parameters that are fitted."""
+        parameters = tuple(p for p in effect.parameters if effect.full_name(p) not in self)
+        frequency = effect.frequency if effect.frequency in [p.name for p in parameters] else None
+        return replace(effect, parameters=parameters, frequency=frequency)
+
+    def of(self, effects: Collection[str]) -> list[str]:
+        """Names of those of the base model and of these effects."""
+        return [name for name in (*self.fixed, *self.tied) if "." not in name or name.split(".")[0] in effects]
+
+    def check(self, parameters: Sequence[Parameter], library: Sequence[Effect]) -> None:
+        """Raises DeclarationError where one of these may not be held, or not in this way."""
+        sizing = {name for effect in library for name in effect.size_names}
+        shaping = [name for e in library for p in e.parameters if (name := e.full_name(p)) not in sizing]
+        able = [*(p.name for p in parameters), *shaping]
+        for name in (*self.fixed, *self.tied):
+            if name in sizing:
+                raise DeclarationError(f"{name} sizes an effect, so it can be neither fixed nor tied.")
+            if name not in able:
+                raise DeclarationError(f"fixed or tied: there is no {name}; there are {', '.join(able)}.")
+        for name, value in self.fixed.items():
+            if name in self.tied:
+                raise DeclarationError(f"{name} is both fixed and tied: choose one of the two.")
+            if not isinstance(value, Real) or not isfinite(value):
+                raise DeclarationError(f"{name} is fixed at {value!r}, which is no number.")
+        for name, other in self.tied.items():
+            if other not in able or other in self.tied:
+                free = ", ".join(n for n in able if n not in self.tied)
+                raise DeclarationError(f"{name} is tied to {other!r}, which is not one of {free}.")
+        if not self.free(parameters):
+            raise DeclarationError("Every parameter of the base model is fixed or tied: leave one to be fitted.")

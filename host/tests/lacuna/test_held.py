@@ -1,0 +1,72 @@
+"""Parameters that are fixed or tied: what the model is given, what is told of them, and what is refused."""
+
+import heater
+import numpy as np
+import pytest
+
+import lacuna
+from lacuna import Effect, Parameter
+from lacuna.errors import DeclarationError
+
+SPREAD = Effect(
+    "spread", (Parameter("size", "", 0.2, -1.0, 1.0), Parameter("at_W", "W", 5.0, 1.0, 20.0)), equation="size, at"
+)
+SPARE = Parameter("tau_other_s", "s", 3.0, 0.1, 100.0)
+
+
+def seen(**held):
+    """What `simulate` is given where everything that is fitted is 2, and the system."""
+    system = lacuna.System(heater.simulate, (*heater.PARAMETERS, SPARE), [SPREAD], outputs="temperature_K", **held)
+    fitted = {p.name: system.coordinate(p.name).fitted(2.0) for p in system.parameters}
+    return system.values(fitted | {"spread.size": 0.5}), system
+
+
+def test_a_fixed_parameter_has_its_value_and_is_not_fitted():
+    given, system = seen(fixed={"tau_s": 15.0, "spread.at_W": 7.0})
+    assert [p.name for p in system.parameters] == ["gain_K_W", "tau_other_s"]
+    assert [p.name for p in system.effects["spread"].parameters] == ["size"]
+    assert given["tau_s"] == 15.0
+    assert given["spread.at_W"] == 7.0
+    assert list(given)[:3] == ["gain_K_W", "tau_s", "tau_other_s"]  # in the order of their declaration
+
+
+def test_a_tied_parameter_follows_another_whether_that_is_fitted_or_fixed():
+    given, system = seen(tied={"tau_other_s": "tau_s"})
+    assert [p.name for p in system.parameters] == ["gain_K_W", "tau_s"]
+    assert given["tau_other_s"] == given["tau_s"] == pytest.approx(2.0)
+    given, _ = seen(tied={"tau_other_s": "tau_s"}, fixed={"tau_s": 9.0})
+    assert given["tau_other_s"] == 9.0
+
+
+def test_a_diagnosis_names_the_same_and_tells_of_what_it_held():
+    lag = {"sensor_lag__lag_s": 3.0}
+    found = lacuna.diagnose(heater.system(fixed={"tau_s": 15.0}), heater.records(seed=1, **lag), progress=False)
+    assert [e.name for e in found.effects] == ["sensor_lag"]
+    assert found.theta["tau_s"] == 15.0
+    assert np.isnan(found.to_frame().loc["tau_s", "lower_90"])
+    assert found.effects[0].parameters["lag_s"] == pytest.approx(3.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("held", "says"),
+    [
+        ({"fixed": {"mass": 1.0}}, "there is no mass; there are gain_K_W, tau_s"),
+        ({"fixed": {"tau_s": "15"}}, "tau_s is fixed at '15'"),
+        ({"fixed": {"tau_s": float("inf")}}, "tau_s is fixed at inf"),
+        ({"fixed": {"spread.size": 0.0}}, "spread.size sizes an effect"),
+        ({"tied": {"tau_s": "mass"}}, "tau_s is tied to 'mass', which is not one of gain_K_W"),
+        ({"tied": {"tau_s": "tau_s"}}, "tau_s is tied to 'tau_s'"),
+        ({"tied": {"tau_s": "gain_K_W"}, "fixed": {"tau_s": 1.0}}, "both fixed and tied"),
+        ({"fixed": {"tau_s": 15.0, "gain_K_W": 1.0, "tau_other_s": 1.0}}, "leave one to be fitted"),
+    ],
+)
+def test_what_may_not_be_held_is_refused(held, says):
+    with pytest.raises(DeclarationError, match=says):
+        seen(**held)
+
+
+def test_an_order_needs_both_to_be_fitted():
+    lower = Parameter("mu_k", "", 0.2, 0.0, 1.0)
+    upper = Parameter("mu_s", "", 0.3, 0.0, 1.0, at_least="mu_k")
+    with pytest.raises(DeclarationError, match="at_least of mu_s names 'mu_k', which is not fitted"):
+        lacuna.System(lambda record, theta: record, [lower, upper], fixed={"mu_k": 0.2})
