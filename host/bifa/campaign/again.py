@@ -1,8 +1,8 @@
 """To the edge in steps that cannot lose much, and walks are data too.
 
-First the robust gait of the completed model is walked, then the one at the edge of what is known of it. A gait whose
-speed was not predicted, or that fell off the edge, is fed back, the model completed anew, and the gait at the edge of
-what is known then is walked next.
+First the robust gait of the completed model is walked, then the one at the edge of what is known of it. Every walk is
+fed back and the model completed anew before the next gait is sought: a walk that was predicted narrows what is known,
+and so moves the edge; one that was not, or that fell off the edge, corrects it.
 """
 
 from __future__ import annotations
@@ -159,8 +159,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        if not rounds[-1].is_predicted:
-            model, effects = trades.complete(dataset)
+        model, effects = trades.complete(dataset)
         found.append(trades.optimize(model))
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)

@@ -74,9 +74,9 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
 
 
 def test_a_robust_gait_that_is_predicted_is_followed_by_the_one_at_the_edge(folders):
-    rounds, seen = go_round(folders, ROBOT, [])
+    rounds, seen = go_round(folders, ROBOT, [ROBOT])
     assert [(Gait(**r["gait"]), r["at_edge"]) for r in rounds] == [(FAST, False), (FASTER, True)]
-    assert seen == [], "nothing is diagnosed anew"
+    assert [len(files) for files in seen] == [6], "its walks, and the base model's, narrow what is known"
     assert [r["ended"] for r in rounds] == [None, "predicted"]
     for one in rounds:
         low, high = one["interval_90_mm_s"]
@@ -125,7 +125,7 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
     again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, lambda model: FASTER, fall))
     rounds = json.loads((outputs / "rounds.json").read_text())
     assert len(rounds) == ROUNDS
-    assert seen == [["walks-1", "walks-2"]]
+    assert seen == [["walks-1"], ["walks-1", "walks-2"]]
     assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
     assert load_gait(outputs / "gait-last.toml") == FAST, "the robust gait is what is kept"
 
