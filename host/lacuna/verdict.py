@@ -68,7 +68,7 @@ def _one(record: Any, outputs: tuple[str, ...]) -> Record:
 
 class Verdict:
     """The engine's result. `verdict`: "none", "identified" or "unexplained"; `effects`: the effects named, with sizes,
-    intervals and probabilities; `error`: of the model before and after and of the floor, RMS in units of the noise, on
+    intervals and weights (`probability`); `error`: before, after and of the floor, RMS in units of the noise, on
     records that were not fitted; `warnings`; `theta`: the completed model's parameters; `model`: that model, to call;
     `nuisances`: by record, what was fitted to each. For a system of a function these three are fitted to every record,
     once the errors are known.

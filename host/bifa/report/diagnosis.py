@@ -69,7 +69,7 @@ def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[Sec
 
 
 def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
-    """How much each effect explains, how probable it is, and what else it could be."""
+    """How much each effect explains, how much weight is behind it, and what else it could be."""
     said = ["The gap is the base model's error beyond the noise floor, on held-out trials."]
     for effect in effects:
         name = effect_words(effect["name"])
@@ -77,7 +77,7 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
         closes = "takes up what repeats do not show" if share is None else f"closes {_percent(share)} of it"
         sentence = f"{name[:1].upper()}{name[1:]} {closes}"
         if effect["probability"] is not None:
-            sentence += f"; its probability is {effect['probability']:.2f}"
+            sentence += f"; its weight is {effect['probability']:.2f}"
         if effect["confusable_with"]:
             others = " or ".join(effect_words(other) for other in effect["confusable_with"])
             sentence += f", and this data cannot tell it from {others}"

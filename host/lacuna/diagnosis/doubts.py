@@ -42,7 +42,7 @@ def but_too_little(choice: Choice, split: Split, tested: float | None) -> list[s
 
 
 def doubts(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
-    """Of named effects: an explanation that is more probable, and final trials that tell little. `tested`: what the
+    """Of named effects: an explanation of more weight, and final trials that tell little. `tested`: what the
     effects close there, if there is a gap."""
     said = []
     if tested is not None and tested < policy.half:
@@ -54,7 +54,7 @@ def doubts(choice: Choice, split: Split, tested: float | None, policy: Policy) -
     if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
         besides = [effect for effect in likeliest if effect not in choice.candidate.effects]
         said.append(
-            f"With {listed(besides)}, too, the explanation would be more probable ({weight:.2f}), but that closes too"
+            f"With {listed(besides)}, too, the explanation would have more weight ({weight:.2f}), but that closes too"
             " little of what is left to be named, or helps too little where nothing was fitted."
         )
     if tested is not None and len(split.final) == 1:

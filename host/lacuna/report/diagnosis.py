@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.report.evidence import draw_errors, draw_learnt, draw_probabilities
+from lacuna.report.evidence import draw_errors, draw_learnt, draw_weights
 from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.overview import draw_held_out, draw_tried
 from lacuna.report.page import Page, Section, Table, both_palettes
@@ -44,9 +44,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
 def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
     if not effects:
         return []
-    figure = both_palettes(
-        lambda stream, dark: draw_probabilities(effects, stream, dark), "probability of each effect named"
-    )
+    figure = both_palettes(lambda stream, dark: draw_weights(effects, stream, dark), "weight of each effect named")
     rows = [
         (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), share_in_words(e["share_of_gap"]))
         for e in effects

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: error before and after per experiment, and the effects' probabilities."""
+"""Figures of a diagnosis: error before and after per experiment, and the effects' weights."""
 
 from collections.abc import Mapping, Sequence
 from io import BytesIO
@@ -38,8 +38,8 @@ def draw_errors(error: Mapping[str, Any], path: Path | BytesIO, dark: bool = Fal
         plt.close(figure)
 
 
-def draw_probabilities(effects: Sequence[Mapping[str, Any]], path: Path | BytesIO, dark: bool = False) -> None:
-    """The probability of each effect named (`effects` of `bifa diagnose --json`), confusable ones beside it."""
+def draw_weights(effects: Sequence[Mapping[str, Any]], path: Path | BytesIO, dark: bool = False) -> None:
+    """The weight of each effect named (`effects` of `bifa diagnose --json`), confusable ones beside it."""
     with figure_style(dark) as palette:
         import matplotlib.pyplot as plt
 
@@ -53,7 +53,7 @@ def draw_probabilities(effects: Sequence[Mapping[str, Any]], path: Path | BytesI
         axis.set_yticks(rows, [effect["name"].replace("_", " ") for effect in effects])
         axis.set_xlim(0, 1.25)
         axis.set_xticks([0, 0.5, 1])
-        axis.set_xlabel("probability")
+        axis.set_xlabel("weight")
         figure.savefig(path, format=_format(path))
         plt.close(figure)
 

@@ -56,7 +56,7 @@ def _effects(record: Mapping[str, Any]) -> Iterator[str]:
     for effect in record["effects"]:
         share = effect["share_of_gap"]
         closes = "" if share is None else f"closes {share_in_words(share)}, "
-        yield f"{effect['name']}: {closes}probability {effect['probability']:.2f}"
+        yield f"{effect['name']}: {closes}weight {effect['probability']:.2f}"
         if form := own_form(effect):
             yield from _wrapped(form, "    ")
         for name, value in effect["parameters"].items():
