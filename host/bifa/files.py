@@ -42,7 +42,7 @@ def check_targets(
         if not path.resolve().parent.is_dir():
             raise TargetError(f"the folder {path.resolve().parent} does not exist; create it first")
         if path.resolve() in read:
-            raise TargetError(f"{path} is what this command reads; name another file for what it writes")
+            raise TargetError(f"{path} is an input of this command; choose another file for its output")
         if path.exists() and (path.resolve().parent / "dataset.toml").exists():
             raise TargetError(f"{path} belongs to a data set, which is never overwritten; choose another place")
         _check_writable(path if path.exists() else path.resolve().parent, path)
@@ -53,7 +53,7 @@ def check_targets(
         while not there.exists():
             there = there.parent
         if not there.is_dir():
-            raise TargetError(f"{there} is a file, so that {path} cannot be a folder; choose another name")
+            raise TargetError(f"{there} is a file, so {path} cannot be a folder; choose another name")
         _check_writable(there, path)
 
 
@@ -65,7 +65,7 @@ def _refuse_same(files: tuple[Path | None, ...], folders: tuple[Path | None, ...
         taken.add(file)
     for path in folders:
         if path is not None and path.resolve() in taken:
-            raise TargetError(f"{path} is named for a file and for a folder; give each a name of its own")
+            raise TargetError(f"{path} is used for both a file and a folder; choose different paths")
 
 
 def _check_writable(there: Path, asked: Path) -> None:
@@ -78,7 +78,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
     path = Path(path)
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # of a folder the system says so itself
-        raise OSError(errno.EINVAL, "not a regular file but a pipe or a device: copy what it holds into one", str(path))
+        raise OSError(errno.EINVAL, "a pipe or a device, not a regular file; copy it into a file first", str(path))
     return path.read_bytes()
 
 
@@ -132,6 +132,6 @@ def written_into(folder: Path) -> Iterator[Path]:
         for path in sorted(aside.iterdir()):
             os.replace(path, folder / path.name)
     except OSError as error:
-        raise TargetError(f"{folder} cannot be written into ({error.strerror or error})") from None
+        raise TargetError(f"cannot write into {folder} ({error.strerror or error})") from None
     finally:
         shutil.rmtree(aside, ignore_errors=True)

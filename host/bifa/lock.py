@@ -55,7 +55,7 @@ def _taken(path: Path, folder: Path) -> IO[str]:
             file.seek(0)
             text = file.read()
             file.close()
-            raise LockedError(f"{folder} is being written by {_words(text)}: wait for it, or name another folder")
+            raise LockedError(f"{folder} is being written by {_words(text)}: wait for it, or choose another folder")
         with suppress(OSError):
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file

@@ -69,7 +69,7 @@ def test_targets_are_refused_before_work(tmp_path):
         check_targets(tmp_path / "no" / "model.toml")
     with pytest.raises(TargetError, match="is a folder"):
         check_targets(tmp_path)
-    with pytest.raises(TargetError, match="is a file, so that"):
+    with pytest.raises(TargetError, match="is a file, so "):
         check_targets(folders=(tmp_path / "file" / "pictures",))
 
 
@@ -79,7 +79,7 @@ def test_what_a_command_reads_and_what_was_measured_are_never_its_target(tmp_pat
     data.mkdir()
     (data / "dataset.toml").write_text("")
     (data / "walk_1.csv").write_text("")
-    with pytest.raises(TargetError, match="is what this command reads"):
+    with pytest.raises(TargetError, match="is an input of this command"):
         check_targets(data / ".." / "model.toml", inputs=(model, None))
     with pytest.raises(TargetError, match="belongs to a data set"):
         check_targets(data / "walk_1.csv")

@@ -80,7 +80,7 @@ def read_rounds(file: Path) -> list[dict[str, Any]]:
     rounds = json.loads(file.read_text(encoding="utf-8"))
     known = {field.name for field in fields(Round)}
     if not rounds or any(known - set(one) for one in rounds):
-        raise StageError(f"{file} is of an earlier version: walk the rounds again with --rerun again")
+        raise StageError(f"{file} was written by an earlier version; repeat the rounds with --rerun again")
     return rounds
 
 

@@ -92,7 +92,7 @@ def _that_count(folder: Path) -> list[Path]:
 def check_folder(folder: Path) -> None:
     """Raise StageError where `folder` is a data set, among whose files a campaign has no place."""
     if (folder / "dataset.toml").exists():
-        raise StageError(f"{folder} is a data set: name another folder for the campaign")
+        raise StageError(f"{folder} is a data set; choose another folder for the campaign")
 
 
 def run_stages(
@@ -175,14 +175,14 @@ def _holds(folder: Path, stage: Stage, asked: dict[str, Any], record: dict[str, 
         return intact and all(record.get(key) == value for key, value in asked.items())
     if intact and (differing := _differing(record.get("settings", {}), asked["settings"])):
         raise StageError(
-            f"{', '.join(stage.makes)} in {folder} was measured with {', '.join(differing)}: run with the same, "
-            f"name another folder, or measure again with --rerun {stage.name}"
+            f"{', '.join(stage.makes)} in {folder} was measured with {', '.join(differing)}: use the same "
+            f"settings, choose another folder, or measure again with --rerun {stage.name}"
         )
     same_inputs = record.get("inputs") == asked["inputs"]
     if other and same_inputs and not _unfinished(folder, stage).exists():
         raise StageError(
-            f"{', '.join(other)} in {folder} is not what the stage {stage.name} measured (a file was changed, or is"
-            f" gone): put it back, or measure again with --rerun {stage.name}"
+            f"{', '.join(other)} in {folder} is not what the stage {stage.name} measured (a file has changed or is "
+            f"missing): restore it, or measure again with --rerun {stage.name}"
         )
     return intact and same_inputs
 
@@ -239,8 +239,8 @@ def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, An
         trials = trials_in(scratch)
         held = f"holds {counted(trials, 'trial')} of the stage {stage.name}, begun"
         raise StageError(
-            f"{scratch} {held if trials else 'was begun'} with {', '.join(differing)}: go on there with what it was "
-            "begun with, or name another folder for a new campaign; both are kept then"
+            f"{scratch} {held if trials else 'was begun'} with {', '.join(differing)}: resume with the original "
+            "settings, or choose another folder for a new campaign (both are then kept)"
         )
     return begun
 
@@ -309,7 +309,7 @@ def _read_records(folder: Path) -> dict[str, Any]:
         return {}
     except (ValueError, KeyError, TypeError) as error:
         raise StageError(
-            f"{folder / PROVENANCE} is damaged ({error}): put it right, or name another folder to start over"
+            f"{folder / PROVENANCE} is damaged ({error}): repair it, or choose another folder to start over"
         ) from None
 
 

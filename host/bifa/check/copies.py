@@ -17,6 +17,6 @@ def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Fi
                 continue
             earlier = first.setdefault((trial.experiment, name, values.tobytes()), trial.file)
             if earlier != trial.file:
-                text = f"has the same {name} as {earlier}, sample by sample: put its own record there, or leave it out"
+                text = f"has the same {name} as {earlier}, sample by sample: give its own record, or leave it out"
                 yield Finding("copy", text, trial.file, column=name)
                 break

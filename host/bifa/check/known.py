@@ -52,14 +52,14 @@ def _cause(parameter: ModelParameter, value: float) -> str | None:
     if low <= value <= high:
         return None
     if low <= -value <= high:
-        return f"its sign is turned; write {-value:g}"
+        return f"its sign is reversed; write {-value:g}"
     for unit, size in _UNITS.get(parameter.unit, {}).items():
         if low <= value * size <= high:
-            return f"it seems to be in {unit}; write {value * size:.4g}"
+            return f"it looks like a value in {unit}; write {value * size:.4g}"
     if parameter.unit == "psi" and low <= value - _ATMOSPHERE_PSI <= high:
-        return f"it seems to be absolute, where gauge pressures count; write {value - _ATMOSPHERE_PSI:.4g}"
+        return f"it looks like an absolute pressure, gauge pressure is expected; write {value - _ATMOSPHERE_PSI:.4g}"
     if parameter.lower <= value <= parameter.upper:
         return None
     if parameter.lower <= -value <= parameter.upper:
-        return f"its sign is turned; write {-value:g}"
-    return f"the model ends at {parameter.lower:g} and {parameter.upper:g}; check number and unit"
+        return f"its sign is reversed; write {-value:g}"
+    return f"the model is limited to {parameter.lower:g} to {parameter.upper:g}; check number and unit"

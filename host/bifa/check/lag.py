@@ -63,8 +63,8 @@ def misfit(lag: Lag, others: Sequence[Lag] = ()) -> str | None:
     if abs(lag.late_s - usual_s) <= max(LIMIT_S, 5.0 * lag.sd_s):
         return None
     return (
-        f"the displacement is {_in_words(lag.late_s)} against the pressures, in the session's other trials "
-        f"{_in_words(usual_s)}: record this trial again"
+        f"the displacement is {_in_words(lag.late_s)} relative to the pressures, in the session's other "
+        f"trials {_in_words(usual_s)}: record this trial again"
     )
 
 
@@ -74,7 +74,7 @@ def shift_of_all(lags: Sequence[Lag]) -> str | None:
     if abs(usual_s) <= LIMIT_OF_ALL_S:
         return None
     return (
-        f"the displacement is {_in_words(usual_s)} against the pressures: a shift between the instruments, or a "
+        f"the displacement is {_in_words(usual_s)} relative to the pressures: a shift between the instruments, or a "
         "pressure sensor that lags"
     )
 

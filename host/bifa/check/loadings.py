@@ -18,8 +18,8 @@ def check_static_loading(trial: Trial) -> Iterator[Finding]:
     mm, force_N = trial.columns["displacement_mm"], trial.columns["force_N"]
     if -mm.min() > max(_TRAVEL_MM, _OTHER_WAY * mm.max()):
         text = (
-            f"goes down to {mm.min():.1f} mm where it should go up: displacement is positive when extending; turn its "
-            "sign"
+            f"goes down to {mm.min():.1f} mm where it should go up: displacement is positive when extending; "
+            "reverse its sign"
         )
         yield Finding("sign", text, trial.file, column="displacement_mm")
         return
@@ -32,7 +32,7 @@ def check_static_loading(trial: Trial) -> Iterator[Finding]:
         text = (
             f"falls by {-first:.2f} N over the first fifth of the travel and by {-last:.2f} N over the last, where "
             "pulling an actuator out of a stable state takes a rising force: is pushing counted as positive? "
-            "Positive is pulling; turn the sign"
+            "Positive is pulling; reverse the sign"
         )
         yield Finding("sign", text, trial.file, column="force_N")
 
@@ -43,7 +43,7 @@ def check_anchor_pull(trial: Trial) -> Iterator[Finding]:
     if np.median(force_N) < 0.0 and -force_N.min() > _OTHER_WAY * force_N.max():
         text = (
             f"{np.median(force_N):.2f} N in the middle (median), where a resistance is positive: does the load cell "
-            "count the other way? Turn the sign"
+            "count the other way? Reverse the sign"
         )
         yield Finding("sign", text, trial.file, column="force_N")
 

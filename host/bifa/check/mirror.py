@@ -35,13 +35,14 @@ def check_mirror(trial: Trial) -> Iterator[Finding]:
         return
     if _TAIL in trial.columns:
         text = (
-            f"the body gets {mm:.1f} mm shorter (head minus tail) while it is filled, where it should get longer: does "
-            "the camera's axis point backwards, or are head and tail exchanged? Turn both signs, or rename the columns"
+            f"the body gets {mm:.1f} mm shorter (head minus tail) while it is filled, where it should get longer: "
+            "does the camera's axis point backwards, or are head and tail exchanged? Reverse both signs, or rename the "
+            "columns"
         )
     else:
         text = (
             f"the head goes back by {mm:.1f} mm while the body is filled, where it should go forward: does the "
-            "camera's axis point backwards? Turn the sign"
+            "camera's axis point backwards? Reverse the sign"
         )
     yield Finding("mirrored", text, trial.file, column="displacement_head_mm")
 

@@ -99,7 +99,7 @@ def _no_value(trial: Trial) -> Iterator[Finding]:
     for name, values in trial.columns.items():
         rows = np.flatnonzero(codes(values)) if name != "time_s" else np.array([])
         if rows.size:
-            text = f"{rows.size} samples read {values[rows[0]]:g}, which stands for no value: record it again"
+            text = f"{rows.size} samples read {values[rows[0]]:g}, a code for a missing value: record it again"
             yield Finding("no value", text, trial.file, _line(rows[0]), name)
 
 
@@ -165,7 +165,7 @@ def _commanded_pressure(trial: Trial) -> Iterator[Finding]:
         return
     measured = float(np.mean(trial.columns["pressure_psi"]))
     if abs(measured - trial.pressure_psi) > max(1.0, 0.15 * abs(trial.pressure_psi)):
-        sign = ": its sign is turned" if measured * trial.pressure_psi < 0.0 else ""
+        sign = ": its sign is reversed" if measured * trial.pressure_psi < 0.0 else ""
         text = f"{measured:.2f} psi on average where {trial.pressure_psi:g} psi was commanded{sign}"
         yield Finding("pressure", text, trial.file, column="pressure_psi")
 

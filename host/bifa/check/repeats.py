@@ -71,7 +71,7 @@ def _of_two(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
         far, channel = max(found)
         text = (
             f"{one.file} and {other.file} differ by {far * group.ranges[channel]:.3g} {_unit(channel)} (RMS), "
-            f"{100 * far:.0f} % of the range: one of these repeats was recorded otherwise; a third tells which"
+            f"{100 * far:.0f} % of the range: one of these repeats was recorded differently; a third would tell which"
         )
         yield Finding("repeat", text, column=channel, files=(one.file, other.file))
 

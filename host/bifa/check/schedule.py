@@ -78,7 +78,7 @@ def _why(trial: Trial, seen: Mapping[str, float], wrong: Sequence[str], walks: S
     for other in walks:
         if other.walked != given and not contradicted(other.walked, seen):
             return f"that is the gait of {other.file}; does dataset.toml name the right file?"
-    return "another gait was walked than dataset.toml says; correct it there, or walk again"
+    return "the robot did not walk the gait in dataset.toml; correct it there, or repeat the walk"
 
 
 def _written(name: str, value: float) -> str:

@@ -9,7 +9,7 @@ from .swing import follow, swing
 
 # Of the range, the other way round. Healthy: 0.92 and more of a pressure, 0.53 and more of a displacement.
 AGAINST = -0.5
-PORTS = "where it should rise: are the sensor's two ports exchanged? Turn the sign"
+PORTS = "where it should rise: are the sensor's two ports exchanged? Reverse the sign"
 _MOVES_MM = 5.0  # the other way; small actuators have a stroke of 30 mm
 
 
@@ -34,6 +34,6 @@ def check_step_response(trial: Trial) -> Iterator[Finding]:
     elif shrinks:
         text = (
             f"shrinks by {-moved_mm:.1f} mm while the actuator is inflated: displacement is positive when extending; "
-            "turn its sign"
+            "reverse its sign"
         )
         yield Finding("sign", text, trial.file, column="displacement_mm")

@@ -34,7 +34,7 @@ def console(
     from bifa.errors import BifaError
 
     if sys.stdin is None:
-        raise BifaError("nothing can be typed, as the standard input is closed (<&-); pipe lines into the command")
+        raise BifaError("stdin is closed; run it in a terminal, or pipe lines into it")
 
     from bifa.link import Uno
     from bifa.link.terminal import settle

@@ -111,7 +111,7 @@ def experiment(
     from bifa.rig import check_port
 
     if add and instrument is None:
-        raise typer.BadParameter("--add goes with --instrument; a session with a rig is resumed by the same command")
+        raise typer.BadParameter("--add requires --instrument; a session on a rig is resumed by the same command")
     check_targets(folders=(out,))
     check_port(port)
 
@@ -130,9 +130,9 @@ def experiment(
         _check_within("--pressure", psi, *RANGES["pressure_psi"])
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
     if rate is not None and not math.isfinite(rate):
-        raise typer.BadParameter(f"--rate is a finite number of mm/s, not {rate:g}")
+        raise typer.BadParameter(f"--rate must be a finite number of mm/s, not {rate:g}")
     if inclination and name not in (Experiment.LOCOMOTION, Experiment.ALL):
-        raise typer.BadParameter(f"--inclination is of walks; leave it out, or run locomotion instead of {name}")
+        raise typer.BadParameter(f"--inclination applies to walks only; leave it out, or run locomotion, not {name}")
     gaits = [_load(path) for path in gait] if gait else [BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name == Experiment.ALL else (name,),
@@ -156,7 +156,7 @@ def experiment(
 def _check_within(option: str, value: float, low: float, high: float, unit: str) -> None:
     """Not left to typer, for whose ranges NaN is within."""
     if not low <= value <= high:
-        raise typer.BadParameter(f"{option} is {low:g} to {high:g} {unit}, not {value:g}")
+        raise typer.BadParameter(f"{option} must be {low:g} to {high:g} {unit}, not {value:g}")
 
 
 def _kept(out: Path) -> str:
@@ -248,8 +248,8 @@ def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
     first = [trial for trial in trials if trial.repeat == 1]
     if len(first) > 1:
         raise typer.BadParameter(
-            f"--instrument holds one trial, and {len(first)} conditions fit these options, from {first[0].title!r} to "
-            f"{first[-1].title!r}: name the experiment, --actuator, --pressure, --rate or --gait"
+            f"--instrument imports one trial, but {len(first)} conditions match, from {first[0].title!r} to "
+            f"{first[-1].title!r}: specify the experiment, --actuator, --pressure, --rate or --gait"
         )
     return first[0]
 
@@ -270,7 +270,7 @@ def _import(
 
     if telemetry is None:
         raise typer.BadParameter(
-            "--instrument needs --telemetry: the Uno's record of the same time, from `bifa record`"
+            "--instrument requires --telemetry: the Uno's telemetry of the same time, from `bifa record`"
         )
     export = read_exports(bench).get(ROLES[planned.experiment])
     dataset, clock = import_trial(instrument, telemetry, planned, out, known, add=add, export=export)

@@ -43,12 +43,12 @@ def gaits(
     if make:
         folder = out or library.FOLDER
         check_targets(folders=(folder,))
-        with stoppable(lambda: f"the gaits named above are in {folder}"):
+        with stoppable(lambda: f"the gaits listed above are in {folder}"):
             _make(console, model, folder, names, seed)
         return
     idle = [name for name, given in (("--model", model), ("--out", out), ("--seed", seed)) if given]
     if idle:
-        raise BifaError(f"{idle[0]} is for a new search: add --make, or leave it out to list the gaits that there are")
+        raise BifaError(f"{idle[0]} applies to a new search: add --make, or leave it out to list the existing gaits")
     title = "Gaits of the nominal robot: mm/s; head, tail ahead; vacuum of body, head, tail"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("gait", "speed", "9 in 10", "period, s", "ahead, °", "vacuum"):

@@ -51,9 +51,9 @@ def instrument(
             console.print(f"{name:16} {preset['program']}", markup=False, highlight=False)
         return
     if file is None:
-        raise typer.BadParameter("name a file that your instrument has exported, or ask for --presets")
+        raise typer.BadParameter("give a file that your instrument exported, or use --presets")
     if role is not None and role not in _ROLES:
-        raise typer.BadParameter(f"--role is machine or camera, not {role}")
+        raise typer.BadParameter(f"--role must be machine or camera, not {role}")
 
     from bifa.measure.propose import declaration, look
 
@@ -121,7 +121,7 @@ def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
         columns[name] = column
         told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
         units[name] = _unit(name, column, told)
-        if name != "time_s" and typer.confirm(f"Turn the sign of {name}?", default=False):
+        if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
             sign[name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
     table: dict[str, Any] = {"preset": preset} if preset else dict(seen.how)
@@ -144,7 +144,7 @@ def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -
     from bifa.data.errors import DatasetError
 
     while True:
-        optional = "" if name == "time_s" else " (- if it is none)"
+        optional = "" if name == "time_s" else " (- if there is none)"
         column = typer.prompt(f"Which column is {name}{optional}?", default=proposed)
         if column == "-" and optional:
             return column
@@ -173,11 +173,11 @@ def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
 def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
     """What frames and dates need besides."""
     if unit == "frame":
-        return {"rate_hz": typer.prompt("Frames a second?", default=given.rate_hz if given else None, type=float)}
+        return {"rate_hz": typer.prompt("Frames per second?", default=given.rate_hz if given else None, type=float)}
     if unit != "date":
         return {}
-    form = typer.prompt("How is a date written (as for strptime; Enter: ISO 8601)?", default="", show_default=False)
-    zone = typer.prompt("In which zone, where it names none (as Europe/Berlin; Enter: UTC)?", default="UTC")
+    form = typer.prompt("Date format (strptime; Enter: ISO 8601)?", default="", show_default=False)
+    zone = typer.prompt("Time zone, if the dates name none (e.g. Europe/Berlin; Enter: UTC)?", default="UTC")
     return ({"date_format": form} if form else {}) | ({"zone": zone} if zone != "UTC" else {})
 
 

@@ -50,7 +50,7 @@ def monitor(
     Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
     """
     if not web and (model is not None or web_port != _WEB_PORT):
-        raise typer.BadParameter("--model and --web-port are for --web")
+        raise typer.BadParameter("--model and --web-port require --web")
 
     from bifa.rig import check_port
 
@@ -111,5 +111,5 @@ def _fly(
         console.print(text, highlight=False, soft_wrap=True)
 
     with served(page, port) as address:
-        say(f"page: {address.url}   (Ctrl-C ends it, and the robot stops)")
+        say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
         fly(pilot, board, page.tell, say, seconds, begin, later)

@@ -29,19 +29,19 @@ def register(app: typer.Typer) -> None:
         profile: Annotated[Profile, PROFILE] = "ideal",
         effect: Annotated[
             list[str] | None,
-            typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; may be given several times", autocompletion=effects),
+            typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; repeatable.", autocompletion=effects),
         ] = None,
         sealed: Annotated[
-            int | None, typer.Option(min=0, help="seed that draws a robot with an undisclosed effect")
+            int | None, typer.Option(min=0, help="Seed that draws a robot with an undisclosed effect.")
         ] = None,
-        seed: Annotated[int, typer.Option(min=0, help="seed of noise, clocks and run-to-run variation")] = 0,
+        seed: Annotated[int, typer.Option(min=0, help="Seed of noise, clocks and run-to-run variation.")] = 0,
         firmware: Annotated[
-            Path | None, typer.Option(help="image (ELF or HEX) instead of the one that is built")
+            Path | None, typer.Option(help="Firmware image (ELF or HEX); the built one if left out.")
         ] = None,
         eeprom: Annotated[
-            Path | None, typer.Option(help="file that keeps the EEPROM between runs", dir_okay=False)
+            Path | None, typer.Option(help="File that keeps the EEPROM between runs.", dir_okay=False)
         ] = None,
-        link: Annotated[Path | None, typer.Option(help="symbolic link to the pty for as long as it is served")] = None,
+        link: Annotated[Path | None, typer.Option(help="Symbolic link to the pty while it is served.")] = None,
     ) -> None:
         """Offer the virtual robot, with the real firmware, as a serial port in real time.
 

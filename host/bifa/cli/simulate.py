@@ -65,7 +65,7 @@ def simulate(
     The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
     """
     if paper and _walks_otherwise(cycles, inclination, payload, obstacle, buckling, pictures, out):
-        raise typer.BadParameter("--paper has walks of its own; only --model and --gait go with it")
+        raise typer.BadParameter("--paper simulates walks of its own; only --model and --gait can be combined with it")
 
     from bifa.files import check_targets, written_into
 
@@ -78,7 +78,7 @@ def simulate(
     chosen = robot.load_model(model) if model else robot.nominal()
     file = robot.read_gait_file(gait) if gait else robot.GaitFile(robot.BASELINE)
     if file.others:
-        console.print(f"not simulated: {', '.join(file.others)} (the Uno's; a model has its own supply pressure)")
+        console.print(f"not simulated: {', '.join(file.others)} (the Uno's; the model has its own supply pressure)")
     if paper:
         _print_paper(console, chosen if model else None, file.gait if gait else None)
         return

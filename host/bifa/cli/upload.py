@@ -38,7 +38,7 @@ def upload(
     valves are off.
     """
     if seconds is not None and not run:
-        raise typer.BadParameter("--seconds is for --run")
+        raise typer.BadParameter("--seconds requires --run")
 
     from bifa.rig import check_port
 

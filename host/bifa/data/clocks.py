@@ -15,7 +15,7 @@ def zone_of(name: str) -> ZoneInfo:
     try:
         return ZoneInfo(name)
     except (ZoneInfoNotFoundError, OSError) as error:
-        raise ValueError(f"there is no zone {name!r}: write one as Europe/Berlin, or UTC") from error
+        raise ValueError(f"unknown time zone {name!r}: write it as Europe/Berlin, or UTC") from error
 
 
 def first_that_is_none(cells: Sequence[str], form: str | None, zone: ZoneInfo | None) -> int | None:

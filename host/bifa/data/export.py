@@ -181,7 +181,7 @@ def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) ->
     told = told_unit(sheet, place)
     if told and unit and unit in _sizes(name) and told != unit:
         raise sheet.error(
-            f"the file says {told}, and units.{name} is declared as {unit}: correct the declaration",
+            f"the file says {told}, but units.{name} is declared as {unit}: correct the declaration",
             -1,
             sheet.labels()[place],
         )
@@ -269,7 +269,7 @@ def _form(fields: Fields, given: Mapping[str, Any]) -> Form:
     if how["separator"] not in SEPARATORS.values():
         raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
     if how.get("decimal", ".") not in (".", ",") or how.get("decimal") == how["separator"]:
-        raise fields.error("decimal", 'must be "." or ",", and another than the separator')
+        raise fields.error("decimal", 'must be "." or ",", and differ from the separator')
     try:
         "".encode(how.get("encoding", "utf-8"))
     except LookupError:
@@ -281,12 +281,12 @@ def _check_columns(fields: Fields, export: Export) -> None:
     for key in _TABLES:
         for name, value in getattr(export, key).items():
             if name not in _OWN:
-                raise fields.error(key, f"{name} is no column of the data set; there are {listed(sorted(_OWN))}")
+                raise fields.error(key, f"{name} is not a column of a data set; the columns are {listed(sorted(_OWN))}")
             _check_value(fields, export, key, name, value)
     for name in export.columns:
         if not is_command(name) and name not in export.units and name not in export.factor:
             allowed = " | ".join([*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())])
-            raise fields.error("units", f"{name} has none: say in which unit the file has it ({allowed}), or a factor")
+            raise fields.error("units", f"{name} has no unit: declare the one in the file ({allowed}), or a factor")
 
 
 def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any) -> None:

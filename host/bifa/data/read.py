@@ -117,7 +117,7 @@ def _read_toml(folder: Path) -> tuple[Fields, Source]:
 def _no_table(folder: Path) -> str:
     inside = sorted(path.parent.name for path in folder.glob(f"*/{TABLE_FILE}"))
     if inside:
-        return f"{folder} is no data set, but holds {', '.join(inside)}: name {folder / inside[0]}"
+        return f"{folder} is not a data set, but contains {', '.join(inside)}: name {folder / inside[0]}"
     return (
         f"{folder} has no {TABLE_FILE}: a data set is a folder with this file, which lists the trials, and a CSV file "
         "for each. Write it beside your files (docs/data-format.md shows how), or let `bifa experiment` record one; "

@@ -33,7 +33,7 @@ def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:
     """An effect's parameters in full: those left out take their typical value, or the one for omission. EffectError
     names the range."""
     if name not in library():
-        raise EffectError(f"{name!r} is no effect of the library; it has {', '.join(library())}")
+        raise EffectError(f"{name!r} is not an effect of the library; it has {', '.join(library())}")
     known = {parameter.name: parameter for parameter in library()[name].parameters}
     unknown = [key for key in values if key not in known]
     if unknown:

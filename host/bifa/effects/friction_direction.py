@@ -4,7 +4,7 @@ from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="friction_direction",
-    summary="sliding forward meets another friction than sliding backward",
+    summary="friction differs between sliding forward and sliding backward",
     equation="mu_forward = mu (1 + asymmetry),  mu_backward = mu (1 - asymmetry)",
     source="direction-dependent Coulomb friction, e.g. A. Janot et al., the EMPS benchmark (2019)",
     enters="eq. (5), mu_s and mu_k",

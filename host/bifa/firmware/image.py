@@ -47,7 +47,7 @@ def carried_image(folder: Path = FOLDER) -> Path:
             "this installation carries no firmware: install a wheel of a release, or work in a clone of the repository"
         ) from error
     if found != noted:
-        raise ImageError(f"{folder / HEX} is damaged: install the wheel of bifa again")
+        raise ImageError(f"{folder / HEX} is damaged: reinstall the wheel of bifa")
     _check_tables(found, folder / HEX)
     return folder / HEX
 
@@ -66,7 +66,7 @@ def image_of(path: Path) -> Image:
     text = path.read_bytes()
     says = _SAYS.search(_decoded(text.decode("ascii", "replace"), path))
     if says is None:
-        raise ImageError(f"{path} is no firmware of bifa")
+        raise ImageError(f"{path} is not a bifa firmware image")
     version, protocol, table = (group.decode() for group in says.groups())
     return Image(version, int(protocol), table, hashlib.sha256(text).hexdigest())
 
@@ -74,8 +74,8 @@ def image_of(path: Path) -> Image:
 def _check_tables(image: Image, path: Path) -> None:
     if (image.protocol, image.table) != (PROTOCOL_VERSION, f"{TABLE_HASH:08x}"):
         raise ImageError(
-            f"{path} is of protocol {image.protocol}, table {image.table}; "
-            f"this host speaks protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}: build the firmware again"
+            f"{path} has protocol {image.protocol}, table {image.table}; "
+            f"this host speaks protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}: rebuild the firmware"
         )
 
 

@@ -58,8 +58,8 @@ def measured_speed(
     advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
     if complete < LEAST:
         raise BifaError(
-            f"the walk holds {complete} complete cycle(s) of {period_s:g} s, and whether it has settled takes {LEAST}: "
-            "record a longer walk"
+            f"the walk has {complete} complete cycle(s) of {period_s:g} s; it takes {LEAST} to see whether it has "
+            "settled: record a longer walk"
         )
     return speed_of_cycles(advance_mm, period_s, noise_mm)
 

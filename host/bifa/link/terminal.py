@@ -40,7 +40,7 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
     Raises NoAnswerError, and RestartedError if the Uno restarts meanwhile.
     """
     if not line.replace("\t", " ").isprintable():
-        return [f"error {line!r} holds characters that are no text; not sent"]
+        return [f"error {line!r} contains characters that are not text; not sent"]
     word = (line.split() or [""])[0]
     if word in MOVING:
         uno.guard()

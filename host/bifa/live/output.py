@@ -28,7 +28,7 @@ def writable() -> Iterator[None]:
             raise
         _drop_the_rest()
         reason = os.strerror(error.errno)
-        raise OutputError(f"the output cannot be written ({reason}); make room, or print to somewhere else") from None
+        raise OutputError(f"the output cannot be written ({reason}); free some space, or redirect it") from None
 
 
 def _drop_the_rest() -> None:

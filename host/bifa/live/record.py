@@ -96,12 +96,12 @@ def record_telemetry(
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
     if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
-        raise RecordError(f"{out} holds something else; name a new folder")
+        raise RecordError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
     recorder = _Recorder(open_rig, port, parameters, end_s, console)
-    waiting = "when that Uno is back, recording goes on" + (
-        ", and you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
+    waiting = "recording resumes when that Uno is back" + (
+        "; you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
     )
     is_told = False
     try:
@@ -119,7 +119,7 @@ def record_telemetry(
                     time.sleep(RETRY_S)
     except KeyboardInterrupt:
         console.print("ended")
-    console.print(f"{out} holds the telemetry; a data set needs the displacement from your own instrument beside it")
+    console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 
 class _Recorder:
@@ -171,15 +171,15 @@ class _Recorder:
         followed = self._nonce is not None and 0 <= (nonce - self._nonce) % 65536 <= RESTARTS
         self._nonce = nonce
         if self._board.serial_number or followed:
-            return "The Uno is back, and has started anew"
-        return "An Uno is there, and nothing says that it is the same one"
+            return "The Uno is back and has restarted"
+        return "An Uno is connected, but it may be a different one"
 
     def _ask(self, known: str) -> None:
         if sys.stdin is not None and sys.stdin.isatty():
             self._desk.ask("walk", f"{known}. Recording goes on. Press Enter to walk again; q ends.")
             return
         self._console.print(
-            f"{known}: recording without walking, as nobody can be asked; to walk, start the command anew"
+            f"{known}: recording without walking, since no one can be asked; to walk, run the command again"
         )
 
     def _record(self, uno: Uno, writer: Any, file: TextIO, status: Status, marked: int) -> None:
@@ -222,12 +222,12 @@ def telemetry_file(path: Path) -> Iterator[TextIO]:
         raise
     except OSError as error:
         if file is None:
-            raise RecordError(f"{path} cannot be written ({error.strerror or error}); nothing was kept") from None
+            raise RecordError(f"{path} cannot be written ({error.strerror or error}); no samples were kept") from None
         whole = path.read_bytes()
         os.truncate(path, whole.rfind(b"\n") + 1)
         raise RecordError(
             f"{path} cannot be written any further ({error.strerror or error}); the {max(whole.count(10) - 1, 0)} "
-            "samples so far are kept in it: make room, and record again"
+            "samples so far are kept: free some space and record again"
         ) from None
 
 

@@ -81,7 +81,7 @@ def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) 
     measured = np.isfinite(values)
     measured[measured] = ~held(values[measured])
     if measured.sum() < 4:
-        raise AlignmentError(f"the instrument's record has {int(measured.sum())} values: nothing to follow; repeat")
+        raise AlignmentError(f"the instrument's record has {int(measured.sum())} values, too few to follow; repeat")
     instrument_s, values = instrument_s[measured], values[measured]
     away_s = 2 * np.median(np.diff(instrument_s))
     _refuse_holes(instrument_s, time_s)
@@ -103,8 +103,8 @@ def _refuse_holes(instrument_s: np.ndarray, time_s: np.ndarray) -> None:
     period_s = float(np.median(np.diff(instrument_s)))
     if period_s > SLOWEST_S:
         raise AlignmentError(
-            f"the camera recorded {1.0 / period_s:.3g} samples a second: a snap-through lasts about 50 ms, so that at "
-            f"least 50 are needed, better 100; set its rate, and repeat"
+            f"the camera recorded {1.0 / period_s:.3g} samples a second: a snap-through lasts about 50 ms, so at "
+            f"least 50 are needed, better 100; set its rate and repeat"
         )
     steps = np.diff(instrument_s)
     within = (instrument_s[1:] > time_s[0]) & (instrument_s[:-1] < time_s[-1])
@@ -114,8 +114,8 @@ def _refuse_holes(instrument_s: np.ndarray, time_s: np.ndarray) -> None:
         raise AlignmentError(
             f"the instrument's record has {len(wide)} hole{'s' if len(wide) > 1 else ''}, the longest of "
             f"{steps[worst]:.2f} s at {instrument_s[worst] - time_s[0]:.2f} s of the trial (about "
-            f"{round(steps[worst] / period_s) - 1} samples: rows missing, or a marker lost): what is missing is not "
-            "made up; repeat"
+            f"{round(steps[worst] / period_s) - 1} samples: rows missing, or a marker lost): gaps are "
+            "not filled in; repeat"
         )
 
 
@@ -132,8 +132,8 @@ def _gaps(sync_s: np.ndarray) -> np.ndarray:
 def _no_pause(gaps: np.ndarray, pauses: int) -> str:
     if pauses > 1:
         return (
-            f"the sync edges show {pauses} pauses of {MARK_PAUSE} strobes, so that it is not clear which one is this "
-            "recording's: start the instrument anew for every recording, and repeat"
+            f"the sync edges show {pauses} pauses of {MARK_PAUSE} strobes, so it is not clear which one is this "
+            "recording's: restart the instrument for every recording, and repeat"
         )
     return (
         f"the sync edges do not show the pause of {MARK_PAUSE} strobes that tells which edge is which sample (the "

@@ -93,7 +93,7 @@ class Desk:
     def again(self, answer: str, choice: str) -> None:
         """`answer` is none to what was asked last, which is still asked: `choice` says what would be."""
         self.is_asking = True
-        self.say(f"{answer!r} is no answer here: {choice}, q stops.")
+        self.say(f"{answer!r} is not an answer here: {choice}, q stops.")
 
     def attend(self) -> None:
         """While nothing is asked: raises KeyboardInterrupt if somebody has asked to stop."""

@@ -102,7 +102,9 @@ def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
     """`planned` under the next number of its condition."""
     planned = replace(planned, repeat=1 + recorded.last_repeat(planned.as_trial().condition))
     if (recorded.folder / planned.file).exists():
-        raise InstrumentFileError(f"{recorded.folder / planned.file} is in the way: it is not listed in {TABLE_FILE}")
+        raise InstrumentFileError(
+            f"{recorded.folder / planned.file} exists, but is not listed in {TABLE_FILE}; move it away"
+        )
     return planned
 
 
@@ -161,8 +163,8 @@ def _refuse_codes(path: Path, columns: dict[str, np.ndarray], lines: Sequence[in
         if name != "time_s" and (coded := codes(values)).any():
             row = int(np.flatnonzero(coded)[0])
             raise InstrumentFileError(
-                f"{path}, line {lines[row]}, column {name}: {values[row]:g} stands for no value (a lost marker?); "
-                "fill the gap by the instrument's own means, or record again"
+                f"{path}, line {lines[row]}, column {name}: {values[row]:g} is a code for a missing value (a lost "
+                "marker?); fill the gap by the instrument's own means, or record again"
             )
 
 
@@ -209,7 +211,7 @@ def _refuse_falling(path: Path, columns: dict[str, np.ndarray], name: str, lines
 
 def _refuse_few(path: Path, lines: Sequence[int]) -> None:
     if len(lines) < 2:
-        raise InstrumentFileError(f"{path} holds {len(lines)} samples: nothing to synchronise")
+        raise InstrumentFileError(f"{path} holds {len(lines)} samples: too few to synchronise")
 
 
 def _line(row: int, lines: Sequence[int] | None) -> int:
@@ -222,7 +224,7 @@ def _telemetry_file(path: Path) -> Path:
         return path
     files = sorted(path.glob("telemetry_*.csv"))
     if len(files) != 1:
-        raise InstrumentFileError(f"{path} holds {len(files)} telemetry files: name the one of this trial")
+        raise InstrumentFileError(f"{path} holds {len(files)} telemetry files: give the one of this trial")
     return files[0]
 
 
@@ -260,8 +262,8 @@ def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
     ends = np.flatnonzero(np.diff(strobe) > 0)
     if len(ends) != 1 or sequence[ends[0] + 1] != sequence[ends[0]] + 1:
         raise InstrumentFileError(
-            f"{telemetry}: samples about the pause of the strobe (column strobe) were lost on the link, or there are "
-            "several pauses: nothing tells which edge is which sample; record again"
+            f"{telemetry}: samples around the pause of the strobe (column strobe) were lost on the link, or there "
+            "are several pauses, so edges cannot be matched to samples; record again"
         )
     return int(sequence[ends[0] + 1])
 

@@ -108,7 +108,7 @@ class Recording:
             elapsed_s = self._clock.now() - begun_s
             self._on_progress(min(elapsed_s / expected_s, 1.0))
             if not are_asked(self._instruments) and elapsed_s > 3.0 * expected_s + 5.0:
-                raise BifaError(f"the cross-head is still moving after {elapsed_s:.0f} s: look at the stand")
+                raise BifaError(f"the cross-head is still moving after {elapsed_s:.0f} s: check the stand")
 
     def _line_up(self) -> None:
         samples = self.samples

@@ -115,8 +115,8 @@ def refuse_other_settings(writer: DatasetWriter, provenance: Mapping[str, Any]) 
     ]
     if differing:
         raise DatasetError(
-            f"{writer.partial} holds {counted(len(writer.trials), 'trial')} made with {', '.join(differing)}: go on "
-            "with the same options, name another folder, or move it away"
+            f"{writer.partial} holds {counted(len(writer.trials), 'trial')} made with {', '.join(differing)}: "
+            "resume with the same options, choose another folder, or move it away"
         )
 
 

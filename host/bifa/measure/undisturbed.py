@@ -31,7 +31,7 @@ def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, s
         before = [one for one in samples[max(k - _SAMPLES, 0) : k] if sample.time_us - one.time_us <= _LATE_US]
         if wrong := _wrong(before, sample, state, held):
             after_s = sample.time_us * 1e-6 - begun_s
-            raise DisturbedError(f"{after_s:.2f} s after it began {wrong}: that is no trial; repeat it")
+            raise DisturbedError(f"{after_s:.2f} s after it began {wrong}: the trial is not valid; repeat it")
 
 
 def _wrong(before: Sequence[Sample], sample: Sample, state: str, held: Mapping[str, str] | None) -> str:

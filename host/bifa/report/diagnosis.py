@@ -74,7 +74,7 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
     for effect in effects:
         name = effect_words(effect["name"])
         share = effect["share_of_gap"]
-        closes = "takes up what repeats do not show" if share is None else f"closes {_percent(share)} of it"
+        closes = "explains what repeats do not share" if share is None else f"closes {_percent(share)} of it"
         sentence = f"{name[:1].upper()}{name[1:]} {closes}"
         if effect["probability"] is not None:
             sentence += f"; its weight is {effect['probability']:.2f}"

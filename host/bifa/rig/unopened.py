@@ -18,7 +18,7 @@ def why_unopened(port: str, error: Exception) -> str:
     number = number or next((number for name, number in _ON_WINDOWS.items() if name in str(error)), None)
     if number in (errno.EBUSY, errno.EAGAIN):
         holder = holder_of(port)
-        return f"{port} is in use by {holder}: end that first" if holder else PORT_BUSY.format(port=port)
+        return f"{port} is in use by {holder}: close it first" if holder else PORT_BUSY.format(port=port)
     if number == errno.EACCES:
         return PORT_REFUSED.format(port=port)
     if number == errno.ENOENT:

@@ -142,7 +142,7 @@ class Model:
                 effect, _, parameter = name.partition(".")
                 effects.setdefault(effect, {})[parameter] = value
             else:
-                raise ModelParameterError(f"{name!r} is no parameter; known are {', '.join(BASE_PARAMETERS)}")
+                raise ModelParameterError(f"{name!r} is not a parameter; known are {', '.join(BASE_PARAMETERS)}")
         return replace(self, parameters=parameters, effects=effects, covariance=covariance or self.covariance)
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Model:

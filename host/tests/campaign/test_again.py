@@ -165,5 +165,5 @@ def test_a_speed_within_what_repeats_differ_by_is_predicted():
 def test_rounds_of_an_earlier_version_are_walked_again(tmp_path):
     file = tmp_path / "rounds.json"
     file.write_text('[{"effects": [], "predicted_mm_s": 20.0, "measured_mm_s": 20.1, "spread_mm_s": 0.1}]')
-    with pytest.raises(StageError, match=r"rounds\.json is of an earlier version.*--rerun again"):
+    with pytest.raises(StageError, match=r"rounds\.json was written by an earlier version.*--rerun again"):
         read_rounds(file)

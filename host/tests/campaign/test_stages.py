@@ -94,7 +94,7 @@ def test_folders_are_artefacts_too_and_provenance_is_the_same_for_the_same_setti
 
 def test_a_damaged_provenance_is_refused_with_advice(tmp_path):
     (tmp_path / PROVENANCE).write_text("{")
-    with pytest.raises(StageError, match="name another folder"):
+    with pytest.raises(StageError, match="choose another folder"):
         run_stages(tmp_path, [])
 
 
@@ -152,7 +152,7 @@ def test_what_the_campaign_did_not_make_is_refused_before_any_stage_runs(tmp_pat
 
 def test_a_campaign_does_not_run_inside_a_data_set(tmp_path):
     (tmp_path / "dataset.toml").write_text("mine")
-    with pytest.raises(StageError, match="is a data set: name another folder"):
+    with pytest.raises(StageError, match="is a data set; choose another folder"):
         run_stages(tmp_path, [folder_maker()])
 
 
@@ -239,7 +239,9 @@ def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, 
     log = []
     with pytest.raises(KeyboardInterrupt):
         run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
-    with pytest.raises(StageError, match=r"\.measure-unfinished was begun with quick = True, not False.*both are kept"):
+    with pytest.raises(
+        StageError, match=r"\.measure-unfinished was begun with quick = True, not False.*both are then kept"
+    ):
         run_stages(tmp_path, [stopping(log, {"quick": False}, by_hand=True)])
     monkeypatch.setattr("bifa.__version__", "9.9")
     run_stages(tmp_path, [stopping(log, {"quick": True}, by_hand=True)])
@@ -265,7 +267,7 @@ def test_settings_that_differ_are_refused_with_what_would_be_lost_and_what_would
         run_stages(tmp_path, [stage(True)])
     assert str(refused.value) == (
         f"{tmp_path / '.measure-unfinished'} holds 16 trials of the stage measure, begun with quick = False, not True: "
-        "go on there with what it was begun with, or name another folder for a new campaign; both are kept then"
+        "resume with the original settings, or choose another folder for a new campaign (both are then kept)"
     )
     assert len(list((tmp_path / ".measure-unfinished").rglob("*.csv"))) == 16
 

@@ -69,7 +69,7 @@ def test_a_trial_that_does_not_fit_the_others_is_named_with_its_lag(session):
     (found,) = findings([*session[:-1], late(wrong, -0.01)])
     assert found.file == wrong.file
     assert str(found).startswith(f"{wrong.file}: the displacement is ")
-    assert "ms early against the pressures, in the session's other trials" in str(found)
+    assert "ms early relative to the pressures, in the session's other trials" in str(found)
     assert misfit_of_last([*session[:-1], late(wrong, -0.01)]).startswith(f"{wrong.file}: the displacement is ")
     assert misfit_of_last(session) is None
 
@@ -77,7 +77,7 @@ def test_a_trial_that_does_not_fit_the_others_is_named_with_its_lag(session):
 def test_a_shift_of_all_trials_is_one_finding(session):
     (found,) = findings([late(trial, 0.012) for trial in session])
     assert found.file is None
-    assert "ms late against the pressures: a shift between the instruments" in str(found)
+    assert "ms late relative to the pressures: a shift between the instruments" in str(found)
     assert not findings([late(trial, -0.007) for trial in session])  # a sensor's filter
 
 

@@ -94,7 +94,7 @@ def test_a_snap_through_is_no_spike_and_a_coarse_sensor_is_not_clipped():
 
 def test_a_pressure_of_the_wrong_sign_is_called_that():
     (found,) = damaged("anchor_pull_2.csv", pressure_psi=lambda x: -x)
-    assert str(found).endswith("psi on average where 8.5 psi was commanded: its sign is turned")
+    assert str(found).endswith("psi on average where 8.5 psi was commanded: its sign is reversed")
 
 
 def test_an_actuator_that_vacuum_draws_in_begins_where_it_should():

@@ -85,7 +85,7 @@ def test_the_walk_whose_gait_it_is_is_named(day):
     [
         ({"psi12_deg": 120.0, "psi13_deg": 300.0}, "a phase is how far head and tail are ahead of the body"),
         ({"duty_body": 0.44}, "a duty is the part of the cycle at vacuum"),
-        ({"period_s": 3.0}, "another gait was walked than dataset.toml says"),
+        ({"period_s": 3.0}, "the robot did not walk the gait in dataset.toml"),
     ],
 )
 def test_a_likely_cause_is_named(day, gait, cause):

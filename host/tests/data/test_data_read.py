@@ -290,7 +290,7 @@ def test_no_table_and_no_folder(tmp_path):
 
 
 def test_a_folder_above_a_data_set_is_told_its_name(folder):
-    with pytest.raises(DatasetError, match=f"is no data set, but holds bench: name {folder}"):
+    with pytest.raises(DatasetError, match=f"is not a data set, but contains bench: name {folder}"):
         read_dataset(folder.parent)
 
 

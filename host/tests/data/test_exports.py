@@ -213,19 +213,19 @@ def test_an_encoding_that_is_another_is_said_with_how_to_declare_it(tmp_path):
 
 def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
     (tmp_path / "a.csv").write_text("t,x,F\n(s),(mm),(kN)\n0,1,2\n")
-    with pytest.raises(DatasetError, match=r"line 2, column F: the file says kN, and units.force_N is declared as N"):
+    with pytest.raises(DatasetError, match=r"line 2, column F: the file says kN, but units.force_N is declared as N"):
         read_export(tmp_path / "a.csv", declared(SIMPLE + "units_rows = 1\n"), MACHINE)
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (SIMPLE.replace("force_N =", "force_kN ="), r"instrument\.machine\.columns: force_kN is no column"),
+        (SIMPLE.replace("force_N =", "force_kN ="), r"instrument\.machine\.columns: force_kN is not a column"),
         (
             SIMPLE.replace('force_N = "N"', 'force_N = "mm"'),
             r"line 3, .*units: force_N is 'mm'; it must be one of N, kN",
         ),
-        (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has none: say in which unit.*N \| kN"),
+        (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has no unit: declare the one in the file.*N \| kN"),
         (SIMPLE + "skip_row = 2\n", r"line 4, .*skip_row: unknown key"),
         (SIMPLE + "skip_rows = -2\n", r"skip_rows: -2 is outside"),
         (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; there are arduino"),
@@ -233,7 +233,7 @@ def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
         (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
         (SIMPLE + 'decimal = ","\n', r"decimal: must be"),
         (SIMPLE + "sign = { force_N = 2 }\n", r"sign: force_N must be 1 or -1"),
-        (SIMPLE + 'zone = "Berlin"\n', r"zone: there is no zone 'Berlin'"),
+        (SIMPLE + 'zone = "Berlin"\n', r"zone: unknown time zone 'Berlin'"),
         (SIMPLE + 'sync = "edges"\n', r"sync: must be"),
         (SIMPLE.replace('time_s = "s"', 'time_s = "frame"'), r"rate_hz: must be given"),
         (SIMPLE.replace("machine", "robot"), r"instrument\.robot: must be machine .* or camera"),
@@ -357,7 +357,7 @@ def test_a_columns_name_alone_is_no_unit(tmp_path):
     found, _, _ = read_export(tmp_path / "a.csv", declared("[instrument.machine]\n" + columns + units), MACHINE)
     assert found["force_N"].tolist() == [2000.0, 3000.0]
     (tmp_path / "a.csv").write_text("t,x,N [N]\n0,1,2\n1,2,3\n")
-    with pytest.raises(DatasetError, match=r"the file says N, and units.force_N is declared as kN"):
+    with pytest.raises(DatasetError, match=r"the file says N, but units.force_N is declared as kN"):
         read_export(
             tmp_path / "a.csv", declared("[instrument.machine]\n" + columns.replace('"N"', '"N [N]"') + units), MACHINE
         )

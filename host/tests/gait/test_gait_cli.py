@@ -79,7 +79,7 @@ def test_the_list_of_gaits_is_readable_at_80_columns():
 def test_options_of_a_search_are_refused_where_gaits_are_listed(tmp_path):
     (tmp_path / "mine.toml").touch()
     for options in (["--seed", "3"], ["--out", tmp_path], ["--model", tmp_path / "mine.toml"]):
-        assert f"{options[0]} is for a new search" in str(invoke("gaits", *options).exception)
+        assert f"{options[0]} applies to a new search" in str(invoke("gaits", *options).exception)
 
 
 @pytest.mark.parametrize("make", [["--make"], []])

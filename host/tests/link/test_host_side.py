@@ -246,10 +246,10 @@ def test_a_recording_is_a_data_set(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["monitor", "--model", "{here}", "--port", "nowhere"], "are for --web"),
-        (["monitor", "--web-port", "0", "--port", "nowhere"], "are for --web"),
+        (["monitor", "--model", "{here}", "--port", "nowhere"], "require --web"),
+        (["monitor", "--web-port", "0", "--port", "nowhere"], "require --web"),
         (["monitor", "--web", "--model", "{missing}", "--port", "nowhere"], "does not exist"),
-        (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds is for --run"),
+        (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds requires --run"),
         (["compare", "{here}"], "two campaigns or more"),
     ],
     ids=" ".join,

@@ -56,4 +56,4 @@ def test_a_console_with_its_input_closed_says_so(uno):
         timeout=60,
     )
     assert ended.returncode == 2
-    assert ended.stderr.startswith("error: nothing can be typed, as the standard input is closed")
+    assert ended.stderr.startswith("error: stdin is closed")

@@ -111,7 +111,7 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
     record_telemetry(open_rig, "the port", tmp_path / "out", None, 120.0, Console(file=told, width=200))
     text = told.getvalue()
     assert f"{unos[0].device} is gone; plug the Uno in again" in text
-    assert f"what was recorded is in {tmp_path / 'out'}; when that Uno is back, recording goes on" in text
+    assert f"what was recorded is in {tmp_path / 'out'}; recording resumes when that Uno is back" in text
     assert text.count("when that Uno is back") == 1
     for path in files:
         recorded = rows(path)
@@ -128,7 +128,7 @@ def test_a_restart_never_walks_and_a_person_is_asked(uno, gait, tmp_path):
         uno.board.reset()
         terminal.sees("Press Enter to walk")
         terminal.presses("clear\n")
-        terminal.sees("'clear' is no answer here")
+        terminal.sees("'clear' is not an answer here")
         driven_s = uno.driven_s
         uno.wait(3.0)
         assert (uno.board.valves, uno.driven_s) == (0, driven_s), "it waits for the person"
@@ -159,7 +159,7 @@ def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, mo
     record_telemetry(open_rig, None, tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
     assert unos[0].driven_s > 0
     assert unos[1].driven_s == 0, "another board, or the same one anew: it does not walk by itself"
-    assert "recording without walking, as nobody can be asked" in told.getvalue()
+    assert "recording without walking, since no one can be asked" in told.getvalue()
     unos[1].unplug()
 
 

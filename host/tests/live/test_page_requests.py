@@ -67,7 +67,7 @@ def test_what_is_no_request_ends_its_page(page, live, text):
     one.state()
     one.send(TextMessage(text))
     assert [message for message in one.messages(5) if "id" in message] == []
-    assert "that is no request" in one.closed.reason
+    assert "not a valid request" in one.closed.reason
     assert live.pilot.stops == []
 
 
@@ -91,7 +91,7 @@ def test_only_a_truth_value_decides_what_closing_does(page, live, stop):
 @pytest.mark.parametrize("gait", [None, [], {}, {"period_s": 4}])
 def test_what_is_no_gait_is_refused(page, gait):
     one = page()
-    assert "a gait has period_s" in one.answer(one.ask("draft", gait=gait))["error"]
+    assert "a gait needs period_s" in one.answer(one.ask("draft", gait=gait))["error"]
 
 
 def test_what_is_not_known_is_refused_with_what_there_is(page):

@@ -211,7 +211,7 @@ def test_a_word_that_is_no_answer_neither_keeps_nor_discards(bench, tmp_path):
     here.desk.again = again
     assert len(here.run(tmp_path / "day", (STATIC,)).trials) == 1
     assert words == []
-    assert "'no' is no answer here: Enter keeps it, r repeats it, q stops." in here.said
+    assert "'no' is not an answer here: Enter keeps it, r repeats it, q stops." in here.said
 
 
 def test_a_trial_that_was_stopped_is_not_kept_and_is_tried_again_once_somebody_says_so(bench, tmp_path):

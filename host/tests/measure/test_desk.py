@@ -166,6 +166,6 @@ def test_a_word_that_is_no_answer_starts_nothing_and_is_asked_again(typed, word)
     typed(f"{word}\n".encode())
     assert waited(lambda: instruments.ready or (len(said) > 1 or None))
     assert not instruments.ready
-    assert f"{word!r} is no answer here: press Enter once it is done, q stops." in said[-1]
+    assert f"{word!r} is not an answer here: press Enter once it is done, q stops." in said[-1]
     typed(b"\n")
     assert waited(lambda: instruments.ready or None)

@@ -53,7 +53,7 @@ def test_who_has_locked_a_port_is_named_with_process_and_command(port, held):
         open_rig(port)
     said = str(refused.value)
     assert said.startswith(f"{port} is in use by `-c 'import serial")
-    assert said.endswith(f"(process {program.pid}): end that first")
+    assert said.endswith(f"(process {program.pid}): close it first")
     assert "\n" not in said
     program.communicate()
     open_rig(port).close()

@@ -129,4 +129,4 @@ def test_a_pipe_steeper_than_vertical_is_refused_with_the_range(degrees):
 def test_what_the_papers_table_would_ignore_is_refused(ignored):
     result = _run("--paper", *ignored)
     assert result.exit_code == 2
-    assert "--paper has walks of its own" in result.output
+    assert "--paper simulates walks of its own" in result.output

@@ -99,15 +99,15 @@ def test_another_image_in_its_place_is_not_written(package):
 
 def test_an_image_of_other_tables_is_neither_taken_up_nor_written(package, monkeypatch, tmp_path):
     monkeypatch.setattr("bifa.firmware.image.TABLE_HASH", TABLE_HASH ^ 1)
-    with pytest.raises(ImageError, match="build the firmware again"):
+    with pytest.raises(ImageError, match="rebuild the firmware"):
         carried_image(package)
-    with pytest.raises(ImageError, match="build the firmware again"):
+    with pytest.raises(ImageError, match="rebuild the firmware"):
         write_image(BUILT, tmp_path)
 
 
 def test_what_is_no_image_of_bifa_is_refused(tmp_path):
     (tmp_path / "blink.hex").write_text(":0400000001020304F2\n:00000001FF\n")
-    with pytest.raises(ImageError, match="no firmware of bifa"):
+    with pytest.raises(ImageError, match="not a bifa firmware image"):
         image_of(tmp_path / "blink.hex")
 
 

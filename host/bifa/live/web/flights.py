@@ -45,6 +45,6 @@ def fly(
                 raise
             if str(error) != told:
                 told = str(error)
-                say(f"{error}\nwaiting for the Uno, since a page is open; when it is back, it stands (Ctrl-C ends)")
-            begin, came_back = later, "the Uno was gone, and is back; it does not walk by itself"
+                say(f"{error}\nwaiting for the Uno, since a page is open; once back, it stands still (Ctrl-C ends)")
+            begin, came_back = later, "the Uno was gone and is back; it does not walk by itself"
             time.sleep(RETRY_S)

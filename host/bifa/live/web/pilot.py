@@ -90,7 +90,7 @@ class Pilot:
             if not self._is_flying:
                 future.set_exception(NobodyThereError(self._ended))
             elif len(self._asked) >= MOST_ASKED:
-                future.set_exception(BusyError("the robot is busy with what was asked before; try again, or stop it"))
+                future.set_exception(BusyError("the robot is busy with earlier requests; try again, or stop it"))
             else:
                 self._asked.append(_Asked(what, changes, future))
         return future
@@ -311,7 +311,7 @@ def _why(uno: Uno) -> str:
         return f"fault {status.fault}: see `status` in bifa console"
     if status.is_emergency_stop_pressed:
         return "the emergency stop was pressed"
-    return "it was stopped at the Uno: the emergency stop, or a stop that came over the line"
+    return "it was stopped at the Uno: the emergency stop, or a stop sent over the serial line"
 
 
 def _chambers(sample: Sample) -> dict[str, dict[str, Any]]:

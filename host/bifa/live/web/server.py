@@ -229,7 +229,7 @@ class LivePage:
             asked = json.loads(text)
             number, name = asked["id"], asked["do"]
         except (ValueError, KeyError, TypeError, RecursionError):
-            raise AskedWrongError('that is no request: send {"id": 1, "do": "stop"}') from None
+            raise AskedWrongError('not a valid request: send {"id": 1, "do": "stop"}') from None
         if name == "stop":
             self._answer_later(page, number, self._stop(f"page {page.number}"))
         elif not page.is_owner:
@@ -249,7 +249,7 @@ class LivePage:
         }
         try:
             if name not in acts:
-                raise AskedWrongError(f"a page asks for stop, {', '.join(acts)}; not for {name!r}")
+                raise AskedWrongError(f"unknown request {name!r}; a page may ask for stop, {', '.join(acts)}")
             said = acts[name]()
         except BifaError as error:
             page.tell({"id": number, "error": str(error)})
@@ -269,7 +269,7 @@ class LivePage:
 
     def _apply(self, gait: Gait) -> Awaitable[str]:
         done = self.pilot.ask(lambda uno: uno.upload(gait.as_dict()), changes=True)
-        return _waited(done, "applied; a walking robot takes it at its next cycle")
+        return _waited(done, "applied; a walking robot adopts it at its next cycle")
 
     def _save(self, gait: Gait, name: str) -> Awaitable[str]:
         return _waited(
@@ -284,7 +284,7 @@ class LivePage:
         loaded = self.pilot.ask(load, changes=True)
 
         async def shown() -> str:
-            said = await _waited(loaded, f"loaded {preset}; a walking robot takes it at its next cycle")
+            said = await _waited(loaded, f"loaded {preset}; a walking robot adopts it at its next cycle")
             self._draft(_of_gait(loaded.result()), by=0)
             return said
 
@@ -293,7 +293,7 @@ class LivePage:
     def _closing(self, asked: Mapping[str, Any]) -> str:
         stop = asked.get("stop")
         if not isinstance(stop, bool):
-            raise AskedWrongError("stop is true or false")
+            raise AskedWrongError("stop must be true or false")
         self._change({"stops_when_closed": stop})
         return f"when the last page closes, the robot {'stops' if stop else 'goes on'}"
 
@@ -346,7 +346,7 @@ def _seen(future: Future[Any]) -> None:
 def _gait(asked: Mapping[str, Any]) -> Gait:
     given = asked.get("gait")
     if not isinstance(given, Mapping) or set(given) != set(GAIT_NAMES):
-        raise AskedWrongError(f"a gait has {', '.join(GAIT_NAMES)}")
+        raise AskedWrongError(f"a gait needs {', '.join(GAIT_NAMES)}")
     return Gait(**given)
 
 
@@ -366,7 +366,7 @@ async def _answered(said: Awaitable[str]) -> tuple[int, dict[str, Any]]:
     except BifaError as error:
         return 409, {"error": str(error)}
     except (CancelledError, asyncio.CancelledError):
-        return 409, {"error": "not done: a stop came first"}
+        return 409, {"error": "cancelled: a stop came first"}
     except TimeoutError:
         return 504, {"error": "the robot does not answer"}
 
@@ -393,7 +393,7 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
         listener.listen()  # who comes before the server is up waits
     except OSError as error:
         raise ServerError(
-            f"port {port} of this computer cannot be opened ({error}); choose another: --web-port"
+            f"port {port} of this computer cannot be opened ({error}); choose another with --web-port"
         ) from None
     config = uvicorn.Config(
         live.app(),
