@@ -1,4 +1,4 @@
-"""Text as it is shown: from outside made safe, so that what a terminal would obey becomes visible; and counts."""
+"""Text for the terminal: control characters from outside are shown instead of obeyed; and counted nouns."""
 
 
 def printable(text: str, keep: str = "\n\t") -> str:
@@ -12,5 +12,5 @@ def printable(text: str, keep: str = "\n\t") -> str:
 
 
 def counted(number: int, one: str) -> str:
-    """`number` of what `one` of is called so: 1 trial, 2 trials."""
+    """`number` with its noun: 1 trial, 2 trials."""
     return f"{number} {one}{'' if number == 1 else 's'}"

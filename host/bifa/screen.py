@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 
 class Console(rich.console.Console):
-    """Rich's, which obeys nothing that stands in what it is given: no escape sequence, no markup, no emoji code. What
-    is to be coloured is a `Text`."""
+    """Rich's, which interprets nothing in the text it is given: no escape sequence, no markup, no emoji code.
+    Colored text is given as a `Text`."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"markup": False, "emoji": False} | options)
@@ -33,10 +33,8 @@ class Console(rich.console.Console):
 
 
 class Countdown:
-    """What is waited for and for how long still: one line, redrawn in place; where nothing can be, said once.
-
-    What is typed meanwhile may stand behind it.
-    """
+    """What is being waited for, and for how long still: one line, redrawn in place; printed once where it cannot be.
+    Input that is typed meanwhile may follow it."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

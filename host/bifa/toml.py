@@ -1,4 +1,4 @@
-"""TOML from strangers: tomllib, kept from what would cost it gigabytes or the interpreter's stack."""
+"""TOML from untrusted sources: tomllib, guarded against input that would exhaust memory or the stack."""
 
 import re
 import tomllib

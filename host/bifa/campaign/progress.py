@@ -60,7 +60,7 @@ class StageProgress:
         self.close()
 
     def close(self) -> None:
-        """Nothing is redrawn any more; what stands there stays."""
+        """Stop redrawing; what has been drawn stays."""
         if self._bars is not None:
             self._bars.stop()
             self._bars = None

@@ -1,4 +1,4 @@
-"""Where a campaign is run, a rig that is opened for every stage that measures; how much it measures; both in words."""
+"""Where a campaign runs (a rig, opened for every stage that measures) and how much it measures; both in words."""
 
 import shlex
 from collections.abc import Mapping
@@ -45,7 +45,8 @@ class Setup:
 
     @property
     def is_kept(self) -> bool:
-        """Whether the robot is real: nothing is measured again unasked, and what was is kept beside the new."""
+        """Whether the robot is real: nothing is measured again unless asked, and earlier data are kept next to the
+        new."""
         return not self.is_virtual
 
     def open(self, stage: int) -> Rig:

@@ -55,7 +55,7 @@ def measure_walks(
 
 
 def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Callable[[float], None], **_: Any) -> Trial:
-    """The `Recorder` of a rig that needs nobody, until the walk has settled, or has had time enough for that."""
+    """The `Recorder` of a rig that needs nobody, until the walk has settled, or has lasted long enough for that."""
     while True:
         trial = unattended(rig, uno, planned, on_progress)
         short = planned.cycles < LEAST
@@ -65,8 +65,8 @@ def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Calla
 
 
 def planned_cycles(model: Model, gait: Gait, least: int) -> int:
-    """For how many cycles to walk: near the edge a robot may stand nearly still for several before it walks, so that
-    the first ones tell nothing; the model foretells how many."""
+    """How many cycles to walk, as the model predicts: near the edge a robot may hardly move for several cycles
+    before it walks, so that the first ones say nothing."""
     return int(np.clip(predict_speed(model, spread_of(model), gait).cycles, least, MOST_CYCLES))
 
 
@@ -81,8 +81,8 @@ def walks_of(gait: Gait, dataset: Dataset) -> list[Trial]:
 
 
 def foretold(model: Model, trial: Trial, naive: bool = False) -> Prediction:
-    """What the model says of the walk in `trial`, of which only the clock's rate is used; naive: by its covariance
-    alone."""
+    """The model's prediction of the walk in `trial`, of which only the clock's rate is used; naive: from its
+    covariance alone."""
     known = spread_of(model)
     rate = seconds_per_uno_s(trial)
     return predict_speed(model, known.naive if naive else known, Gait(**trial.walked), clock_rate=rate)

@@ -1,4 +1,5 @@
-"""Which command does each chamber's pressure follow in a walk? Its own, if nothing is exchanged and no sign turned."""
+"""Which command does each chamber's pressure follow in a walk? Its own, unless chambers are exchanged or a sign is
+reversed."""
 
 from collections.abc import Iterator
 from itertools import permutations

@@ -25,8 +25,8 @@ _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
 
 
 def check_known(known: Mapping[str, float]) -> Iterator[Finding]:
-    """One finding a value that cannot be right. A value beyond the plausible range that is no slip is the lab's own:
-    its robot is another; only what the model cannot compute with is named too."""
+    """One finding for each value that cannot be right. A value beyond the plausible range that is not a recognisable
+    slip is taken as the lab's own, from another robot; only what the model cannot compute with is reported too."""
     positive, negative = (known.get(name) for name in _SUPPLIES)
     exchanged = positive is not None and negative is not None and positive < 0.0 < negative
     if exchanged:

@@ -55,8 +55,8 @@ def displacement_lag(trial: Trial) -> Lag | None:
 
 
 def misfit(lag: Lag, others: Sequence[Lag] = ()) -> str | None:
-    """What is wrong with a trial's lag beside those of the session's other trials, or, without any, beside none at all;
-    None where it fits."""
+    """What is wrong with a trial's lag compared with the session's other trials or, if there are none, with no lag
+    at all; None if it fits."""
     if not others:
         return shift_of_all([lag])
     usual_s = float(np.median([other.late_s for other in others]))
@@ -80,7 +80,7 @@ def shift_of_all(lags: Sequence[Lag]) -> str | None:
 
 
 def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
-    """What is wrong with a trial's lag beside those of `earlier` ones, with its file."""
+    """What is wrong with a trial's lag compared with `earlier` ones, with its file."""
     last = displacement_lag(trial)
     if last is None:
         return None
@@ -89,7 +89,7 @@ def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
 
 
 def misfit_of_last(trials: Sequence[Trial]) -> str | None:
-    """`misfit_of` the trial that was recorded last beside the earlier ones."""
+    """`misfit_of` the last trial recorded, against the earlier ones."""
     return misfit_of(trials[-1], trials[:-1])
 
 

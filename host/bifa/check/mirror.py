@@ -1,8 +1,8 @@
 """Walks whose displacement runs the wrong way: a filling body gets longer, whichever way the robot goes.
 
-The net way says nothing: a robot may slide back. Its length, or where only the head was tracked its position, must go
-with the body's command over whole cycles, and it is each snap-through's bump in the pressure that has the last word:
-where a slide or a late valve turns the former round, the latter keeps its sign.
+The net displacement says nothing: a robot may slide back. Its length (or, where only the head was tracked, its
+position) must follow the body's command over whole cycles. The bump in the pressure at each snap-through decides: a
+slide or a late valve can reverse the former, not the latter.
 """
 
 from collections.abc import Iterator
@@ -22,8 +22,8 @@ _FOLLOWS = 0.6  # of its range, the body's pressure its command; less in cycles 
 
 
 def shortens_mm(trial: Trial) -> float:
-    """By how much the body gets shorter (of an untracked tail: the head goes back) while it is commanded to fill; 0
-    where that is nothing to speak of."""
+    """By how much the body gets shorter while it is commanded to fill (tail not tracked: the head goes back); 0 if
+    negligible."""
     mm = swing(trial.columns["command_body"], _length_mm(trial), trial.time_s)
     return -mm if mm is not None and mm < -_SHORTER_MM else 0.0
 

@@ -1,7 +1,7 @@
 """Mistakes made in the lab that the format cannot refuse: signs, mirrors, exchanged tubes, another gait, a wrong unit.
 
-A diagnosis would look for their cause in the robot. Each check has its own file, with its limits and how far from them
-healthy data stay, strong effects included. Nothing here changes what is fitted.
+A diagnosis would look for their cause in the robot. Each check has its own file, with its limits and how far healthy
+data stay from them, even with strong effects. Nothing here changes what is fitted.
 """
 
 from collections.abc import Iterable, Sequence
@@ -25,14 +25,14 @@ _CHECKS = {
 
 
 def check_trial_plausibility(trial: Trial, walks: Sequence[Trial] = ()) -> list[Finding]:
-    """What was mistaken in one trial, as it seems; `walks`, others of the day, may have the gait that it was."""
+    """Likely mistakes in one trial; `walks`: the day's other walks, one of which may have the gait that was walked."""
     if trial.experiment == "locomotion":
         return [*check_walk(trial, walks), *check_units(trial)]
     return [*_CHECKS[trial.experiment](trial), *check_units(trial)]
 
 
 def check_plausibility(dataset: Dataset) -> list[Finding]:
-    """What was mistaken in a data set, as it seems: what is known beforehand, single trials, odd repeats."""
+    """Likely mistakes in a data set: in the declared values, in single trials, in repeats that differ."""
     walks = dataset.of("locomotion")
     found = [finding for trial in dataset.trials for finding in check_trial_plausibility(trial, walks)]
     found += check_strokes(dataset, _files(finding for finding in found if finding.kind == "unit"))

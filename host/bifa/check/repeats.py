@@ -43,7 +43,8 @@ def check_repeats(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
 
 
 def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:
-    """A repeat is as far from the others as from the nearest of them: two that agree, of five, are no mistake."""
+    """A repeat counts as different only if even the nearest other one is far away: two of five that agree are no
+    mistake."""
     for place, trial in enumerate(group.trials):
         others = [k for k in range(len(group.trials)) if k != place]
         found = []

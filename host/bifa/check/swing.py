@@ -1,7 +1,7 @@
-"""How far a quantity goes with a valve's command: it tells signs, mirrors and swaps without a model of the robot.
+"""How far a quantity follows a valve's command: this reveals signs, mirrors and swaps without a model of the robot.
 
-A chamber fills while its command is 1 and empties while it is 0, so that over its own command's spans its pressure goes
-the whole way up and down; over another chamber's it goes less far, and what has its sign turned goes the other way.
+A chamber fills while its command is 1 and empties while it is 0, so its pressure goes all the way up and down over the
+spans of its own command, less far over another chamber's, and the other way if its sign is reversed.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What several commands share: options under one name each, with their values completed, and how they end."""
+"""Options shared by several commands, each under one name and with completion; and how commands end."""
 
 import pkgutil
 from collections.abc import Callable, Iterator
@@ -59,7 +59,7 @@ def port_option(text: str = "Serial port, `virtual`, or the name of a rig; detec
 
 
 def file_option(text: str) -> Any:
-    """An option that names a file to read, which has to be there."""
+    """An option for an input file, which must exist."""
     return typer.Option(help=text, exists=True, dir_okay=False)
 
 
@@ -79,13 +79,13 @@ NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
 
 
 def examples(*commands: str) -> str:
-    """What stands at the end of a command's help, one to a line."""
+    """The examples at the end of a command's help, one per line."""
     return "\n\n".join(("Examples:", *commands))
 
 
 @contextmanager
 def stoppable(kept: Callable[[], str]) -> Iterator[None]:
-    """Ctrl-C inside ends the command with status 130 and a line that says what `kept()` says was kept."""
+    """On Ctrl-C, end the command with status 130 and a line with what `kept()` says was kept."""
     try:
         yield
     except KeyboardInterrupt:

@@ -142,7 +142,7 @@ def _check(out: Path, port: str) -> None:
 
 
 def _attended(console: "Console", setup: "Setup", watch: Path | None, bench_file: Path | None) -> "Setup":
-    """The setup with somebody at the desk, and what is known of it."""
+    """The setup with somebody at the desk, and what that person declares as known."""
     from dataclasses import replace
 
     from bifa.measure.bench_file import known_on

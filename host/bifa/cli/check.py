@@ -57,7 +57,7 @@ def register(app: typer.Typer) -> None:
 
 
 def warn_of_units(console: "Console", dataset: "Dataset") -> None:
-    """What a fit would stumble over, or make a diagnosis of."""
+    """Warn of units that a fit would stumble over, or a diagnosis would take for an effect."""
     from bifa.check.plausibility import check_plausibility
 
     _print_findings(console, [finding for finding in check_plausibility(dataset) if finding.kind == "unit"])

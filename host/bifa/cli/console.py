@@ -59,7 +59,7 @@ def console(
 
 
 def _lines(uno: "Uno") -> Iterator[str]:
-    """What comes through the pipe; in between the Uno is kept from taking this host for dead."""
+    """Lines from the pipe; while it is silent the Uno is told that this host is alive."""
     import queue
     import threading
 

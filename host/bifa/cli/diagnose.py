@@ -184,8 +184,8 @@ def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:
 
 
 def _rigs(measured: Dataset, port: str | None, progress: Progress) -> Callable[[int], AbstractContextManager[Rig]]:
-    """Opens the rig for an experiment more. A virtual robot is the one of the data set's provenance; where a person
-    works the instruments, no bar redraws itself over the questions."""
+    """Open the rig for a further experiment. A virtual robot is the one in the data set's provenance; where a person
+    works the instruments, no bar is redrawn over the questions."""
     from contextlib import contextmanager
 
     from bifa.campaign.resolve import SPECIMEN

@@ -154,7 +154,7 @@ def experiment(
 
 
 def _check_within(option: str, value: float, low: float, high: float, unit: str) -> None:
-    """Not left to typer, for whose ranges NaN is within."""
+    """Not left to typer, whose ranges accept NaN."""
     if not low <= value <= high:
         raise typer.BadParameter(f"{option} must be {low:g} to {high:g} {unit}, not {value:g}")
 
@@ -238,13 +238,14 @@ def _run(
 
 
 def _length_of_walks(trials: "Sequence[PlannedTrial]") -> dict[str, int]:
-    """No part of a walk's condition: a session that is resumed has to be asked for the same."""
+    """The number of cycles, which is not part of a walk's condition: a session can only be resumed with the same
+    one."""
     cycles = [trial.cycles for trial in trials if trial.cycles]
     return {"cycles": cycles[0]} if cycles else {}
 
 
 def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":
-    """The one condition that was named: what a record is of cannot be guessed."""
+    """The one condition that the options name: which trial a record belongs to cannot be guessed."""
     first = [trial for trial in trials if trial.repeat == 1]
     if len(first) > 1:
         raise typer.BadParameter(

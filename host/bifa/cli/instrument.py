@@ -39,8 +39,8 @@ def instrument(
     """Look at an instrument's export, and declare how it is written.
 
     Shows the names of its columns, its first rows, its row of units and a small plot of each column, proposes which
-    column is what, and asks. The declaration is checked on the file and written into the bench's file, from where
-    `bifa campaign` and `bifa experiment` read it. Nothing is declared that you have not been asked about.
+    column is what, and asks. The declaration is checked on the file and written into the bench's file, from where `bifa
+    campaign` and `bifa experiment` read it. Nothing is declared without asking you.
     """
     from bifa.data.export import presets as known
     from bifa.screen import Console
@@ -171,7 +171,7 @@ def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
 
 
 def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
-    """What frames and dates need besides."""
+    """What else is needed where times are frames or dates."""
     if unit == "frame":
         return {"rate_hz": typer.prompt("Frames per second?", default=given.rate_hz if given else None, type=float)}
     if unit != "date":
@@ -197,7 +197,7 @@ def _sync(seen: "Look") -> dict[str, Any]:
 
 
 def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:
-    """Read the file as it is declared, and say what comes out; DatasetError where it cannot be."""
+    """Read the file as declared, and say what comes out; DatasetError if that fails."""
     import numpy as np
 
     from bifa.data.export import read_export

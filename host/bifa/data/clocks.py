@@ -1,4 +1,5 @@
-"""Times as instruments write them, in seconds from the first one: dates, with zones or of one, and counted frames."""
+"""Times as instruments write them, in seconds since the first one: dates, with or without time zones, and counted
+frames."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -19,7 +20,7 @@ def zone_of(name: str) -> ZoneInfo:
 
 
 def first_that_is_none(cells: Sequence[str], form: str | None, zone: ZoneInfo | None) -> int | None:
-    """The first cell that is no date as declared."""
+    """The first cell that is not a date in the declared form."""
     for row, cell in enumerate(cells):
         try:
             _moment(cell, form, zone)

@@ -1,4 +1,5 @@
-"""Numbers that nobody measured: a marker held, or set to zero, while it was out of sight; a code for "no value"."""
+"""Numbers that nobody measured: a marker held, or set to zero, while it was out of sight; a code for a missing
+value."""
 
 import numpy as np
 
@@ -10,14 +11,14 @@ _FAR_MM = 5.0  # no motion there and back again
 
 
 def codes(values: np.ndarray) -> np.ndarray:
-    """Which samples stand for no value: a code of its own kind among other values, shape (n,)."""
+    """Which samples are codes for a missing value: one distinct number among other values, shape (n,)."""
     found = np.isin(np.abs(values), _CODES)
     return found if not found.all() else np.zeros(len(values), bool)
 
 
 def held(values_mm: np.ndarray) -> np.ndarray:
     """Which samples of a tracked displacement repeat the one before because the marker was lost, shape (n,): it was
-    elsewhere before, or when it was found again. At rest a sample may repeat, and nothing is lost."""
+    elsewhere before the run, or after it. A marker at rest may repeat a value without being lost."""
     found = np.zeros(len(values_mm), bool)
     same = np.diff(values_mm) == 0.0
     for first, last in _runs(same):

@@ -1,7 +1,7 @@
-"""The one desk for tables that programs write: which cells there are, by what names, and what number stands in each.
+"""Tables as other programs write them: their cells, the names of their columns, and the number in each cell.
 
-pandas reads; whatever it cannot read as plain numbers is gone through cell by cell, so that the first fault is named by
-line, column and cell. Nothing is guessed: how the file is written says its `Form`.
+pandas reads; what it cannot read as plain numbers is parsed cell by cell, so that the first fault is named by line,
+column and cell. Nothing is guessed: `Form` says how the file is written.
 """
 
 from __future__ import annotations
@@ -301,7 +301,7 @@ class Sheet:
 
 
 class _Parted(Sequence[Sequence[str]]):
-    """Lines that are parted into cells one by one: of a file of many megabytes few are ever asked for."""
+    """Lines that are split into cells on demand: of a file of many megabytes few are ever needed."""
 
     def __init__(self, lines: Sequence[bytes], parts_of: Callable[[bytes], list[str]]) -> None:
         self._lines, self._parts_of = lines, parts_of
@@ -320,7 +320,7 @@ class _Parted(Sequence[Sequence[str]]):
 
 
 def _exact() -> dict[str, str]:
-    """What makes pandas read a decimal as the nearest double; later versions do, and warn of being asked."""
+    """Options that make pandas read a decimal as the nearest double; later versions do, and warn if asked to."""
     import pandas
 
     old = tuple(int(part) for part in pandas.__version__.split(".")[:2]) < (3, 1)

@@ -1,4 +1,4 @@
-"""Writing a data set: whole or trial by trial, never over another, never half."""
+"""Write a data set as a whole or trial by trial; never over another one, and never half of one."""
 
 import os
 import re
@@ -97,7 +97,7 @@ class DatasetWriter:
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """Of the session that began it."""
+        """What was noted by the session that began the data set."""
         return self._dataset.provenance
 
     def has(self, trial: Trial) -> bool:

@@ -16,11 +16,11 @@ class EffectError(BifaError):
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One number of an effect. `typical` is the size at which the effect is plainly visible on the paper's robot.
+    """One number of an effect. `typical` is the size at which the effect is clearly visible on the paper's robot.
 
-    A `size` parameter is 0 when the effect is absent; the others only shape it. Of an `own` one every trial has its
-    own value; a `frequency` is looked for in the residual's spectrum. `omitted`: its value where it is left out, if not
-    the typical one: what an older file means that does not know it. `period`: of a value that repeats itself.
+    A `size` parameter is 0 when the effect is absent; the others only shape it. An `own` parameter has a value of its
+    own in every trial; a `frequency` is searched in the residual's spectrum. `omitted`: the value where it is left out,
+    if not the typical one (in files older than the parameter). `period`: of a periodic value.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What walks will differ from a fitted model by beyond its covariance: from run to run, over a session, and what is
+"""How walks differ from a fitted model beyond its covariance: from run to run, over a session, and what is
 unexplained."""
 
 from __future__ import annotations

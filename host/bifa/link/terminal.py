@@ -18,7 +18,7 @@ def is_answer(line: str) -> bool:
 
 
 def settle(uno: Uno, clock: Clock) -> None:
-    """End what may stand unfinished in the Uno's line, and drop what it answers to that."""
+    """End whatever is unfinished in the Uno's input line, and drop its answer to that."""
     uno.session.transport.write(b"\n")
     deadline = clock.now() + SETTLE_S
     while clock.now() < deadline:
@@ -27,7 +27,7 @@ def settle(uno: Uno, clock: Clock) -> None:
 
 
 def _drop_answers(uno: Uno) -> None:
-    """Drop answers to what nobody waits for any more; what the Uno said by itself stays."""
+    """Drop answers that nobody waits for any more; what the Uno said by itself stays."""
     lines = [line for line in uno.session.lines if not is_answer(line)]
     uno.session.lines.clear()
     uno.session.lines.extend(lines)

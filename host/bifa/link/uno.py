@@ -165,7 +165,7 @@ class Uno:
         return {name: from_wire(name, value) for name, value in self._read_set()[0].items()}
 
     def parameters_and_pending(self) -> tuple[dict[str, float], bool]:
-        """As parameters(); and whether a walking robot takes them only at its next cycle."""
+        """As parameters(); and whether a walking robot adopts them only at its next cycle."""
         values, is_pending = self._read_set()
         return {name: from_wire(name, value) for name, value in values.items()}, is_pending
 
@@ -181,7 +181,7 @@ class Uno:
     def upload(self, parameters: Mapping[str, float], save: str | None = None, wait: bool = False) -> None:
         """Replace the parameter set as a whole and read it back; parameters not named stay as they are.
 
-        A walking robot takes the new set at the next cycle boundary: `wait` returns only then. `save` keeps it as a
+        A walking robot adopts the new set at the next cycle boundary: `wait` returns only then. `save` keeps it as a
         preset as well. Raises UnoParameterError before anything is sent if a value is out of range, and LinkError if
         the Uno ends up with anything but what was meant.
         """
@@ -204,8 +204,8 @@ class Uno:
             raise LinkError("the parameters read back are not those sent; upload again")
 
     def guard(self) -> None:
-        """From now on, and until the Uno restarts, it vents by itself GUARD_S after this host has fallen silent (was
-        killed, hangs), unless it has a `host_timeout_s` already. Whatever moves air calls this."""
+        """From now on, until it restarts, the Uno vents by itself GUARD_S after this host has fallen silent (killed,
+        or hanging), unless it has a `host_timeout_s` already. Whatever moves air calls this."""
         if not self._is_guarded and self._read_set()[0]["host_timeout_s"] == 0:
             self._is_guarded = True
             try:
@@ -216,7 +216,8 @@ class Uno:
 
     @contextmanager
     def unguarded(self) -> Iterator[None]:
-        """Inside, the Uno's parameters are those that were meant, to be kept for another day and a bare terminal."""
+        """Inside, the Uno holds the parameters as they were meant, without the guard: to be saved for another day
+        and a bare terminal."""
         if not self._is_guarded:
             yield
             return
@@ -228,7 +229,7 @@ class Uno:
             self.guard()
 
     def guard_again(self) -> None:
-        """After a set was taken over that knows of no guard."""
+        """After a parameter set without the guard has been adopted."""
         if self._is_guarded:
             self._is_guarded = False
             self.guard()

@@ -46,7 +46,7 @@ class Conversation:
         self._is_stopping = True
 
     def _dropped(self) -> list[str]:
-        """What was typed and has not begun; it waits no more."""
+        """What was typed and has not begun; it will not be carried out."""
         lines: list[str | None] = []
         with contextlib.suppress(queue.Empty):
             while True:

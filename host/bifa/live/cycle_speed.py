@@ -1,5 +1,5 @@
-"""How fast the robot is, by its own phase, whatever gait anybody believes it has: over its last whole cycle, and over
-those that have settled."""
+"""How fast the robot walks, by its own phase, whatever gait it is thought to have: over its last whole cycle, and
+over the settled ones."""
 
 import math
 from collections import deque

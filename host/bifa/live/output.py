@@ -18,7 +18,8 @@ class OutputError(BifaError):
 
 @contextmanager
 def writable() -> Iterator[None]:
-    """Around all that a command does: an error of a full disk becomes an OutputError. A robot inside stands by then."""
+    """Wraps a whole command: an error of a full disk becomes an OutputError. A robot inside has been stopped by
+    then."""
     try:
         yield
         if sys.stdout is not None:
@@ -32,7 +33,7 @@ def writable() -> Iterator[None]:
 
 
 def _drop_the_rest() -> None:
-    """What waits to be written would fail once more as Python ends."""
+    """Output not written yet would fail once more as Python exits."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())

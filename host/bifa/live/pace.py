@@ -1,4 +1,4 @@
-"""A rig's time beside the wall's: a virtual rig waits for it; a real one is in step by itself."""
+"""Keep a rig in step with the wall clock: a virtual rig waits for it; a real one is in step by itself."""
 
 import time
 
@@ -15,7 +15,7 @@ class Pace:
         self._lead_s = clock.now() - time.monotonic()
 
     def wait(self) -> None:
-        """Sleep until the wall clock has caught up; what a slow computer has lost is not made up for."""
+        """Sleep until the wall clock has caught up; time lost by a slow computer is not made up."""
         ahead_s = self._clock.now() - time.monotonic() - self._lead_s
         if ahead_s > 0:
             time.sleep(ahead_s)

@@ -206,14 +206,14 @@ class _Recorder:
 
 
 def next_file(out: Path) -> Path:
-    """After the last one, whatever is missing before it."""
+    """Numbered one above the highest, whatever is missing before it."""
     numbers = [path.stem.removeprefix("telemetry_") for path in out.glob("telemetry_*.csv")]
     return out / f"telemetry_{1 + max((int(n) for n in numbers if n.isdecimal()), default=0)}.csv"
 
 
 @contextmanager
 def telemetry_file(path: Path) -> Iterator[TextIO]:
-    """A new file; on a full disk it ends with its last whole line, and RecordError says so."""
+    """A new file; if the disk fills, it ends with its last whole line, and RecordError says so."""
     file = None
     try:
         with path.open("x", encoding="utf-8", newline="") as file:

@@ -1,4 +1,4 @@
-"""Walking without looking: until somebody ends it, or the robot does."""
+"""Walk without a monitor, until somebody ends it or the robot stops by itself."""
 
 import errno
 import math

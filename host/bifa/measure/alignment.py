@@ -72,11 +72,11 @@ def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndar
 
 
 def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """What a camera saw at other times, shape of `time_s`; up to two samples beside its record, the first or the last.
+    """What a camera saw at other times, shape of `time_s`, up to two samples beyond either end of its record.
 
-    A snap-through lasts a few samples: a cubic through them follows it, a straight line would not, and across more of
-    them nothing does: what is not there is not made up. Raises AlignmentError where the record begins later or ends
-    earlier, has a hole (rows or values missing, a marker held or set to zero), or too few samples a second.
+    A snap-through lasts a few samples: a cubic follows it, a straight line would not, and longer gaps are not filled
+    in. Raises AlignmentError where the record begins later or ends earlier, has a hole (rows or values missing, a
+    marker held or set to zero), or too few samples a second.
     """
     measured = np.isfinite(values)
     measured[measured] = ~held(values[measured])
@@ -95,7 +95,7 @@ def resampled(time_s: np.ndarray, instrument_s: np.ndarray, values: np.ndarray) 
 
 
 def camera_rate(instrument_s: np.ndarray) -> dict[str, float]:
-    """What a trial notes of its camera: its samples are then taken at the Uno's."""
+    """The camera's own rate, noted since the trial's samples are at the Uno's."""
     return {"camera_rate_hz": round(float(1.0 / np.median(np.diff(instrument_s))), 1)}
 
 

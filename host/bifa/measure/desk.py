@@ -39,7 +39,7 @@ class Countdown(Protocol):
         """`what` goes on for `left_s` more."""
 
     def close(self) -> None:
-        """Nothing is counted any more; a second call does nothing."""
+        """Stop counting; a second call does nothing."""
 
 
 class _Unseen:
@@ -91,7 +91,7 @@ class Desk:
         return text
 
     def again(self, answer: str, choice: str) -> None:
-        """`answer` is none to what was asked last, which is still asked: `choice` says what would be."""
+        """`answer` does not answer the last question, which still stands: `choice` says what would."""
         self.is_asking = True
         self.say(f"{answer!r} is not an answer here: {choice}, q stops.")
 
@@ -124,7 +124,7 @@ class Desk:
         return line.strip()
 
     def clear(self) -> None:
-        """Nothing is asked any more, nor counted."""
+        """No question and no countdown stands any more."""
         self._countdown.close()
         if self._watch is not None:
             (self._watch / ASKS).unlink(missing_ok=True)

@@ -1,8 +1,8 @@
-"""A lab's own instruments as files: what to mount and start is said, the file that comes is the record.
+"""A lab's own instruments as files: the person is told what to mount and start; the file that appears is the record.
 
 It has `time_s` and the channels under the data set's names, or is written as declared; `<name>.sync.csv` beside it has
 `sync_time_s`, the rising edges of the strobe that its sync input saw, unless the declaration has them elsewhere. It
-appears in the watched folder or below it, or its path is typed. What has appeared and cannot be used is said.
+appears in the watched folder or below it, or its path is typed. Files that cannot be used are named.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ class OwnInstruments:
                     yield path, tuple(_signature(part) for part in parts)
 
     def _alone(self) -> Iterator[tuple[Path, Signature]]:
-        """Files of which no record can be made yet, or at all."""
+        """Files that do not make a record yet, or never will."""
         whole = {path for path, _ in self._signatures()}
         whole |= {sync_file(path) for path in whole}
         for path in self._files():
@@ -236,7 +236,7 @@ class OwnInstruments:
         return (".xlsx",) if self._export.form.format == "xlsx" else TEXT_SUFFIXES
 
     def _tell_of_others(self) -> None:
-        """What has come and cannot be used, once for each version of it."""
+        """Name files that have appeared and cannot be used, once for each version of them."""
         for path, signature in self._alone():
             if self._told.get(path) == signature:
                 continue
@@ -260,7 +260,8 @@ class OwnInstruments:
         )
 
     def _take_new(self) -> bool:
-        """Take the file that has come since the start, once it is whole; what cannot be used is said, once."""
+        """Take the file that has appeared since the start, once it is complete; one that cannot be used is named
+        once."""
         self._take_correction()
         self._tell_of_others()
         for path, signature in self._signatures():
@@ -276,7 +277,7 @@ class OwnInstruments:
         return False
 
     def _take_correction(self) -> None:
-        """A declaration that was put right while it is waited for: what came is looked at again."""
+        """If the declaration was corrected while its file waits, look at the file again."""
         try:
             declared = self._exports()
         except BifaError as error:
@@ -313,7 +314,7 @@ class OwnInstruments:
         return True
 
     def _refuse_earlier(self, path: Path) -> None:
-        """A file that an earlier trial was kept with: somebody saved or named the wrong one."""
+        """Refuse the file of an earlier trial: somebody saved or named the wrong one."""
         data, own = path.read_bytes(), Path(self._present.planned.file).stem
         for old in sorted(self._kept.glob("*")) if self._kept is not None else ():
             if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:

@@ -46,8 +46,8 @@ def mount(bench: Bench, uno: Uno, experiment: str, **settings: Any) -> None:
 
 
 def idle(bench: Bench, uno: Uno, duration_s: float, doing: str = "") -> None:
-    """Let time pass without letting the Uno think that the host has gone; `doing`: what the robot does meanwhile, for
-    whoever works the instruments."""
+    """Let time pass, and the Uno know that the host is alive; `doing`: what the robot does meanwhile, for whoever
+    works the instruments."""
     until_s = bench.clock.now() + duration_s
     while (left_s := until_s - bench.clock.now()) > 0:
         attend(bench.instruments, doing, left_s)

@@ -1,4 +1,4 @@
-"""A trial in which the robot was stopped, or did anything but what was asked, is no data."""
+"""A trial in which the robot was stopped, or did anything but what was asked, is not valid."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SAMPLES = 3  # in that time
 
 
 class DisturbedError(BifaError):
-    """The robot left what it was to do in the middle of a trial."""
+    """The robot did something else in the middle of a trial."""
 
 
 def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, str] | None = None) -> None:

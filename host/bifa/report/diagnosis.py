@@ -126,7 +126,7 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
 
 
 def base_table(record: Mapping[str, Any]) -> Table | None:
-    """The base model's parameters, fitted in company of the named effects; none where the data remain unexplained."""
+    """The base model's parameters, fitted together with the named effects; none where the data remain unexplained."""
     rows = []
     for name, one in record["base_parameters"].items():
         if name in BASE_PARAMETERS:  # not the coefficients of a curve's shape

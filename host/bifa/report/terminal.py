@@ -1,4 +1,4 @@
-"""What stands on pages, on a terminal: the same tables and sentences, in the same words."""
+"""Pages on a terminal: the same tables and sentences, in the same words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A port that is opened again and again, and each time only for the board that was there at first."""
+"""A port that is reopened, but only for the board that was there first."""
 
 from collections.abc import Callable
 from typing import Any

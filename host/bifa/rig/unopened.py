@@ -13,7 +13,7 @@ _ON_WINDOWS = {"PermissionError": errno.EBUSY, "FileNotFoundError": errno.ENOENT
 
 
 def why_unopened(port: str, error: Exception) -> str:
-    """What to tell of the error with which `port` did not open."""
+    """What to say about the error with which `port` did not open."""
     number = getattr(error, "errno", None)
     number = number or next((number for name, number in _ON_WINDOWS.items() if name in str(error)), None)
     if number in (errno.EBUSY, errno.EAGAIN):

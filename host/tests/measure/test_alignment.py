@@ -154,7 +154,7 @@ def test_rows_that_are_missing_are_followed_over_two_and_refused_beyond(first, l
     keep[first : first + length] = False
     within = CAMERA_S[first - 1] < UNO_S[-1]
     if length > 2 and within and first + length < len(keep):
-        with pytest.raises(AlignmentError, match=r"hole.*not made up; repeat|ends .* too early"):
+        with pytest.raises(AlignmentError, match=r"hole.*not filled in; repeat|ends .* too early"):
             resampled(UNO_S, CAMERA_S[keep], SEEN_MM[keep])
     elif length <= 2:
         found = resampled(UNO_S, CAMERA_S[keep], SEEN_MM[keep])

@@ -1,4 +1,4 @@
-"""What the page foretells of the gait on its sliders: the model's own speed at once, then the interval."""
+"""What the page predicts for the gait on its sliders: the model's own speed at once, then the interval."""
 
 from __future__ import annotations
 

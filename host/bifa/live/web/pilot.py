@@ -29,15 +29,15 @@ Tell = Callable[[dict[str, Any], list[dict[str, Any]]], None]
 
 
 class NobodyThereError(BifaError):
-    """The robot is gone, or has not come yet."""
+    """The robot is not connected, or not any more."""
 
 
 class BusyError(BifaError):
-    """More is asked than can be done soon."""
+    """More requests are waiting than can be served soon."""
 
 
 class Stopper:
-    """Sends stops from a thread of its own, which does nothing else, and so waits for nobody."""
+    """Sends stops from a thread of its own, which waits for nothing else."""
 
     def __init__(self, send: Callable[[], None]) -> None:
         self._send, self._wanted, self._ended = send, threading.Event(), False
@@ -161,7 +161,7 @@ class Pilot:
             self._ended = "bifa monitor has ended; the robot was stopped"
 
     def _land(self) -> None:
-        """Nothing more is done for anybody."""
+        """Refuse all further requests."""
         with self._lock:
             self._is_flying = False
             left = [asked.future for asked in self._asked] + ([self._stop] if self._stop else [])
@@ -269,7 +269,7 @@ class _Flight:
         self._learnt = {"parameters": parameters, "presets": self._uno.presets(), "is_pending": is_pending}
 
     def _notice(self) -> None:
-        """Why it stopped, if it did so by itself; and whether a set that waited has been taken over."""
+        """Why the robot stopped, if it did so by itself; and whether a pending parameter set has been adopted."""
         state = self._latest.sample.state if self._latest.sample else ""
         if state != self._state:
             if self._state in MOVING and state not in MOVING and self._pilot.stopped is None:

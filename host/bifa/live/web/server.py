@@ -332,7 +332,7 @@ async def _send(socket: WebSocket, page: Page) -> None:
 
 
 async def _waited(future: Future[Any], said: str) -> str:
-    """What is said when it is done; if it has not begun in time, it is not done behind the page's back."""
+    """What is said once it is done; if it has not begun in time, it is not done later without the page's knowing."""
     await asyncio.wait_for(asyncio.wrap_future(future), _ANSWER_S)
     return said
 
