@@ -18,7 +18,7 @@ from typing import NamedTuple
 SEED = 7
 
 
-class Case(NamedTuple):
+class TimedCommand(NamedTuple):
     """A command on the data set drawn with these options; `required_s` by the clock, on two cores."""
 
     key: str
@@ -28,11 +28,11 @@ class Case(NamedTuple):
 
 
 CASES = (
-    Case("fit", "fit", ("--none",), 10.0),
-    Case("diagnosis_none", "diagnose", ("--none",), 15.0),
-    Case("diagnosis", "diagnose", ("--effect", "hysteresis", "--size", "0.8"), 20.0),
-    Case("diagnosis_pair", "diagnose", ("--pair",), 45.0),
-    Case("diagnosis_unexplained", "diagnose", ("--outside",), 60.0),
+    TimedCommand("fit", "fit", ("--none",), 10.0),
+    TimedCommand("diagnosis_none", "diagnose", ("--none",), 15.0),
+    TimedCommand("diagnosis", "diagnose", ("--effect", "hysteresis", "--size", "0.8"), 20.0),
+    TimedCommand("diagnosis_pair", "diagnose", ("--pair",), 45.0),
+    TimedCommand("diagnosis_unexplained", "diagnose", ("--outside",), 60.0),
 )
 
 
@@ -52,7 +52,7 @@ def run() -> dict[str, float]:
     return figures
 
 
-def _timed(case: Case, scratch: Path) -> tuple[float, float, str]:
+def _timed(case: TimedCommand, scratch: Path) -> tuple[float, float, str]:
     """Seconds by the clock, seconds of processor, and what the command answered."""
     folder, answer = scratch / case.key, scratch / f"{case.key}.json"
     sealed = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(SEED), "--out", str(folder), *case.drawn]

@@ -32,7 +32,7 @@ from pathlib import Path
 from benchmarks import blind_records, small_systems
 from benchmarks.blind_figures import BASELINES, CLOSE, name_of, report, said_of, table
 from benchmarks.search_record import searched
-from benchmarks.simulations import Simulations
+from benchmarks.simulations import SimulationCount
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
@@ -112,7 +112,7 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int)
     use_threads(threads)
     system = prepare(read_dataset(folder))
     system.effects = {name: effect for name, effect in system.effects.items() if name != without}
-    simulations = Simulations()
+    simulations = SimulationCount()
     simulations.of_trials(system)
     began = time.monotonic()
     found = diagnose(system, progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))

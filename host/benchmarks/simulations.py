@@ -7,7 +7,7 @@ from multiprocessing import get_context
 from typing import Any
 
 
-class Simulations:
+class SimulationCount:
     """A count that threads and forked children share."""
 
     def __init__(self) -> None:

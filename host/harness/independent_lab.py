@@ -50,7 +50,7 @@ class Actuator:
 
 
 @dataclass(frozen=True)
-class Lab:
+class IndependentLab:
     large: Actuator = Actuator((4900.0, 0.0520, 0.0200, 0.10, 15.0), 0.175, 118.0, 8.6, 2.3, 0.66)
     small: Actuator = Actuator((1800.0, 0.0290, 0.0110, 0.08, 3.5), 0.015, 13.0, 3.05, 2.6, 0.9)
     head_mass: float = 0.180
@@ -71,7 +71,7 @@ class Lab:
     seed: int = 0
     rng: np.random.Generator = field(default=None, compare=False)
 
-    def with_seed(self, seed: int) -> Lab:
+    def with_seed(self, seed: int) -> IndependentLab:
         return replace(self, seed=seed, rng=np.random.default_rng(seed))
 
     def noise(self, n: int, sd: float) -> np.ndarray:
@@ -178,7 +178,7 @@ BASELINE = {
 }
 
 
-def session(lab: Lab, path, repeats: int = 3, walks: int = 2) -> Dataset:
+def session(lab: IndependentLab, path, repeats: int = 3, walks: int = 2) -> Dataset:
     """A day at the bench: both actuators at three pressures, steps at two, pulls at three, walks."""
     trials = []
     for repeat in range(1, repeats + 1):
@@ -199,7 +199,7 @@ def session(lab: Lab, path, repeats: int = 3, walks: int = 2) -> Dataset:
     return Dataset(path=path, name="independent laboratory", known=known, trials=trials)
 
 
-def small_session(lab: Lab) -> Dataset:
+def small_session(lab: IndependentLab) -> Dataset:
     """Enough to determine everything, twice each, and short: the suite has to end."""
     trials = []
     for repeat in (1, 2):

@@ -10,7 +10,7 @@ from harness.pty_uno import PtyUno
 from harness.web_socket import WebSocket
 
 
-class Monitor:
+class WebMonitor:
     """The command, the Uno that it talks to, and its page's address."""
 
     def __init__(self, *options, port=None, uno=None):

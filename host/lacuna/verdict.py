@@ -21,7 +21,7 @@ from lacuna.system import Record, System
 from lacuna.values import Values
 
 
-class Model:
+class CompletedModel:
     """The completed model, called like `simulate`: `model(record)` or `model(record, theta)`.
 
     `record` is anything that `diagnose` takes as one record, `theta` a mapping of values that differ from the fitted
@@ -81,7 +81,7 @@ class Verdict:
         self.system, self.diagnosis = system, told(system, diagnosis)
         self.verdict, self.effects, self.warnings = diagnosis.verdict, self.diagnosis.effects, diagnosis.warnings
         fitted = diagnosis.told if isinstance(system, FunctionSystem) else diagnosis.final
-        self.model = Model(system, fitted)
+        self.model = CompletedModel(system, fitted)
         self.theta = self.model.theta
         self.nuisances = _nuisances(fitted)
         self.record = as_record(self.diagnosis)

@@ -10,7 +10,7 @@ import pytest
 
 from bifa.data import Dataset, write_dataset
 from bifa.rig import check_port
-from harness.independent_lab import Lab
+from harness.independent_lab import IndependentLab
 
 HOST = Path(__file__).resolve().parent.parent
 ROOMS = [
@@ -45,7 +45,7 @@ def bifa(run, *arguments: str | Path) -> str:
 
 @pytest.fixture(scope="module")
 def day(tmp_path_factory):
-    folder, lab = tmp_path_factory.mktemp("lab") / "day", Lab().with_seed(11)
+    folder, lab = tmp_path_factory.mktemp("lab") / "day", IndependentLab().with_seed(11)
     trials = [
         replace(lab.static("large", p, rate_mm_s=4.0, repeat=r), file=f"{p:g}_{r}.csv")
         for p in (0.0, 8.0)

@@ -16,7 +16,7 @@ from benchmarks.small.excitation import shaped
 from benchmarks.small.instrument import Instrument
 from benchmarks.small.kind import Form, Kind
 from benchmarks.small.kinds import KINDS
-from benchmarks.small.offered import Model, Offered, Run
+from benchmarks.small.offered import Offered, OfferedModel, OfferedRun
 from lacuna import Effect, Parameter
 
 TOLD = Path(__file__).with_name("told.json")  # by truth and seed, which draw can be told
@@ -33,7 +33,7 @@ class UntellableError(Exception):
 
 
 @dataclass(frozen=True)
-class Judged:
+class UnseenRun:
     """A run that nobody is given: what happens without noise, to compare predictions with."""
 
     name: str
@@ -53,7 +53,7 @@ class Sealed:
     values: Mapping[str, float]
     instrument: Instrument
     repeats: int
-    judged: tuple[Judged, ...]
+    judged: tuple[UnseenRun, ...]
 
 
 def drawn(truth: str, seed: int) -> tuple[Offered, Sealed]:
@@ -178,11 +178,11 @@ def _offered(truth: str, kind: Kind, effects, conditions, spread: float, draw, k
     own, decoys = _candidates(truth, kind, effects, draw)
     return Offered(
         key=key,
-        model=Model(kind.key, tuple(e.name for e in decoys), guess),
+        model=OfferedModel(kind.key, tuple(e.name for e in decoys), guess),
         parameters=tuple(_guessed(p, 0.25, draw) for p in kind.parameters),
         effects=tuple(replace(e, parameters=tuple(_guessed(p, 0.4, draw) for p in e.parameters)) for e in own) + decoys,
         nuisances=(),
-        runs=tuple(Run(name, name, t, u, np.full(len(t), np.nan)) for name, t, u in conditions),
+        runs=tuple(OfferedRun(name, name, t, u, np.full(len(t), np.nan)) for name, t, u in conditions),
     )
 
 
@@ -224,19 +224,21 @@ def _options(kind: Kind, instrument: Instrument, repeats: int, draw: np.random.G
     return options
 
 
-def _measured(conditions, clean, instrument: Instrument, repeats: int, draw: np.random.Generator) -> tuple[Run, ...]:
+def _measured(
+    conditions, clean, instrument: Instrument, repeats: int, draw: np.random.Generator
+) -> tuple[OfferedRun, ...]:
     return tuple(
-        Run(f"{name}, run {run}" if repeats > 1 else name, name, t, u, instrument.measured(y, t, draw))
+        OfferedRun(f"{name}, run {run}" if repeats > 1 else name, name, t, u, instrument.measured(y, t, draw))
         for (name, t, u), y in zip(conditions, clean, strict=True)
         for run in range(1, repeats + 1)
     )
 
 
-def _judged(kind: Kind, values: Mapping[str, float], draw: np.random.Generator) -> tuple[Judged, ...]:
+def _judged(kind: Kind, values: Mapping[str, float], draw: np.random.Generator) -> tuple[UnseenRun, ...]:
     """Two runs under conditions that nobody is given, one of them larger than any."""
     time_s = np.arange(kind.samples) * (kind.duration_s / kind.samples)
     found = []
     for shape, size in zip(("multisine", "steps"), kind.judged, strict=True):
         applied = _applied(kind, shape, size, time_s, draw)
-        found.append(Judged(f"{shape} {size:g}", time_s, applied, kind.truth(time_s, applied, values)))
+        found.append(UnseenRun(f"{shape} {size:g}", time_s, applied, kind.truth(time_s, applied, values)))
     return tuple(found)

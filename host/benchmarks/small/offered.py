@@ -16,7 +16,7 @@ from lacuna import Effect, Parameter, Record
 
 
 @dataclass(frozen=True)
-class Model:
+class OfferedModel:
     """`simulate` of one set, of whole numbers and names alone, so that it can be sent anywhere."""
 
     kind: str
@@ -42,7 +42,7 @@ def _in(name: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Run:
+class OfferedRun:
     """One record as the owner has it. `condition`: runs with an equal one repeat one another."""
 
     name: str
@@ -57,11 +57,11 @@ class Offered:
     """`parameters`, `effects`, `nuisances` as declared, `options` further arguments of `lacuna.System`."""
 
     key: str
-    model: Model
+    model: OfferedModel
     parameters: tuple[Parameter, ...]
     effects: tuple[Effect, ...]
     nuisances: tuple[Parameter, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[OfferedRun, ...]
     options: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -7,16 +7,16 @@ from itertools import combinations
 
 from benchmarks.small.kinds.terms import TERMS
 from benchmarks.small.offered import Offered
-from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.problem import KnownProblem, RivalAnswer
 from benchmarks.systems.rivals import best_subset, gaussian_process, sparse_regression
 
 _STARTS, _POINTS = 2, 200
 _ALL_PAIRS = 8  # candidates; where there are more, the best one is grown
 
 
-def problem(offered: Offered) -> Problem:
+def problem(offered: Offered) -> KnownProblem:
     """The set as the rivals take it: nothing in it is known of the truth."""
-    return Problem(
+    return KnownProblem(
         key=offered.key,
         name=offered.kind.name,
         source="",
@@ -51,7 +51,7 @@ def _whole(measured) -> bool:
     return bool((measured == measured).all())
 
 
-def by_bic(given: Problem) -> Answer:
+def by_bic(given: KnownProblem) -> RivalAnswer:
     """The set of up to two with the least BIC (no truth has more): all of them, or grown from the best one. Pairs are
     begun once, where the other explanations are begun twice."""
     names = list(given.library)
@@ -62,15 +62,15 @@ def by_bic(given: Problem) -> Answer:
         pairs = [(best, name) for name in names if name != best]
     found |= {pair: best_subset.fit(given, pair, starts=1) for pair in pairs}
     best = min(found, key=lambda chosen: best_subset.bic(given, found[chosen]))
-    return Answer(best, lambda record: given.predict(record, found[best]))
+    return RivalAnswer(best, lambda record: given.predict(record, found[best]))
 
 
-def _as_it_is(given: Problem) -> Answer:
+def _as_it_is(given: KnownProblem) -> RivalAnswer:
     base = best_subset.fit(given, (), _STARTS)
-    return Answer(None, lambda record: given.predict(record, base))
+    return RivalAnswer(None, lambda record: given.predict(record, base))
 
 
-PEERS: dict[str, Callable[[Problem], Answer]] = {
+PEERS: dict[str, Callable[[KnownProblem], RivalAnswer]] = {
     "the model as it is": _as_it_is,
     "best subset by BIC, SciPy": by_bic,
     "sparse regression, pysindy": sparse_regression.solve,

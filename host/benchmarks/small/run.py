@@ -10,7 +10,7 @@ import numpy as np
 
 import lacuna
 from benchmarks.search_record import searched
-from benchmarks.simulations import Simulations
+from benchmarks.simulations import SimulationCount
 from benchmarks.small.draw import Sealed
 from benchmarks.small.offered import Offered
 from benchmarks.small.peers import PEERS, problem
@@ -22,7 +22,7 @@ Predict = Callable[[Record], np.ndarray]
 def diagnosed(offered: Offered) -> tuple[dict[str, Any], dict[str, Any], Predict | None]:
     """What the engine says of a set, what it tried, and the model that it completes. An engine that raises has said
     "crash"."""
-    simulations = Simulations()
+    simulations = SimulationCount()
     system = lacuna.System(
         simulations.of(offered.model),
         offered.parameters,
@@ -45,7 +45,7 @@ def diagnosed(offered: Offered) -> tuple[dict[str, Any], dict[str, Any], Predict
     return said | spent, found, lambda record: np.asarray(verdict.model(record)[offered.kind.output])
 
 
-def _cost(began: float, simulations: Simulations) -> dict[str, Any]:
+def _cost(began: float, simulations: SimulationCount) -> dict[str, Any]:
     return {"processor_seconds": time.process_time() - began, "simulations": simulations.count}
 
 

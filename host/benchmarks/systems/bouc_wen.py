@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from benchmarks.systems.lines import lines_of
-from benchmarks.systems.problem import Problem
+from benchmarks.systems.problem import KnownProblem
 from lacuna import Effect, Parameter, Record
 
 SAMPLE_S, SAMPLES, NOISE_MM = 1 / 750, 750, 8e-3
@@ -88,14 +88,14 @@ EFFECTS = (
 )
 
 
-def problem(seed: int = 0) -> Problem:
+def problem(seed: int = 0) -> KnownProblem:
     """Multisines of 30 and 50 N, two runs of each, to fit; another of 40 N and a sweep of 40 N to judge by."""
     draw = np.random.default_rng(seed)
     inputs = {size: _multisine(draw, size) for size in (30.0, 50.0)}
     fitted = [_measured(draw, "multisine", size, force, run) for size, force in inputs.items() for run in (1, 2)]
     sweep = 40.0 * np.sin(2 * np.pi * (20.0 + 15.0 * _times()) * _times())
     other = {"multisine": _multisine(draw, 40.0), "sweep": sweep}
-    return Problem(
+    return KnownProblem(
         key="bouc_wen",
         name="Bouc-Wen oscillator",
         source="Noël and Schoukens, 2016; their equations and constants, seed 0",

@@ -15,7 +15,7 @@ from types import ModuleType
 import numpy as np
 
 from benchmarks.systems.lines import lines_of
-from benchmarks.systems.problem import Problem, Terms
+from benchmarks.systems.problem import KnownProblem, Terms
 from lacuna import Record, windows
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -42,11 +42,11 @@ def absent() -> str:
     return f"{' and '.join(missing)} not in {DATA.relative_to(ROOT.parent)} beside the checkout" if missing else ""
 
 
-def problem() -> Problem:
+def problem() -> KnownProblem:
     """Windows of 1 s: of the benchmark's first record to fit, of the one with pulses to judge by."""
     example = _example()
     first, second = (example.read(DATA / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
-    return Problem(
+    return KnownProblem(
         key="emps",
         name="EMPS, measured",
         source="Janot, Gautier and Brunot, 2019",

@@ -34,7 +34,7 @@ class Terms:
 
 
 @dataclass(frozen=True)
-class Problem:
+class KnownProblem:
     """A system whose structural error is known. `key` names it in bench.json.
 
     `simulate(record, theta)` with `parameters` is the model, `effects` the candidates that everybody is offered,
@@ -99,7 +99,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Answer:
+class RivalAnswer:
     """What a rival found: the mechanisms it `named` (None: it names nothing), a model to `predict` with, and its
     `verdict` where it has one."""
 

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from benchmarks.systems.lines import lines_of
-from benchmarks.systems.problem import Problem, Terms
+from benchmarks.systems.problem import KnownProblem, Terms
 from lacuna import Effect, Parameter, Record
 
 SAMPLE_S, NOISE_MM = 0.01, 0.2
@@ -79,7 +79,7 @@ TERMS = Terms(  # neither a delay nor a gain of the sensor is a term of a sum
 )
 
 
-def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = (), seed: int = 0) -> Problem:
+def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = (), seed: int = 0) -> KnownProblem:
     """Steps and sweeps of 1 and 2 N, three times each, to fit; of 1.5 and 3 N, once each, to judge by. `hidden`: what
     is there, by full parameter name; `withheld`: effects that nobody is offered."""
     draw = np.random.default_rng(seed)
@@ -90,7 +90,7 @@ def problem(hidden: Mapping[str, float] = HIDDEN, withheld: Collection[str] = ()
     there = frozenset(name.split(".")[0] for name in hidden)
     case = ", nothing hidden" if not there else ", what it hides not on offer" if withheld else ""
     terms = {name: term for name, term in TERMS.of.items() if name.split(".")[0] not in withheld}
-    return Problem(
+    return KnownProblem(
         key="spring" + ("_nothing" if not there else "_withheld" if withheld else ""),
         name="mass on a spring" + case,
         source="equations of the tests' toy, seed 0",

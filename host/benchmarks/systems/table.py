@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.systems.lines import lines_of
-from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.problem import KnownProblem, RivalAnswer
 from benchmarks.systems.rivals import best_subset, engine, gaussian_process, sparse_regression
 
 
@@ -19,7 +19,7 @@ class Rival:
 
     key: str
     name: str
-    solve: Callable[[Problem], Answer]
+    solve: Callable[[KnownProblem], RivalAnswer]
     lines: int
     by_terms: bool = False
 
@@ -43,7 +43,7 @@ RIVALS = (
 )
 
 
-def compare(problem: Problem) -> dict[str, float]:
+def compare(problem: KnownProblem) -> dict[str, float]:
     """Print a block of rows, the first one for the model as it is; returns the figures flat."""
     for record in problem.fitted:  # what compiles does so here
         problem.predict(record, {})
@@ -60,7 +60,7 @@ def compare(problem: Problem) -> dict[str, float]:
     return {f"systems_{problem.key}_{name}": value for name, value in figures.items()}
 
 
-def _row(problem: Problem, rival: Rival) -> dict[str, float]:
+def _row(problem: KnownProblem, rival: Rival) -> dict[str, float]:
     written = problem.model_lines + (problem.terms_lines if rival.by_terms else 0)
     if rival.by_terms and problem.terms is None:
         print(f"{rival.name:27}{'':40}   {problem.no_terms}", flush=True)
@@ -77,7 +77,7 @@ def _row(problem: Problem, rival: Rival) -> dict[str, float]:
     return {f"{rival.key}_{name}": float(np.round(value, 6)) for name, value in found.items()}
 
 
-def judged(problem: Problem, answer: Answer) -> tuple[str, str]:
+def judged(problem: KnownProblem, answer: RivalAnswer) -> tuple[str, str]:
     """Whether what was named is what is there, neither more nor less, and a verdict, if there is one, says so; and what
     was named."""
     if answer.named is None:

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from benchmarks.systems.lines import lines_of
-from benchmarks.systems.problem import Problem
+from benchmarks.systems.problem import KnownProblem
 from lacuna import Effect, Parameter, Record, segments
 
 SAMPLE_S, SAMPLES, BRIM_V = 4.0, 1024, 10.0
@@ -66,10 +66,10 @@ EFFECTS = (
 TRUTH = (0.055, 0.050, 0.043, BRIM_V, 0.35, 0.0, 0.0, np.inf, 0.0, 0.0, 0.0)
 
 
-def problem(seed: int = 0) -> Problem:
+def problem(seed: int = 0) -> KnownProblem:
     """One record to fit, cut into segments of one run for the engine, and one of another input to judge by."""
     draw = np.random.default_rng(seed)
-    return Problem(
+    return KnownProblem(
         key="tanks",
         name="cascaded tanks",
         source="Schoukens and Noël, 2017; their equations, seed 0",

@@ -26,7 +26,7 @@ from bifa.report.diagnosis import (
     verdict_sentence,
 )
 from bifa.report.evidence import BASE, COMPLETED, errors_chart
-from bifa.report.page import Motion, Page, Section, Table
+from bifa.report.page import ChartedSection, Motion, Page, Table
 from bifa.report.residuals import residual_charts
 from bifa.report.robustness import STANDING_MM_S, robustness_chart, standing_share
 from bifa.report.walks import MEASURED, Walk, walks_chart
@@ -111,7 +111,7 @@ def _bought(base_mm_s: float, completed_mm_s: float) -> str:
     return f"That is {abs(gain):.0f} % {'faster' if gain > 0 else 'slower'} than with the base model."
 
 
-def _found(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> Section:
+def _found(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> ChartedSection:
     effects, truth = summary["effects"], summary["truth"]
     said = found_sentences(effects) if effects else []
     for experiment in diagnosis.get("separated_by", []):
@@ -122,7 +122,7 @@ def _found(summary: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> Section:
             "The virtual robot draws its own effect and keeps it sealed: it was recorded before any measurement and "
             "opened only after the verdict."
         )
-    return Section("What was found", said, [effects_table(effects, truth)])
+    return ChartedSection("What was found", said, [effects_table(effects, truth)])
 
 
 def _off(
@@ -130,9 +130,9 @@ def _off(
     diagnosis: Mapping[str, Any],
     traces: Sequence[Mapping[str, Any]],
     labels: Mapping[str, str],
-) -> Section:
+) -> ChartedSection:
     groups = residual_charts(traces)
-    return Section(
+    return ChartedSection(
         "Where the base model is off, and what is left",
         [
             RESIDUAL,
@@ -145,13 +145,13 @@ def _off(
     )
 
 
-def walking(walks: Mapping[str, Walk]) -> Section:
+def walking(walks: Mapping[str, Walk]) -> ChartedSection:
     """The walk that the base model misses by most, as predicted and as measured."""
     walk = most_missed(walks)
     svg, seconds, rate = motion_of(walk)
     shown_s = round(seconds * rate, 1)
     how_fast = "in real time" if round(rate, 1) == 1.0 else f"at {rate:.1f} times real time"
-    return Section(
+    return ChartedSection(
         "The robot, walking",
         [
             f"The {walk.title}, for which the base model has the largest error: as the base model predicts it, as the "
@@ -191,7 +191,7 @@ def _ahead(miss_mm: float) -> str:
     return f"{abs(miss_mm):.1f} mm {'ahead' if miss_mm > 0 else 'behind'}"
 
 
-def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> Section:
+def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSection:
     robots = len(next(iter(summary["robustness"].values())))
     standing = {name: standing_share(speeds) for name, speeds in summary["robustness"].items()}
     said = [
@@ -220,7 +220,7 @@ def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> Section:
         "standard deviation).",
     )
     charts: list[Chart] = [walks_chart(list(walks.values())), robustness_chart(summary["robustness"], GAIT_NAMES)]
-    return Section("The gaits", said, [table], charts)
+    return ChartedSection("The gaits", said, [table], charts)
 
 
 _ENDED = {
@@ -230,7 +230,7 @@ _ENDED = {
 }
 
 
-def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> Section:
+def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
     """How well gaits were predicted that no fit had seen, round by round, and why the last round is the last."""
     rows = [
         [
@@ -255,7 +255,7 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> Section:
         *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
         f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
     ]
-    return Section("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
+    return ChartedSection("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
 
 
 def _round_words(one: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ from bifa.errors import BifaError
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
 from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, RMS, verdict_sentence
 from bifa.report.evidence import before_and_after
-from bifa.report.page import Page, Section, Table
+from bifa.report.page import ChartedSection, Page, Table
 from bifa.report.words import (
     NBSP,
     channel_words,
@@ -82,9 +82,13 @@ def compare_page(runs: Sequence[Campaign]) -> Page:
         f"{len(runs)} campaigns side by side",
         _lead(runs),
         [
-            Section("Verdicts", [f"{run.name}: {_verdict(run)}" for run in runs], [error_table(runs)], [_errors(runs)]),
-            Section("Gaits", tables=[gait_table(runs, which) for which in runs[0].gaits], charts=[_speeds(runs)]),
-            Section(
+            ChartedSection(
+                "Verdicts", [f"{run.name}: {_verdict(run)}" for run in runs], [error_table(runs)], [_errors(runs)]
+            ),
+            ChartedSection(
+                "Gaits", tables=[gait_table(runs, which) for which in runs[0].gaits], charts=[_speeds(runs)]
+            ),
+            ChartedSection(
                 "Models",
                 [
                     "Parameters as fitted with what was found in the model; ≠ marks those that differ between two "

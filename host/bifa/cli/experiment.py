@@ -29,7 +29,7 @@ EPILOG = examples(
 )
 
 
-class Experiment(StrEnum):
+class ExperimentName(StrEnum):
     """What can be run."""
 
     STATIC_LOADING = "static_loading"
@@ -40,24 +40,24 @@ class Experiment(StrEnum):
 
 
 def _named(text: str) -> str:
-    if text not in list(Experiment):
-        raise typer.BadParameter(f"{text!r} is none of {', '.join(Experiment)}")
+    if text not in list(ExperimentName):
+        raise typer.BadParameter(f"{text!r} is none of {', '.join(ExperimentName)}")
     return text
 
 
 def _begun(incomplete: str) -> list[str]:
-    return [name for name in Experiment if name.startswith(incomplete)]
+    return [name for name in ExperimentName if name.startswith(incomplete)]
 
 
 WHICH = typer.Argument(
-    help=f"{', '.join(list(Experiment)[:-1])}, or all: the paper's section IV, and walks.",
+    help=f"{', '.join(list(ExperimentName)[:-1])}, or all: the paper's section IV, and walks.",
     callback=_named,  # an enumeration's own help is one word that no narrow terminal can break
     autocompletion=_begun,
     metavar="EXPERIMENT",
 )
 
 
-class Actuator(StrEnum):
+class ActuatorName(StrEnum):
     """Which actuator."""
 
     LARGE = "large"
@@ -73,7 +73,9 @@ def experiment(
     name: Annotated[str, WHICH],
     out: Annotated[Path, typer.Option(help="Folder of the data set: a new one, or that of an interrupted session.")],
     port: Annotated[str | None, PORT] = None,
-    actuator: Annotated[Actuator | None, typer.Option(help="Only this one (static_loading, step_response).")] = None,
+    actuator: Annotated[
+        ActuatorName | None, typer.Option(help="Only this one (static_loading, step_response).")
+    ] = None,
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed in mm/s.")] = None,
     gait: Annotated[list[Path] | None, file_option("Gait file to walk; otherwise three built-in gaits.")] = None,
@@ -131,11 +133,11 @@ def experiment(
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
     if rate is not None and not math.isfinite(rate):
         raise typer.BadParameter(f"--rate must be a finite number of mm/s, not {rate:g}")
-    if inclination and name not in (Experiment.LOCOMOTION, Experiment.ALL):
+    if inclination and name not in (ExperimentName.LOCOMOTION, ExperimentName.ALL):
         raise typer.BadParameter(f"--inclination applies to walks only; leave it out, or run locomotion, not {name}")
     gaits = [_load(path) for path in gait] if gait else [BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
-        plan.EXPERIMENTS if name == Experiment.ALL else (name,),
+        plan.EXPERIMENTS if name == ExperimentName.ALL else (name,),
         actuators=(actuator.value,) if actuator else plan.ACTUATORS,
         repeats=repeats,
         pressures_psi=pressure or None,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from bifa.robot import Gait, Model
     from bifa.screen import Console
-    from bifa.simulate import Progress, SimulatedTrial, Supports
+    from bifa.simulate import Advance, SimulatedTrial, Supports
     from bifa.simulate.terrain import Obstacle as Obstacle_
 
 
@@ -127,7 +127,7 @@ def _walk(
     return record, float(progress.speed_mm_s[0])
 
 
-def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Progress") -> None:
+def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Advance") -> None:
     from rich.table import Table
 
     table = Table(title=f"{model.name}, period {gait.period_s:g} s", title_justify="left")

@@ -28,7 +28,7 @@ import numpy as np
 from .clocks import DATE, FRAME, SECONDS, dated, first_that_is_none, zone_of
 from .fields import Fields
 from .layout import EXPERIMENTS, is_command
-from .sheet import SEPARATORS, Form, Sheet, listed
+from .sheet import SEPARATORS, Sheet, SheetForm, listed
 
 MACHINE, CAMERA = "machine", "camera"
 ROLES = {"static_loading": MACHINE, "anchor_pull": MACHINE, "step_response": CAMERA, "locomotion": CAMERA}
@@ -56,7 +56,7 @@ class Export:
     strobe was sampled."""
 
     name: str
-    form: Form
+    form: SheetForm
     columns: Mapping[str, str]
     units: Mapping[str, str] = field(default_factory=dict)
     factor: Mapping[str, float] = field(default_factory=dict)
@@ -75,7 +75,7 @@ class Export:
         return self.sync == _SYNC_FILE
 
 
-OWN_NAMES = Export("", Form(), {})
+OWN_NAMES = Export("", SheetForm(), {})
 
 
 def read_export(
@@ -250,7 +250,7 @@ def _export(fields: Fields, name: str, given: dict[str, Any]) -> Export:
     return Export(name, form, **tables, **rest, rate_hz=rate_hz, sync=sync, threshold=float(threshold))
 
 
-def _form(fields: Fields, given: Mapping[str, Any]) -> Form:
+def _form(fields: Fields, given: Mapping[str, Any]) -> SheetForm:
     how: dict[str, Any] = {"format": given.get("format", "csv")}
     if how["format"] not in ("csv", "xlsx"):
         raise fields.error("format", "must be csv or xlsx")
@@ -274,7 +274,7 @@ def _form(fields: Fields, given: Mapping[str, Any]) -> Form:
         "".encode(how.get("encoding", "utf-8"))
     except LookupError:
         raise fields.error("encoding", f"{how['encoding']!r} is unknown; utf-8, cp1252, latin-1, utf-16 ...") from None
-    return Form(**how)
+    return SheetForm(**how)
 
 
 def _check_columns(fields: Fields, export: Export) -> None:

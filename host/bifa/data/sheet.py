@@ -1,7 +1,7 @@
 """Tables as other programs write them: their cells, the names of their columns, and the number in each cell.
 
 pandas reads; what it cannot read as plain numbers is parsed cell by cell, so that the first fault is named by line,
-column and cell. Nothing is guessed: `Form` says how the file is written.
+column and cell. Nothing is guessed: `SheetForm` says how the file is written.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ NUMERIC_BYTES = b"0123456789+-.eE, \t\r\n"
 
 
 @dataclass(frozen=True)
-class Form:
+class SheetForm:
     """How a file is written. The names of columns stand in `header_rows` rows, from `skip_rows` on, or, where `header`
     is given, in those that end with the line that begins with this text; below them `units_rows` rows that are no data.
     `encoding` is Python's name of it. `sheet` is of a workbook."""
@@ -46,7 +46,7 @@ class Form:
     sheet: str | None = None
 
 
-OWN = Form()
+OWN = SheetForm()
 
 
 def fast_numbers(path: Path, skip: int, width: int) -> np.ndarray | None:
@@ -79,7 +79,7 @@ class Sheet:
     """A table as it was written. `names`: the parts of each column's name, one a header row; `units`: what the rows of
     units say of it; `first`: the line of the first row of numbers. Raises DatasetError for what is no table."""
 
-    def __init__(self, path: Path, form: Form = OWN, file: str | None = None) -> None:
+    def __init__(self, path: Path, form: SheetForm = OWN, file: str | None = None) -> None:
         self._path, self._form, self.file = path, form, str(path) if file is None else file
         self._encoding = codecs.lookup(form.encoding).name.removesuffix("-sig")
         heads, self._rows = self._workbook() if form.format == "xlsx" else self._text()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bifa.simulate import Progress
+from bifa.simulate import Advance
 from bifa.simulate.rigs import CLEAR
 from bifa.simulate.terrain import passed_at_m, terrain, tunnel
 
@@ -69,7 +69,7 @@ class Metric:
         """For searches over many draws: six cycles, longer steps. What it lets through is judged again."""
         return replace(self, cycles=6, judged=2, periodic=5e-3, tolerance_m=3e-5)
 
-    def judge(self, progress: Progress) -> Judged:
+    def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""
         last = progress.advance_m[:, -self.judged :]
         slips = progress.slip_m[:, -self.judged :].max(axis=1) > self.slip_m
@@ -103,7 +103,7 @@ class Passage:
         """As many cycles, since the tunnel has to be passed; longer steps."""
         return replace(self, tolerance_m=3e-5)
 
-    def judge(self, progress: Progress) -> Judged:
+    def judge(self, progress: Advance) -> Judged:
         """Time until the whole robot is behind the tunnel, from simulated cycles of shape (n, cycles)."""
         way = passed_at_m(tunnel()) + _LONGEST_BODY_M
         reached = np.cumsum(progress.advance_m, axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bifa.cluster import Tls, cluster
 from bifa.gait.metric import Judged, Metric, Passage
-from bifa.simulate import Plant, Progress, cores, full_lanes, speeds
+from bifa.simulate import Advance, Plant, cores, full_lanes, speeds
 
 _PIECES_PER_WORKER = 8  # gaits differ in cost
 
@@ -31,7 +31,7 @@ class Simulations:
             self._executor.submit(_walks, [plants[i] for i in which[piece]], gaits[piece], metric) for piece in rows
         ]
         parts = [future.result() for future in futures]
-        progress = Progress(
+        progress = Advance(
             np.concatenate([part.advance_m for part in parts]),
             np.concatenate([part.slip_m for part in parts]),
             np.concatenate([part.period_s for part in parts]),
@@ -39,7 +39,7 @@ class Simulations:
         return metric.judge(progress)
 
 
-def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Progress:
+def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Advance:
     place: dict[str, Any] = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
     real = gaits * np.array([metric.clock, 1.0, 1.0, 1.0, 1.0, 1.0])
     dead_time_s = metric.dead_time_s * metric.clock

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bifa.errors import BifaError
-from bifa.gait.methods import METHODS, Found
+from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.methods.cma_es import basins, climb, climb_basins
-from bifa.gait.methods.common import Objective, Recorder
+from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
 from bifa.gait.pool import Simulations
@@ -31,7 +31,7 @@ _POPULATION = 12
 
 
 @dataclass(frozen=True)
-class Round:
+class RobustRound:
     """Of a robust search: how many robots a gait meets, what quantile of the speed counts, the share of the best value
     at which a gait is given up, the integrator's tolerance; the changes of period, in parts, that the gaits of the
     round before are tried with; and of the CMA-ES run on that: the most evaluations, its first step."""
@@ -47,14 +47,14 @@ class Round:
 
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
 # in ten of its own robots fails would fail more often on others.
-EXPLORE = Round(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
+EXPLORE = RobustRound(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    Round(64, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 350, 0.05),
-    Round(192, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 150, 0.015),
+    RobustRound(64, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 350, 0.05),
+    RobustRound(192, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 150, 0.015),
 )
-_SHORTLIST = Round(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
+_SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
 # on others. Slower by these parts if need be.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 768, 0.085
@@ -108,7 +108,7 @@ class Optimum:
     settings: Settings
     evaluations: int
     simulations: int
-    explored: Found
+    explored: Evaluated
     prediction: Prediction
 
     @property
@@ -178,7 +178,7 @@ def _foretold(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, se
     return predict_speed(model, known, gait, seed=settings.seed)
 
 
-def _explore(objective: Objective, settings: Settings, say: OnProgress) -> Found:
+def _explore(objective: Objective, settings: Settings, say: OnProgress) -> Evaluated:
     budget = _budget(settings)
     return METHODS[settings.method](
         objective,
@@ -190,12 +190,12 @@ def _explore(objective: Objective, settings: Settings, say: OnProgress) -> Found
 
 
 def explore_on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, explored: Found, settings: Settings, say: OnProgress
-) -> Found:
+    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, say: OnProgress
+) -> Evaluated:
     """CMA-ES on a few robots from the basins of the model's own speed: from slower copies too, since there the fastest
     are beyond the cliff of most robots, whose objective is 0."""
     objective, budget = on_robots(model, runs, spread, settings, EXPLORE, 0), _scaled(EXPLORE.evaluations, settings)
-    recorder = Recorder(
+    recorder = RecordedObjective(
         objective, settings.space.wraps, lambda count, best: say("search on robots", min(count / budget, 1.0), best)
     )
     recorder(np.concatenate(_at_periods(EXPLORE, settings.space, basins(explored, settings.space.wraps, _BASINS))))
@@ -213,10 +213,10 @@ def _scaled(evaluations: int, settings: Settings) -> int:
     return max(2 * _POPULATION, round(evaluations * _budget(settings) / EVALUATIONS[settings.method]))
 
 
-def _refine(objective: Objective, explored: Found, settings: Settings, say: OnProgress) -> Found:
+def _refine(objective: Objective, explored: Evaluated, settings: Settings, say: OnProgress) -> Evaluated:
     """CMA-ES from the best."""
     share = _scaled(_FINAL, settings)
-    recorder = Recorder(
+    recorder = RecordedObjective(
         objective,
         settings.space.wraps,
         lambda count, best: say("refine", min(count / share, 1.0), max(best, explored.best_value)),
@@ -226,8 +226,8 @@ def _refine(objective: Objective, explored: Found, settings: Settings, say: OnPr
 
 
 def _refine_on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, explored: Found, settings: Settings, say: OnProgress
-) -> list[Found]:
+    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, say: OnProgress
+) -> list[Evaluated]:
     """CMA-ES in rounds of more robots each, every time from the gait of the round before that these robots like best:
     what was best on few robots may owe it to them."""
     found, starts = [explored], _STARTS
@@ -238,7 +238,7 @@ def _refine_on_robots(
         def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
             say(f"refine {number}", min(count / budget, 1.0), best)
 
-        recorder = Recorder(objective, settings.space.wraps, show)
+        recorder = RecordedObjective(objective, settings.space.wraps, show)
         for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=0.02)):
             recorder(points)
         climb(recorder, recorder.found().best_point, stage.step, budget, settings.seed, _POPULATION)
@@ -248,7 +248,7 @@ def _refine_on_robots(
 
 
 def on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, settings: Settings, stage: Round, number: int
+    model: Model, runs: Simulations, spread: Knowledge, settings: Settings, stage: RobustRound, number: int
 ) -> RobustSpeed:
     """The objective of a round, on robots of its own."""
     draws = spread.plants(model, stage.draws, settings.seed + 500_000 * number)
@@ -258,7 +258,7 @@ def on_robots(
 
 
 def _nominally(
-    model: Model, runs: Simulations, explored: Found, settings: Settings, say: OnProgress
+    model: Model, runs: Simulations, explored: Evaluated, settings: Settings, say: OnProgress
 ) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fail: the fastest gaits live at a cliff."""
     rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=0.003)))
@@ -271,8 +271,8 @@ def best_of_finalists(
     model: Model,
     runs: Simulations,
     spread: Knowledge,
-    explored: Found,
-    refined: Found,
+    explored: Evaluated,
+    refined: Evaluated,
     settings: Settings,
     say: OnProgress,
 ) -> tuple[Gait, float]:
@@ -309,7 +309,7 @@ def best_of_finalists(
     raise SearchError("no candidate survives re-simulation over 20 cycles with a finer step; search longer")
 
 
-def _at_periods(stage: Round, space: SearchSpace, points: np.ndarray) -> list[np.ndarray]:
+def _at_periods(stage: RobustRound, space: SearchSpace, points: np.ndarray) -> list[np.ndarray]:
     """The points, and each with its period changed a little."""
     return [space.slower(points, share) for share in stage.periods]
 

@@ -14,7 +14,7 @@ class SpaceError(BifaError):
 
 
 @dataclass(frozen=True)
-class Axis:
+class SearchAxis:
     """One coordinate: the gait parameters that it sets together, its range, whether its ends meet."""
 
     name: str
@@ -37,7 +37,7 @@ class Axis:
 class SearchSpace:
     """Axes of the search. Points are rows of the unit cube, shape (n, dimensions)."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[SearchAxis, ...]
 
     @property
     def wraps(self) -> np.ndarray:
@@ -87,10 +87,10 @@ def paper_space(
     """The box of section V.B; d_2 = d_3 there, as the duty of both ends."""
     return SearchSpace(
         (
-            Axis("period_s", ("period_s",), *period_s, "s"),
-            Axis("psi12_deg", ("psi12_deg",), 0.0, 360.0, "degrees", wraps=True),
-            Axis("psi13_deg", ("psi13_deg",), 0.0, 360.0, "degrees", wraps=True),
-            Axis("duty_body", ("duty_body",), *duty_body, ""),
-            Axis("duty_ends", ("duty_head", "duty_tail"), *duty_ends, ""),
+            SearchAxis("period_s", ("period_s",), *period_s, "s"),
+            SearchAxis("psi12_deg", ("psi12_deg",), 0.0, 360.0, "degrees", wraps=True),
+            SearchAxis("psi13_deg", ("psi13_deg",), 0.0, 360.0, "degrees", wraps=True),
+            SearchAxis("duty_body", ("duty_body",), *duty_body, ""),
+            SearchAxis("duty_ends", ("duty_head", "duty_tail"), *duty_ends, ""),
         )
     )

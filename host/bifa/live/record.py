@@ -39,7 +39,7 @@ HEADER = [
 ]
 
 
-class RecordError(BifaError):
+class RecordingError(BifaError):
     """A recording cannot be made there."""
 
 
@@ -96,7 +96,7 @@ def record_telemetry(
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
     if out.exists() and any(entry for entry in out.iterdir() if not entry.name.startswith("telemetry_")):
-        raise RecordError(f"{out} contains other files; choose a new folder")
+        raise RecordingError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
     recorder = _Recorder(open_rig, port, parameters, end_s, console)
@@ -222,10 +222,12 @@ def telemetry_file(path: Path) -> Iterator[TextIO]:
         raise
     except OSError as error:
         if file is None:
-            raise RecordError(f"{path} cannot be written ({error.strerror or error}); no samples were kept") from None
+            raise RecordingError(
+                f"{path} cannot be written ({error.strerror or error}); no samples were kept"
+            ) from None
         whole = path.read_bytes()
         os.truncate(path, whole.rfind(b"\n") + 1)
-        raise RecordError(
+        raise RecordingError(
             f"{path} cannot be written any further ({error.strerror or error}); the {max(whole.count(10) - 1, 0)} "
             "samples so far are kept: free some space and record again"
         ) from None

@@ -32,7 +32,7 @@ class NobodyError(BifaError):
     """There is nobody who could answer."""
 
 
-class Countdown(Protocol):
+class CountdownDisplay(Protocol):
     """Shows how long something takes still (`bifa.screen.Countdown`)."""
 
     def show(self, what: str, left_s: float) -> None:
@@ -55,11 +55,11 @@ class Desk:
     there is one. `is_asking`: a question has not been answered yet."""
 
     def __init__(
-        self, say: Callable[[str], None], watch: Path | None = None, countdown: Countdown | None = None
+        self, say: Callable[[str], None], watch: Path | None = None, countdown: CountdownDisplay | None = None
     ) -> None:
         self.say = say
         self._watch = watch
-        self._countdown: Countdown = countdown or _Unseen()
+        self._countdown: CountdownDisplay = countdown or _Unseen()
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._is_listening = False
         self.is_asking = False

@@ -18,7 +18,7 @@ from bifa.data.clocks import DATE, FRAME
 from bifa.data.errors import DatasetError
 from bifa.data.export import ROLES, UNITS, Export, parse_exports, presets, told_unit, unit_in
 from bifa.data.fields import Fields, Source
-from bifa.data.sheet import SEPARATORS, Form, Sheet, workbook
+from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, workbook
 from bifa.measure.instruments import CHANNELS
 from lacuna.decimals import number
 
@@ -74,7 +74,7 @@ def wanted(role: str) -> list[str]:
 def look(path: Path) -> Look:
     """Raises DatasetError where the file is no table at all."""
     how = _workbook(path) if path.suffix.lower() == ".xlsx" else _text(path)
-    form = Form(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
+    form = SheetForm(**{**how, "separator": SEPARATORS.get(how.get("separator", "comma"), ",")})
     return Look(how, Sheet(path, form), {role: name for role in ("machine", "camera") if (name := _preset(path, role))})
 
 

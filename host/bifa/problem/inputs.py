@@ -32,7 +32,7 @@ Given = TypeVar("Given", bound="Inputs", covariant=True)
 
 
 @dataclass(frozen=True)
-class Case(Generic[Given]):
+class RobotInTrial(Generic[Given]):
     """One robot in a trial. `inputs`: what reached it (learnt curves may change the trial's own); `zeros_m`: K's
     contracted zero of body and small actuator; `nuisances` may hold what varies from run to run."""
 
@@ -42,7 +42,7 @@ class Case(Generic[Given]):
     nuisances: Theta
 
     @property
-    def commands(self: Case[StepInputs] | Case[WalkInputs]) -> Timeline:
+    def commands(self: RobotInTrial[StepInputs] | RobotInTrial[WalkInputs]) -> Timeline:
         """When the valves switched."""
         return shifted(self.inputs.commands, self.nuisances.get("switch_late_s", 0.0))
 
@@ -70,7 +70,9 @@ class Inputs(Protocol):
     def bench(self) -> Hashable: ...
 
     @staticmethod
-    def simulate(cases: Sequence[Case[Any]], tolerance_m: float, together: bool) -> list[Mapping[str, np.ndarray]]:
+    def simulate(
+        cases: Sequence[RobotInTrial[Any]], tolerance_m: float, together: bool
+    ) -> list[Mapping[str, np.ndarray]]:
         """The channels of each case on one bench, each of shape (n,). `together`: see `bifa.simulate.walks`."""
         ...
 
@@ -114,7 +116,7 @@ class StaticInputs:
 
     @staticmethod
     def simulate(
-        cases: Sequence[Case[StaticInputs]], tolerance_m: float, together: bool
+        cases: Sequence[RobotInTrial[StaticInputs]], tolerance_m: float, together: bool
     ) -> list[Mapping[str, np.ndarray]]:
         first = cases[0].inputs
         records = simulate.static_loadings(
@@ -143,7 +145,7 @@ class StepInputs:
 
     @staticmethod
     def simulate(
-        cases: Sequence[Case[StepInputs]], tolerance_m: float, together: bool
+        cases: Sequence[RobotInTrial[StepInputs]], tolerance_m: float, together: bool
     ) -> list[Mapping[str, np.ndarray]]:
         records = simulate.step_responses(
             [case.plant for case in cases],
@@ -185,7 +187,7 @@ class PullInputs:
 
     @staticmethod
     def simulate(
-        cases: Sequence[Case[PullInputs]], tolerance_m: float, together: bool
+        cases: Sequence[RobotInTrial[PullInputs]], tolerance_m: float, together: bool
     ) -> list[Mapping[str, np.ndarray]]:
         first = cases[0].inputs
         records = simulate.anchor_pulls(
@@ -240,7 +242,7 @@ class WalkInputs:
 
     @staticmethod
     def simulate(
-        cases: Sequence[Case[WalkInputs]], tolerance_m: float, together: bool
+        cases: Sequence[RobotInTrial[WalkInputs]], tolerance_m: float, together: bool
     ) -> list[Mapping[str, np.ndarray]]:
         records = simulate.walks(
             [case.plant for case in cases],

@@ -19,7 +19,7 @@ from bifa.errors import BifaError
 from bifa.problem import candidates, regressors, sites
 from bifa.problem.accuracy import accuracy_of
 from bifa.problem.curves import FittedCurve
-from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK, Case, Inputs, inputs_of
+from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK, Inputs, RobotInTrial, inputs_of
 from bifa.problem.library import engine_effects
 from bifa.problem.spare import spare
 from bifa.problem.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
@@ -162,7 +162,7 @@ class RobotSystem(System):
 
     def _case(
         self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
-    ) -> Case[Inputs] | None:
+    ) -> RobotInTrial[Inputs] | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
         place = self._place_in_session(trial)
         try:
@@ -171,7 +171,7 @@ class RobotSystem(System):
         except BifaError:
             return None
         inputs: Inputs = sites.corrected_inputs(trial.payload, learnt, plant, place)
-        return Case(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
+        return RobotInTrial(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
 
     def _place_in_session(self, trial: Record) -> float:
         """0 for the day's first trial, 1 for its last; 0 where the order was not noted."""
@@ -322,7 +322,7 @@ def _bench_unknowns(dataset: Dataset) -> list[str]:
 
 
 def _simulated(
-    bench: Inputs, cases: Sequence[Case[Inputs]], tolerance_m: float, alike: bool
+    bench: Inputs, cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool
 ) -> list[Mapping[str, np.ndarray]]:
     """The channels of each case; none of one that is out of range."""
     try:
@@ -338,7 +338,7 @@ def _nothing(trial: Record) -> Channels:
 
 
 def _seen(
-    channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: Case[Inputs], trial: Record
+    channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: RobotInTrial[Inputs], trial: Record
 ) -> Channels:
     """What the instruments show of a simulation."""
     channels = sites.corrected_readings(dict(channels), learnt, case.inputs, case.plant)

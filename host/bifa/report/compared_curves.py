@@ -9,7 +9,7 @@ import numpy as np
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.evidence import BASE, COMPLETED
-from bifa.report.page import Section
+from bifa.report.page import ChartedSection
 from bifa.report.words import channel_words, experiment_words, unit_of
 from lacuna.system import Channels, Record
 
@@ -21,7 +21,7 @@ _MOST = 300  # points of a curve
 
 def compared_curves(
     trials: Sequence[Record], predictions: Mapping[str, Sequence[Channels]], labels: Mapping[str, str]
-) -> list[Section]:
+) -> list[ChartedSection]:
     """A section for each experiment.
 
     predictions: by model (`BASE`, `COMPLETED`), one for each of `trials`. labels: what trials are called, by file.
@@ -37,7 +37,7 @@ def compared_curves(
         if columns:
             alt = f"Measured and modelled in {experiment_words(experiment)}, and the difference"
             chart = Chart(columns, _keys(predictions), alt, "Below each quantity: measured minus modelled.", height=130)
-            found.append(Section(title, charts=[chart]))
+            found.append(ChartedSection(title, charts=[chart]))
     return found
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bifa.report.evidence import errors_chart, learnt_chart
-from bifa.report.page import Page, Section, Table
+from bifa.report.page import ChartedSection, Page, Table
 from bifa.report.words import (
     effect_parameter,
     effect_words,
@@ -43,7 +43,7 @@ def verdict_sentence(verdict: str, effects: Sequence[Mapping[str, Any]], remaind
 
 
 def diagnosis_page(
-    name: str, record: Mapping[str, Any], labels: Labels | None = None, curves: Sequence[Section] = ()
+    name: str, record: Mapping[str, Any], labels: Labels | None = None, curves: Sequence[ChartedSection] = ()
 ) -> Page:
     """The page for a record of `bifa diagnose --json`; `labels`: what trials are called, by file; `curves`: sections
     with what was measured beside what the models predict."""
@@ -57,14 +57,14 @@ def diagnosis_page(
     )
 
 
-def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[Section]:
+def lacking(record: Mapping[str, Any], labels: Labels | None = None) -> list[ChartedSection]:
     """What was found, and how far each model is off."""
     effects = record["effects"]
     found = []
     if effects:
-        found.append(Section("What was found", found_sentences(effects), (effects_table(effects),)))
-    found.append(Section("Where the base model is off", (RESIDUAL, spoken(record["signature"]["text"], labels))))
-    found.append(Section("Error before and after", charts=[errors_chart(record["error"])]))
+        found.append(ChartedSection("What was found", found_sentences(effects), (effects_table(effects),)))
+    found.append(ChartedSection("Where the base model is off", (RESIDUAL, spoken(record["signature"]["text"], labels))))
+    found.append(ChartedSection("Error before and after", charts=[errors_chart(record["error"])]))
     return found
 
 
@@ -87,25 +87,27 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
     return said
 
 
-def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Section]:
+def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[ChartedSection]:
     """What is left, what else was tried, what to heed and what to measure next: only what there is."""
     sections = []
     if record["learnt"]:
         said = [f"Added to the model: {curve['term']}, a curve over {curve['variable']}." for curve in record["learnt"]]
-        sections.append(Section("Learnt from the data", said, charts=[learnt_chart(c) for c in record["learnt"]]))
+        sections.append(
+            ChartedSection("Learnt from the data", said, charts=[learnt_chart(c) for c in record["learnt"]])
+        )
     if record["effects"]:
-        sections.append(Section("What the named effects leave", (spoken(record["remainder"]["text"], labels),)))
+        sections.append(ChartedSection("What the named effects leave", (spoken(record["remainder"]["text"], labels),)))
     if base := base_table(record):
-        sections.append(Section("Parameters of the base model", tables=(base,)))
+        sections.append(ChartedSection("Parameters of the base model", tables=(base,)))
     if tried := nearest_table(record):
-        sections.append(Section("Also tried", tables=(tried,)))
+        sections.append(ChartedSection("Also tried", tables=(tried,)))
     if record["warnings"]:
-        sections.append(Section("Before you believe it", [spoken(line, labels) for line in record["warnings"]]))
+        sections.append(ChartedSection("Before you believe it", [spoken(line, labels) for line in record["warnings"]]))
     if record["not_detectable_here"]:
         hidden = ", ".join(effect_words(name) for name in record["not_detectable_here"])
-        sections.append(Section("Not detectable in this data", (f"{hidden}.",)))
+        sections.append(ChartedSection("Not detectable in this data", (f"{hidden}.",)))
     if record["next_experiment"]["experiment"]:
-        sections.append(Section("Next experiment", (next_sentence(record["next_experiment"]),)))
+        sections.append(ChartedSection("Next experiment", (next_sentence(record["next_experiment"]),)))
     return sections
 
 

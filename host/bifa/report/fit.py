@@ -8,7 +8,7 @@ from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
 from bifa.report.identification_remarks import AS_NOISE, remarks
-from bifa.report.page import Page, Section, Table
+from bifa.report.page import ChartedSection, Page, Table
 from bifa.report.words import (
     channel_words,
     experiment_words,
@@ -47,11 +47,11 @@ def fit_page(found: Identification) -> Page:
     )
 
 
-def parameters_and_remarks(found: Identification) -> list[Section]:
+def parameters_and_remarks(found: Identification) -> list[ChartedSection]:
     """Every parameter with its interval, and what there is to know about them."""
     return [
-        Section("Parameters", tables=[_parameters(found)]),
-        Section("Notes", [spoken(line) for line in remarks(found)]),
+        ChartedSection("Parameters", tables=[_parameters(found)]),
+        ChartedSection("Notes", [spoken(line) for line in remarks(found)]),
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from bifa.gait.explain import CYCLES, Anatomy, reasons
 from bifa.gait.search import Optimum
 from bifa.gait.sensitivity import Front, Scan
-from bifa.report.style import CHAMBER_COLORS, CHAMBERS, Palette, figure_style
+from bifa.report.style import CHAMBER_COLORS, CHAMBERS, ColorScheme, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def draw_changes(before: Anatomy, after: Anatomy, path: Path, titles: tuple[str,
         plt.close(figure)
 
 
-def _draw_gait(axes: np.ndarray, anatomy: Anatomy, horizon_s: float, palette: Palette) -> None:
+def _draw_gait(axes: np.ndarray, anatomy: Anatomy, horizon_s: float, palette: ColorScheme) -> None:
     outputs, pressures, displacement = axes
     record, gait = anatomy.record, anatomy.gait
     start = (CYCLES - min(_SETTLED, math.ceil(horizon_s / gait.period_s))) * gait.period_s
@@ -67,7 +67,7 @@ def _draw_gait(axes: np.ndarray, anatomy: Anatomy, horizon_s: float, palette: Pa
     displacement.set_xlabel("time [s]")
 
 
-def _mark_contraction(axis: "Axes", contracting: np.ndarray, time: np.ndarray, palette: Palette) -> None:
+def _mark_contraction(axis: "Axes", contracting: np.ndarray, time: np.ndarray, palette: ColorScheme) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], contracting.astype(int), [0]))))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         axis.axvspan(time[first], time[min(last, len(time) - 1)], color=palette.quiet, alpha=0.12, linewidth=0)

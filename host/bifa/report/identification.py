@@ -11,7 +11,7 @@ import numpy as np
 
 from bifa.identify.identification import Identification
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
-from bifa.report.style import CHAMBER_COLORS, Palette, figure_style
+from bifa.report.style import CHAMBER_COLORS, ColorScheme, figure_style
 from lacuna.system import Channels, Record
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def draw(found: Identification, folder: Path) -> list[Path]:
 class _Pair:
     """A quantity as measured and as modelled, and below it the difference, which at this scale is all that shows."""
 
-    def __init__(self, above: Axes, below: Axes, unit: str, palette: Palette) -> None:
+    def __init__(self, above: Axes, below: Axes, unit: str, palette: ColorScheme) -> None:
         self.above, self.below = above, below
         above.tick_params(labelbottom=False)
         below.axhline(0.0, color=palette.quiet, lw=0.6)
@@ -56,7 +56,7 @@ class _Pair:
         self.above.plot(x, modeled, color=color, lw=1.0, label=label)
         self.below.plot(x, measured - modeled, color=color, alpha=0.6, lw=0.5)
 
-    def legend(self, palette: Palette) -> None:
+    def legend(self, palette: ColorScheme) -> None:
         """Each label once, and which line is which; beside the curves."""
         from matplotlib.lines import Line2D
 
@@ -105,7 +105,7 @@ def _pressures(pairs: Pairs) -> dict[float, tuple[Any, ...]]:
     return dict(zip(places, map(tuple, colors), strict=True))
 
 
-def _stiffness(pairs: Pairs, palette: Palette, path: Path) -> None:
+def _stiffness(pairs: Pairs, palette: ColorScheme, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes((3.4, 1.3), len(groups))
     for (above, below), (actuator, mine) in zip(axes.T, groups.items(), strict=True):
@@ -120,7 +120,7 @@ def _stiffness(pairs: Pairs, palette: Palette, path: Path) -> None:
     _save(figure, path)
 
 
-def _steps(pairs: Pairs, palette: Palette, path: Path) -> None:
+def _steps(pairs: Pairs, palette: ColorScheme, path: Path) -> None:
     groups = _by_actuator(pairs)
     figure, axes = _axes((3.0, 1.3, 3.0, 1.3), len(groups))
     for column, (actuator, mine) in zip(axes.T, groups.items(), strict=True):
@@ -140,7 +140,7 @@ def _steps(pairs: Pairs, palette: Palette, path: Path) -> None:
     _save(figure, path)
 
 
-def _anchor(pairs: Pairs, palette: Palette, path: Path) -> None:
+def _anchor(pairs: Pairs, palette: ColorScheme, path: Path) -> None:
     figure, ((above,), (below,)) = _axes((3.6, 1.3), 1, 7.2)
     force, colors = _Pair(above, below, "N", palette), _pressures(pairs)
     for trial, prediction in pairs:
@@ -152,7 +152,7 @@ def _anchor(pairs: Pairs, palette: Palette, path: Path) -> None:
     _save(figure, path)
 
 
-def _walks(pairs: Pairs, palette: Palette, path: Path) -> None:
+def _walks(pairs: Pairs, palette: ColorScheme, path: Path) -> None:
     """The first repeat of each gait: those that follow would lie on it."""
     first: dict[object, tuple[Record, Channels]] = {}
     for trial, prediction in pairs:

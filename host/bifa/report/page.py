@@ -19,11 +19,11 @@ from bifa.report.style import DARK, LIGHT
 from lacuna.report import page as engine
 from lacuna.report.page import Page, Table
 
-__all__ = ["Motion", "Page", "Section", "Table", "page_style", "render", "write_page"]
+__all__ = ["ChartedSection", "Motion", "Page", "Table", "page_style", "render", "write_page"]
 
 
 @dataclass(frozen=True)
-class Section(engine.Section):
+class ChartedSection(engine.Section):
     """A section that shows charts and an animation as well."""
 
     charts: Sequence[Chart] = ()
@@ -43,7 +43,7 @@ class Motion:
 
 def render(page: Page) -> str:
     """The page, whose sections are this module's, as one HTML document; all text is escaped."""
-    charts = [chart for section in page.sections if isinstance(section, Section) for chart in section.charts]
+    charts = [chart for section in page.sections if isinstance(section, ChartedSection) for chart in section.charts]
     plots = [as_plot(column, chart.height) for chart in charts for column in chart.columns]
     return (
         environment()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bifa.report.chart import Axis, Chart, Key, Panel, Series
-from bifa.report.style import Palette, figure_style
+from bifa.report.style import ColorScheme, figure_style
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -58,7 +58,7 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
         plt.close(figure)
 
 
-def _draw(axis: Axes, panel: Panel, palette: Palette) -> None:
+def _draw(axis: Axes, panel: Panel, palette: ColorScheme) -> None:
     colors = palette.colors()
     for series in panel.series:
         _draw_series(axis, series, colors[series.color])
@@ -99,7 +99,7 @@ def _scale(axis: Axes, name: Literal["x", "y"], one: Axis) -> None:
     axis.set(**{f"{name}label": one.label})
 
 
-def _handle(key: Key, palette: Palette) -> Artist:
+def _handle(key: Key, palette: ColorScheme) -> Artist:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -14,7 +14,7 @@ CHAMBER_COLORS = {"body": "#0072B2", "head": "#D55E00", "tail": "#009E73"}
 
 
 @dataclass(frozen=True)
-class Palette:
+class ColorScheme:
     """Colours that depend on the background; all but `grid` stand out from it by 3 to 1 at least."""
 
     paper: str
@@ -30,14 +30,14 @@ class Palette:
         return asdict(self) | CHAMBER_COLORS
 
 
-LIGHT = Palette(**COLORS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
-DARK = Palette(**COLORS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
+LIGHT = ColorScheme(**COLORS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
+DARK = ColorScheme(**COLORS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
 
 _RC: dict[Any, Any] = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
 
 
 @contextmanager
-def figure_style(dark: bool = False) -> Iterator[Palette]:
+def figure_style(dark: bool = False) -> Iterator[ColorScheme]:
     """Matplotlib without a display and with the project's look, inside the block only."""
     import matplotlib
 

@@ -8,7 +8,7 @@ import rich.box
 import rich.table
 from rich.text import Text
 
-from bifa.report.page import Section, Table
+from bifa.report.page import ChartedSection, Table
 from bifa.report.words import NBSP
 from bifa.screen import Console
 
@@ -42,7 +42,7 @@ def print_lines(console: Console, lines: Iterable[str]) -> None:
         console.print(plain_spaces(line), highlight=False)
 
 
-def print_sections(console: Console, sections: Iterable[Section]) -> None:
+def print_sections(console: Console, sections: Iterable[ChartedSection]) -> None:
     """Titles, sentences and tables of sections; what is drawn there is for pages."""
     for section in sections:
         if section.paragraphs or section.tables:

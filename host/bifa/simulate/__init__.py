@@ -5,7 +5,7 @@
 >>> record["displacement_head_mm"]
 """
 
-from bifa.simulate.gaits import Progress, cores, full_lanes, gait_rows, speed, speeds
+from bifa.simulate.gaits import Advance, cores, full_lanes, gait_rows, speed, speeds
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.records import (
     SimulatedTrial,
@@ -33,9 +33,9 @@ from bifa.simulate.timeline import (
 )
 
 __all__ = [
+    "Advance",
     "Obstacle",
     "Plant",
-    "Progress",
     "SimulatedTrial",
     "SimulationError",
     "Supports",

@@ -22,7 +22,7 @@ _LANES_FULL = 4  # times over, for a piece: lanes stand idle at its end
 
 
 @dataclass(frozen=True)
-class Progress:
+class Advance:
     """Head's advance and slip of each cycle, in m; shapes (..., cycles). Slip: travel while both ends slide."""
 
     advance_m: np.ndarray
@@ -46,10 +46,10 @@ def gait_rows(gaits: Sequence[Gait]) -> np.ndarray:
     return np.array([list(gait.as_dict().values()) for gait in gaits], dtype=float).reshape(-1, 6)
 
 
-def speed(model: Model | Plant, gait: Gait, cycles: int = 10, tolerance_m: float = FAST_TOLERANCE_M) -> Progress:
+def speed(model: Model | Plant, gait: Gait, cycles: int = 10, tolerance_m: float = FAST_TOLERANCE_M) -> Advance:
     """One gait from rest; shapes (cycles,). Use tolerance 1e-6 or less to verify what a search has found."""
     result = speeds(model, gait_rows([gait]), cycles, tolerance_m, workers=1)
-    return Progress(result.advance_m[0], result.slip_m[0], result.period_s[0])
+    return Advance(result.advance_m[0], result.slip_m[0], result.period_s[0])
 
 
 def speeds(
@@ -62,7 +62,7 @@ def speeds(
     terrain: np.ndarray = rigs.CLEAR,
     dead_time_s: float = 0.0,
     workers: int | None = None,
-) -> Progress:
+) -> Advance:
     """Many gaits (n, 6) with one model, or with n models one each; shapes (n, cycles). `dead_time_s`: for so long the
     Uno vents a chamber between its supplies.
 
@@ -95,7 +95,7 @@ def speeds(
             run(piece)
     else:
         list(_pool(count).map(run, shares))
-    return Progress(advance, slip, gaits[:, 0])
+    return Advance(advance, slip, gaits[:, 0])
 
 
 def full_lanes() -> int:

@@ -19,7 +19,7 @@ from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.explain_nuisances import explain_nuisances
 from lacuna.diagnosis.learn import holds, learn_correction
-from lacuna.diagnosis.named import Estimated, Named, Rival, describe_base, describe_effects, lost_without, nearest
+from lacuna.diagnosis.named import Estimated, Named, Nearest, describe_base, describe_effects, lost_without, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
 from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import POLICY, Policy
@@ -79,7 +79,7 @@ class Diagnosis:
     remainder_before: Remainder
     signature: Signature
     left: Left
-    nearest: tuple[Rival, ...]
+    nearest: tuple[Nearest, ...]
     warnings: tuple[str, ...]
     learnt: tuple[tuple[CorrectionSite, Correction], ...]
     next: NextExperiment

@@ -42,7 +42,7 @@ class Estimated:
 
 
 @dataclass(frozen=True)
-class Rival:
+class Nearest:
     """Another explanation, and the share of the gap that it would close."""
 
     effects: tuple[str, ...]
@@ -77,12 +77,12 @@ def describe_base(case: Case, candidate: Candidate) -> dict[str, Estimated]:
     return {p.name: Estimated(fitted.theta[p.name], within[p.name]) for p in case.system.parameters}
 
 
-def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Rival, ...]:
+def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Nearest, ...]:
     """The best other explanations tried, with what each would close."""
     chosen = choice.candidate if choice else found.base
     others = sorted((c for c in found.tried if c.effects and c is not chosen), key=lambda c: c.cost)[:_NEAREST]
     closes = _closing(case, *_gap(case, found))
-    return tuple(Rival(c.effects, closes(c.fitted)) for c in others)
+    return tuple(Nearest(c.effects, closes(c.fitted)) for c in others)
 
 
 def _gap(case: Case, found: Search) -> tuple[Error, Floor]:

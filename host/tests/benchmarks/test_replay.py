@@ -10,7 +10,7 @@ from benchmarks import blind_records, records, replay
 from benchmarks.reliability import bins, brier, foretold
 from benchmarks.rules import RULES, within_confidence
 from benchmarks.search_record import searched
-from benchmarks.simulations import Simulations
+from benchmarks.simulations import SimulationCount
 from lacuna import Effect, Parameter, Record
 
 
@@ -117,7 +117,7 @@ def test_a_probability_is_that_of_every_explanation_that_holds_the_effect():
 @pytest.fixture(scope="module")
 def diagnosed():
     """A line that hides a square, three times at each of three slopes."""
-    draw, simulations = np.random.default_rng(0), Simulations()
+    draw, simulations = np.random.default_rng(0), SimulationCount()
     u = np.linspace(-1.0, 1.0, 60)
 
     def simulate(record, theta):
@@ -156,7 +156,7 @@ def test_what_the_engine_tried_is_kept_in_plain_types(diagnosed):
 def test_a_forked_child_counts_as_well():
     from multiprocessing import get_context
 
-    simulations = Simulations()
+    simulations = SimulationCount()
     child = get_context("fork").Process(target=simulations.add, args=(5,))
     child.start()
     child.join()
@@ -169,7 +169,7 @@ def test_what_a_system_simulates_is_counted_a_trial_a_set_of_values():
         def predict_trials(self, thetas, effects, trials, **how):
             return list(thetas)
 
-    system, simulations = System(), Simulations()
+    system, simulations = System(), SimulationCount()
     simulations.of_trials(system)
     assert system.predict_trials([1, 2, 3], (), [None] * 3, coarse=True) == [1, 2, 3]
     assert simulations.count == 3

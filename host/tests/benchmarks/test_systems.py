@@ -9,7 +9,7 @@ import pytest
 from benchmarks import bench_systems
 from benchmarks.systems import bouc_wen, emps, spring, tanks
 from benchmarks.systems.lines import lines_of
-from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.problem import KnownProblem, RivalAnswer
 from benchmarks.systems.rivals import best_subset, engine, gaussian_process, sparse_regression
 from benchmarks.systems.table import judged
 from lacuna import Effect, Parameter, Record
@@ -41,7 +41,7 @@ def static(hidden, noise=0.0, seed=0):
     draw = np.random.default_rng(seed)
     truth = frozenset(name.split(".")[0] for name in hidden)
     gain = (Parameter("gain", "1", 1.0, 0.1, 10.0),)
-    empty = Problem("static", "static", "", "y", simulate, gain, EFFECTS, truth, (), (), 0)
+    empty = KnownProblem("static", "static", "", "y", simulate, gain, EFFECTS, truth, (), (), 0)
     return replace(empty, fitted=(record("a"), record("b")), held_out=(record("c"),))
 
 
@@ -138,13 +138,13 @@ def test_the_error_is_of_records_that_nobody_fits_relative_to_their_spread():
     ],
 )
 def test_right_is_neither_more_nor_less_than_what_is_there(named, verdict, right):
-    assert judged(static({"cube.size": 0.7}), Answer(named, np.zeros, verdict))[0] == right
+    assert judged(static({"cube.size": 0.7}), RivalAnswer(named, np.zeros, verdict))[0] == right
 
 
 def test_saying_unexplained_where_nothing_is_missing_is_not_right():
     nothing = replace(static({}), expected="none")
-    assert judged(nothing, Answer((), np.zeros, "none"))[0] == "yes"
-    assert judged(nothing, Answer((), np.zeros, "unexplained"))[0] == "no"
+    assert judged(nothing, RivalAnswer((), np.zeros, "none"))[0] == "yes"
+    assert judged(nothing, RivalAnswer((), np.zeros, "unexplained"))[0] == "no"
 
 
 def test_lines_are_those_of_code(tmp_path, monkeypatch):

@@ -6,8 +6,7 @@ import pytest
 from bifa.check.plausibility import check_plausibility, check_trial_plausibility
 from bifa.data import Trial, read_dataset
 from bifa.measure.plan import BRISK, PlannedTrial
-from harness.independent_lab import Lab as IndependentLab
-from harness.independent_lab import session
+from harness.independent_lab import IndependentLab, session
 from harness.sealed_campaign import generate
 from virtual_robot.effects import EFFECTS, plant_parameters
 from virtual_robot.gait import Gait

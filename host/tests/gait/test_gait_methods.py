@@ -5,7 +5,7 @@ import pytest
 
 from bifa.gait.methods import METHODS
 from bifa.gait.methods.cma_es import climb_basins
-from bifa.gait.methods.common import Found, Recorder
+from bifa.gait.methods.common import Evaluated, RecordedObjective
 
 WRAPS = np.array([False, True, True, False, False])
 TOP = np.array([0.31, 0.98, 0.07, 0.5, 0.6])
@@ -74,13 +74,13 @@ def test_runs_that_end_apart_are_not_taken_for_an_answer():
     found = METHODS["cma"](peaks, np.zeros(5, bool), 1500, 0)
     assert len(found.ends) >= 5
     assert found.agrees == (found.ends[1] >= 0.99 * found.ends[0])
-    assert not Found(found.points, found.values, (18.7, 10.0)).agrees
-    assert Found(found.points, found.values, (18.79, 18.71)).agrees
+    assert not Evaluated(found.points, found.values, (18.7, 10.0)).agrees
+    assert Evaluated(found.points, found.values, (18.79, 18.71)).agrees
 
 
 def test_climbs_begin_at_the_basins_that_were_seen():
     """A robust search has no sample of its own: it climbs from gaits that the model itself is fast with."""
-    recorder = Recorder(two_basins, np.zeros(5, bool))
+    recorder = RecordedObjective(two_basins, np.zeros(5, bool))
     recorder(np.array([[0.25] * 5, [0.7] * 5, [0.71] * 5]))
     found = climb_basins(recorder, np.zeros(5, bool), 600, 0)
     assert found.best_value > 0.99
@@ -106,5 +106,5 @@ def test_a_plain_of_zeros_does_not_end_the_search_early():
 
 def test_finalists_are_the_best_and_apart():
     points = np.array([[0.1, 0.1], [0.1, 0.1001], [0.5, 0.5], [0.9, 0.9]])
-    found = Found(points, np.array([3.0, 4.0, 2.0, 1.0]))
+    found = Evaluated(points, np.array([3.0, 4.0, 2.0, 1.0]))
     np.testing.assert_array_equal(found.finalists(2), [[0.1, 0.1001], [0.5, 0.5]])

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from bifa.gait.metric import Judged, Metric, Passage
-from bifa.simulate import Progress, speeds
+from bifa.simulate import Advance, speeds
 from bifa.simulate.terrain import passed_at_m, tunnel
 
 
 def progress(advance_mm, slip_um=0.0, period_s=2.0):
     advance = 1e-3 * np.atleast_2d(np.asarray(advance_mm, dtype=float))
     slip = np.broadcast_to(1e-6 * np.asarray(slip_um, dtype=float), advance.shape)
-    return Progress(advance, slip, np.full(len(advance), period_s))
+    return Advance(advance, slip, np.full(len(advance), period_s))
 
 
 def test_the_speed_is_that_of_the_settled_cycles():

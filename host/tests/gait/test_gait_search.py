@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bifa.gait import Metric, SearchError, Settings, library, optimize, paper_space, simulations
-from bifa.gait.methods import Found
+from bifa.gait.methods import Evaluated
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
 from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, best_of_finalists, explore_on_robots, on_robots
 from bifa.gait.uncertainty import spread_of
@@ -71,7 +71,7 @@ def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs
     settings, spread = Settings(), spread_of(nominal(), 0.02)
     fast = settings.space.point(library.load("fast").gait)[None]
     assert on_robots(nominal(), runs, spread, settings, EXPLORE, 0)(fast)[0] < 2.0
-    found = explore_on_robots(nominal(), runs, spread, Found(fast, np.ones(1)), settings, lambda *_: None)
+    found = explore_on_robots(nominal(), runs, spread, Evaluated(fast, np.ones(1)), settings, lambda *_: None)
     assert found.best_value > 20.0
 
 
@@ -85,7 +85,7 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     draws = spread.plants(sloping, 128, seed=99)
     before = distribution(runs, draws, gait_rows(settings.space.gaits(brittle)), metric)
     assert np.quantile(before, 0.1) < 1.0
-    found = Found(brittle, np.ones(1))
+    found = Evaluated(brittle, np.ones(1))
     gait, speed = best_of_finalists(sloping, runs, spread, found, found, settings, lambda *_: None)
     after = distribution(runs, draws, gait_rows([gait]), metric)
     assert np.quantile(after, 0.1) > 0.95 * speed > 20.0
@@ -97,7 +97,7 @@ def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(
     fallen = settings.space.slower(settings.space.point(library.load("fast").gait)[None], -0.02)
     rows = gait_rows(settings.space.gaits(fallen))
     assert distribution(runs, [plant(nominal())], rows, Metric())[0, 0] < 2.0
-    found = Found(fallen, np.ones(1))
+    found = Evaluated(fallen, np.ones(1))
     _, speed = best_of_finalists(nominal(), runs, spread, found, found, settings, lambda *_: None)
     assert speed > 20.0
 
@@ -107,7 +107,7 @@ def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
     """Half the robots of a 20 % spread cannot walk at such speeds: no error, and not just any gait."""
     settings, spread = Settings(spread=0.2), spread_of(nominal(), 0.2)
     points = np.array([settings.space.point(library.load(name).gait) for name in ("fast", "robust")])
-    found = Found(points, np.ones(2))
+    found = Evaluated(points, np.ones(2))
     gait, speed = best_of_finalists(nominal(), runs, spread, found, found, settings, lambda *_: None)
     assert speed > 20.0
     assert gait.period_s > points[:, 0].max() * 2.0 + 2.0

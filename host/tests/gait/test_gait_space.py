@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bifa.gait.space import Axis, SpaceError, paper_space
+from bifa.gait.space import SearchAxis, SpaceError, paper_space
 from bifa.robot.gait import Gait
 
 
@@ -33,4 +33,4 @@ def test_errors_name_the_axis_and_the_range():
     with pytest.raises(SpaceError, match=r"period_s: 0.1 to 4 must be a range within 0.5 to 60 s"):
         paper_space(period_s=(0.1, 4.0))
     with pytest.raises(SpaceError, match="must be a range"):
-        Axis("duty", ("duty_body",), 0.6, 0.4, "")
+        SearchAxis("duty", ("duty_body",), 0.6, 0.4, "")

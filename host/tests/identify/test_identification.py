@@ -19,14 +19,14 @@ from bifa.report.identification_remarks import remarks
 from bifa.report.page import render
 from bifa.report.terminal import print_sections, print_table
 from bifa.robot import load_model, save_model
-from harness.independent_lab import Lab, session, small_session
+from harness.independent_lab import IndependentLab, session, small_session
 
 pytestmark = pytest.mark.slow
 
 _DAYS = 8
 
 
-def truth_of(lab: Lab) -> dict[str, float]:
+def truth_of(lab: IndependentLab) -> dict[str, float]:
     return {
         "body_damping_Ns_m": lab.large.damping,
         "body_area_N_psi": lab.large.area,
@@ -48,7 +48,7 @@ def covers(interval: IntervalEstimate, truth: float) -> bool:
 
 @pytest.fixture(scope="module")
 def lab():
-    return Lab().with_seed(11)
+    return IndependentLab().with_seed(11)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_intervals_of_the_independent_robot_contain_the_truth():
     """A curve that the model can only approximate, and coloured noise: nine in ten, less what chance makes."""
     hits = {}
     for seed in range(11, 11 + _DAYS):
-        lab = Lab().with_seed(seed)
+        lab = IndependentLab().with_seed(seed)
         intervals = identify(small_session(lab)).intervals
         for name, truth in truth_of(lab).items():
             hits.setdefault(name, []).append(covers(intervals[name], truth))
@@ -168,7 +168,7 @@ def test_too_little_data_says_what_cannot_be_had(lab):
 def test_a_whole_session_comes_back_for_several_robots():
     covered = []
     for seed in range(5):
-        lab = Lab().with_seed(1000 + seed)
+        lab = IndependentLab().with_seed(1000 + seed)
         found = identify(session(lab, None))
         assert all(error < 1.1 for error in found.error.values()), (seed, found.error)
         covered += [covers(found.intervals[name], truth) for name, truth in truth_of(lab).items()]

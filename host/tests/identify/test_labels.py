@@ -7,12 +7,12 @@ import pytest
 from bifa.data import Dataset
 from bifa.identify.robust import labeled
 from bifa.identify.start import prepare
-from harness.independent_lab import Lab
+from harness.independent_lab import IndependentLab
 
 
 @pytest.fixture(scope="module")
 def system():
-    lab = Lab().with_seed(3)
+    lab = IndependentLab().with_seed(3)
     trials = [lab.static(which, p, rate_mm_s=4.0) for which in ("large", "small") for p in (0.0, 8.0)]
     trials = tuple(replace(t, file=f"{i}.csv") for i, t in enumerate(trials))
     return prepare(Dataset(path=None, name="monday", known={"head_mass_kg": 0.2}, trials=trials))

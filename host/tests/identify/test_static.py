@@ -13,7 +13,7 @@ from bifa.identify.static import fit_static
 from bifa.problem.motion import imposed_motion
 from bifa.problem.stiffness import UndeterminedError, fit_stiffness
 from bifa.robot import nominal
-from harness.independent_lab import Lab
+from harness.independent_lab import IndependentLab
 
 
 def bench(lab, actuator, pressures=(0.0, 4.0, 8.0), repeats=3) -> Dataset:
@@ -24,7 +24,7 @@ def bench(lab, actuator, pressures=(0.0, 4.0, 8.0), repeats=3) -> Dataset:
 
 @pytest.mark.parametrize("actuator", ["large", "small"])
 def test_the_curve_of_an_independent_actuator_comes_back(actuator):
-    lab = Lab().with_seed(5)
+    lab = IndependentLab().with_seed(5)
     truth = getattr(lab, actuator)
     fit = fit_static(bench(lab, actuator), actuator)
     x = np.linspace(*fit.stiffness.covered_m, 200)
@@ -40,7 +40,7 @@ def test_the_interval_of_the_area_contains_the_truth_as_often_as_it_says():
     hits = 0
     draws = 60
     for seed in range(draws):
-        lab = Lab().with_seed(100 + seed)
+        lab = IndependentLab().with_seed(100 + seed)
         area = fit_static(bench(lab, "small", (0.0, 8.0)), "small").area_N_psi
         hits += area.lower <= lab.small.area <= area.upper
     assert 0.80 <= hits / draws <= 0.99  # 90 % intervals; binomial spread of 60 draws: 4 %
@@ -88,7 +88,7 @@ def test_the_continuation_is_honest_where_the_bare_polynomial_was_off_by_a_third
 
 
 def test_shapes_are_a_unit_coordinate_of_the_posterior():
-    fit = fit_static(bench(Lab().with_seed(1), "large", (0.0,), 2), "large").stiffness
+    fit = fit_static(bench(IndependentLab().with_seed(1), "large", (0.0,), 2), "large").stiffness
     shapes, told = fit.shapes()
     assert shapes.T @ shapes == pytest.approx(fit.covariance, rel=1e-6, abs=1e-9)
     assert 8 <= told.sum() < 16  # the continuation is not told by static loading
@@ -97,13 +97,13 @@ def test_shapes_are_a_unit_coordinate_of_the_posterior():
 
 
 def test_a_single_pressure_leaves_the_area_open():
-    assert fit_static(bench(Lab().with_seed(1), "large", (0.0,)), "large").area_N_psi is None
+    assert fit_static(bench(IndependentLab().with_seed(1), "large", (0.0,)), "large").area_N_psi is None
 
 
 @pytest.mark.parametrize(("pressures", "names"), [((4.0,), "stiffness curve of the large"), ((), "0 psi")])
 def test_too_little_data_says_which_parameter_cannot_be_had(pressures, names):
     with pytest.raises(UndeterminedError, match=names):
-        fit_static(bench(Lab().with_seed(1), "large", pressures), "large")
+        fit_static(bench(IndependentLab().with_seed(1), "large", pressures), "large")
 
 
 def test_a_static_test_that_did_not_move_is_refused():
@@ -139,7 +139,7 @@ def test_the_shipped_curve_and_the_fitted_one_are_the_same_form():
     """The monomial coefficients go into a model file and give the same forces there."""
     from bifa.robot.stiffness import StiffnessCurve
 
-    fit = fit_static(bench(Lab().with_seed(2), "small"), "small").stiffness
+    fit = fit_static(bench(IndependentLab().with_seed(2), "small"), "small").stiffness
     curve = StiffnessCurve(tuple(chebyshev.cheb2poly(fit.coefficients)), fit.lower_m, fit.upper_m)
     x = np.linspace(fit.lower_m, fit.upper_m, 300)
     assert curve.force(x) == pytest.approx(fit.force(x), abs=1e-8)

@@ -11,7 +11,7 @@ import pytest
 
 from bifa.robot.gait import Gait, save_gait
 from harness.pty_uno import PtyUno
-from harness.web_monitor import Monitor
+from harness.web_monitor import WebMonitor
 from harness.web_socket import WebSocket
 
 pytestmark = pytest.mark.real_time
@@ -28,7 +28,7 @@ def monitor():
     started = []
 
     def start(*options, **where):
-        started.append(Monitor(*options, **where))
+        started.append(WebMonitor(*options, **where))
         return started[-1]
 
     yield start

@@ -5,7 +5,7 @@ import errno
 import pytest
 
 from bifa.errors import BifaError
-from bifa.live.record import RecordError, next_file, telemetry_file
+from bifa.live.record import RecordingError, next_file, telemetry_file
 from bifa.measure import experiments
 from bifa.measure.plan import BASELINE, PlannedTrial
 
@@ -17,7 +17,7 @@ def test_numbers_go_on_after_the_largest(tmp_path):
 
 def test_a_full_disk_leaves_whole_lines_and_is_said(tmp_path):
     path = tmp_path / "telemetry_1.csv"
-    kept = pytest.raises(RecordError, match="1 samples so far are kept")
+    kept = pytest.raises(RecordingError, match="1 samples so far are kept")
     with kept, telemetry_file(path) as file:
         file.write("time_s\n0.01\n0.0")
         file.flush()

@@ -10,7 +10,7 @@ import pytest
 from bifa.link import frames
 from bifa.robot import BASELINE
 from harness.pty_uno import PtyUno
-from harness.web_monitor import Monitor
+from harness.web_monitor import WebMonitor
 from harness.web_socket import WebSocket
 
 pytestmark = pytest.mark.real_time
@@ -82,7 +82,7 @@ class Watched(PtyUno):
 
 @pytest.fixture
 def bifa():
-    started = Monitor("--run", uno=Watched())
+    started = WebMonitor("--run", uno=Watched())
     yield started
     started.close()
 

@@ -14,7 +14,7 @@ from stranger import Stranger, lowest
 from bifa.data import write_dataset
 from bifa.link.table import TABLE_HASH
 from bifa.robot.gait import BASELINE, save_gait
-from harness.independent_lab import Lab, small_session
+from harness.independent_lab import IndependentLab, small_session
 from virtual_robot.uno import Uno
 from virtual_robot.uno.board import lib as chip
 
@@ -112,7 +112,7 @@ def pushes(height_N: float, draw: np.random.Generator) -> np.ndarray:
 
 def commands_of_bifa(stranger: Stranger) -> None:
     """A small data set checked and fitted, its model walked, the library listed."""
-    write_dataset(stranger.here / "data", small_session(Lab().with_seed(3)))
+    write_dataset(stranger.here / "data", small_session(IndependentLab().with_seed(3)))
     save_gait(stranger.here / "gait.toml", BASELINE)
     assert "24 trials" in stranger.run("bifa", "check", "data")
     stranger.run("bifa", "fit", "data", "--out", "model.toml", "--report", "fit.html")

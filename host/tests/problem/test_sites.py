@@ -11,13 +11,13 @@ from bifa.identify.start import prepare
 from bifa.problem.sites import SITES, corrected, learnt_curves
 from bifa.robot.learnt import ROWS
 from bifa.simulate import plant, vented_between
-from harness.independent_lab import BASELINE, Lab
+from harness.independent_lab import BASELINE, IndependentLab
 from lacuna.system import Correction
 
 
 @pytest.fixture(scope="module")
 def system():
-    lab = Lab().with_seed(4)
+    lab = IndependentLab().with_seed(4)
     trials = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
     trials += [lab.step(which, 8.5) for which in ("large", "small")]
     trials += [lab.anchor(8.5), lab.walk(BASELINE, 8.0)]

@@ -12,7 +12,7 @@ from bifa.problem.inputs import inputs_of
 from bifa.problem.library import engine_effects
 from bifa.problem.stiffness import UndeterminedError
 from bifa.robot import ModelParameterError
-from harness.independent_lab import BASELINE, Lab
+from harness.independent_lab import BASELINE, IndependentLab
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import estimate_noise
@@ -27,7 +27,7 @@ def numbered(trials) -> tuple:
 
 @pytest.fixture(scope="module")
 def lab():
-    return Lab().with_seed(4)
+    return IndependentLab().with_seed(4)
 
 
 @pytest.fixture(scope="module")

@@ -10,14 +10,14 @@ from bifa.identify.start import prepare
 from bifa.problem.accuracy import AccuracyError, accuracies, accuracy_of
 from bifa.problem.spare import spare
 from bifa.problem.unmeasured import LOAD_CELL, PRIOR_SD, STAND_MASS
-from harness.independent_lab import BASELINE, Lab
+from harness.independent_lab import BASELINE, IndependentLab
 
 GAITS = [BASELINE | {"period_s": period} for period in (5.7, 4.4, 3.4)]
 
 
 @pytest.fixture(scope="module")
 def trials():
-    lab = Lab().with_seed(4)
+    lab = IndependentLab().with_seed(4)
     made = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
     made += [lab.step(which, 8.5) for which in ("large", "small")]
     made += [lab.anchor(p) for p in (0.0, 8.5)]

@@ -20,6 +20,13 @@ def test_other_words_and_prose_are_not(source):
     assert names.faults_of(source, Path("one.py")) == []
 
 
+def test_a_class_has_its_name_to_itself():
+    one, other = Path("one.py"), Path("other.py")
+    assert names.twice({one: "class Rig: pass", other: "class _Rig: pass\nrig = Rig()"}) == []
+    (said,) = names.twice({one: "class Rig: pass", other: "\n\nclass Rig: pass"})
+    assert said == "other.py:3: the class Rig is another in one.py"
+
+
 def test_every_private_word_is_in_the_glossary_under_the_fields():
     glossary = (ROOT / "docs/glossary.md").read_text("utf-8")
     assert [word for word in names.PRIVATE if word not in glossary] == []

@@ -8,20 +8,20 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import least_squares
 
-from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.problem import KnownProblem, RivalAnswer
 
 LARGEST, STARTS = 3, 3
 
 
-def solve(problem: Problem, starts: int = STARTS) -> Answer:
+def solve(problem: KnownProblem, starts: int = STARTS) -> RivalAnswer:
     """The set with the least BIC; its parameters are fitted to all records at once."""
     sets = [chosen for size in range(LARGEST + 1) for chosen in combinations(problem.library, size)]
     found = {chosen: fit(problem, chosen, starts) for chosen in sets}
     best = min(sets, key=lambda chosen: bic(problem, found[chosen]))
-    return Answer(best, lambda record: problem.predict(record, found[best]))
+    return RivalAnswer(best, lambda record: problem.predict(record, found[best]))
 
 
-def fit(problem: Problem, effects: Sequence[str] = (), starts: int = STARTS) -> dict[str, float]:
+def fit(problem: KnownProblem, effects: Sequence[str] = (), starts: int = STARTS) -> dict[str, float]:
     """Least squares of the free-run error within the bounds, from the declared values and from draws around them."""
     names, parameters = zip(*problem.free(effects), strict=True)
     lower, upper = (np.array([getattr(p, end) for p in parameters]) for end in ("lower", "upper"))
@@ -43,7 +43,7 @@ def fit(problem: Problem, effects: Sequence[str] = (), starts: int = STARTS) -> 
     return dict(zip(names, min(tried, key=lambda one: one.cost).x * scale, strict=True))
 
 
-def bic(problem: Problem, found: Mapping[str, float]) -> float:
+def bic(problem: KnownProblem, found: Mapping[str, float]) -> float:
     """n ln(RSS / n) + k ln n, of all samples fitted and as many parameters as `found` has."""
     residual = problem.residual(found, problem.fitted)
     return float(len(residual) * np.log(np.mean(residual**2)) + len(found) * np.log(len(residual)))

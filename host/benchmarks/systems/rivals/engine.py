@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import lacuna
-from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.problem import KnownProblem, RivalAnswer
 
 
-def solve(problem: Problem) -> Answer:
+def solve(problem: KnownProblem) -> RivalAnswer:
     """Default settings; the engine makes its own split of what is fitted."""
     system = lacuna.System(
         problem.simulate, problem.parameters, problem.effects, nuisances=problem.nuisances, outputs=problem.output
     )
     verdict = lacuna.diagnose(system, problem.cut(problem.fitted), progress=False)
     named = tuple(effect.name for effect in verdict.effects)
-    return Answer(named, lambda record: verdict.model(record)[problem.output], verdict.verdict)
+    return RivalAnswer(named, lambda record: verdict.model(record)[problem.output], verdict.verdict)

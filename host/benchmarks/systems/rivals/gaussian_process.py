@@ -11,14 +11,14 @@ from sklearn.gaussian_process.kernels import RBF, WhiteKernel
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from benchmarks.systems.problem import Answer, Problem
+from benchmarks.systems.problem import KnownProblem, RivalAnswer
 from benchmarks.systems.rivals.best_subset import STARTS, fit
 from lacuna import Record
 
 POINTS = 600  # of all samples fitted: what a process of this kind can take
 
 
-def solve(problem: Problem, points: int = POINTS, starts: int = STARTS) -> Answer:
+def solve(problem: KnownProblem, points: int = POINTS, starts: int = STARTS) -> RivalAnswer:
     """The process learns the residual of the free run, and is given nothing that was measured when it predicts."""
     base = fit(problem, starts=starts)
 
@@ -33,10 +33,10 @@ def solve(problem: Problem, points: int = POINTS, starts: int = STARTS) -> Answe
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: that feature does not matter
         process.fit(known[chosen], left[chosen])
-    return Answer(None, lambda record: problem.predict(record, base) + process.predict(features(record)))
+    return RivalAnswer(None, lambda record: problem.predict(record, base) + process.predict(features(record)))
 
 
-def _features(problem: Problem, record: Record, predicted: np.ndarray) -> np.ndarray:
+def _features(problem: KnownProblem, record: Record, predicted: np.ndarray) -> np.ndarray:
     """What the engine takes a residual to depend on as well, shape (n, features): the predicted output, its rate, the
     inputs, and time."""
     rate = np.gradient(predicted, record.time_s)

@@ -8,7 +8,7 @@ import numpy as np
 import pysindy
 from scipy.signal import savgol_filter
 
-from benchmarks.systems.problem import Answer, Problem, Terms
+from benchmarks.systems.problem import KnownProblem, RivalAnswer, Terms
 from benchmarks.systems.rivals.best_subset import bic
 from lacuna import Record
 
@@ -17,15 +17,15 @@ WINDOWS = (9, 15, 21, 31, 45, 61)  # samples over which the filter takes derivat
 ORDER = 5  # of its polynomial: with 3 the acceleration comes out too small, and the mass too large
 
 
-def solve(problem: Problem) -> Answer:
+def solve(problem: KnownProblem) -> RivalAnswer:
     """Of all windows and thresholds, the model whose free run has the least BIC (Mangan et al., 2017)."""
     tried = {(window, *found): found for window in WINDOWS for found in path(problem, problem.terms, window)}
     best = min(tried.values(), key=lambda found: bic(problem, found))
     named = dict.fromkeys(name.split(".")[0] for name in best if "." in name)
-    return Answer(tuple(named), lambda record: problem.predict(record, best))
+    return RivalAnswer(tuple(named), lambda record: problem.predict(record, best))
 
 
-def path(problem: Problem, terms: Terms, window: int) -> list[dict[str, float]]:
+def path(problem: KnownProblem, terms: Terms, window: int) -> list[dict[str, float]]:
     """The parameters that are left at each threshold, in the simulator's terms. Models without the input are none, nor
     are those with a parameter outside its bounds, such as a drag that drives."""
     derived = [_derived(record, problem.output, terms, window) for record in problem.fitted]

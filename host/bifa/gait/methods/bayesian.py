@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from .common import Found, Objective, Recorder, Report
+from .common import Evaluated, Objective, RecordedObjective, Report
 
 KAPPA = 0.5  # the paper's, favouring exploitation
 _INITIAL_SHARE, _INITIAL_LEAST = 0.1, 10  # of the evaluations, spread at random before the process is asked
@@ -21,7 +21,7 @@ def bayesian_optimization(
     evaluations: int,
     seed: int,
     report: Report | None = None,
-) -> Found:
+) -> Evaluated:
     """Maximise `objective` with `evaluations` calls, one at a time; `wraps` (dimensions,) marks full turns.
 
     The cost is the Gaussian process's own: a tenth of a second a suggestion at first, and more with each.
@@ -33,7 +33,7 @@ def bayesian_optimization(
     from sklearn.gaussian_process.kernels import Matern
     from threadpoolctl import threadpool_limits
 
-    recorder = Recorder(objective, wraps, report)
+    recorder = RecordedObjective(objective, wraps, report)
     space = TargetSpace(None, dict.fromkeys([f"x{axis}" for axis in range(len(wraps))], (0.0, 1.0)))
     acquisition = UpperConfidenceBound(kappa=KAPPA)
     process = GaussianProcessRegressor(Matern(0.3, _LENGTHS, nu=2.5), alpha=1e-6, normalize_y=True)

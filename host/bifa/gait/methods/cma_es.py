@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-from .common import Found, Objective, Recorder, Report, agree
+from .common import Evaluated, Objective, RecordedObjective, Report, agree
 
 _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled until enough of them walk
 _ENOUGH = 60
@@ -27,17 +27,22 @@ def cma_es(
     seed: int,
     report: Report | None = None,
     population: int = 12,
-) -> Found:
+) -> Evaluated:
     """Maximise `objective` in at most about `evaluations` calls, fewer where the landscape is simple; `wraps`
     (dimensions,) marks full turns."""
-    recorder = Recorder(objective, wraps, report)
+    recorder = RecordedObjective(objective, wraps, report)
     _sample(recorder, len(wraps), seed, evaluations)
     return climb_basins(recorder, wraps, evaluations, seed, population)
 
 
 def climb_basins(
-    recorder: Recorder, wraps: np.ndarray, evaluations: int, seed: int, population: int = 12, step: float = _STEP
-) -> Found:
+    recorder: RecordedObjective,
+    wraps: np.ndarray,
+    evaluations: int,
+    seed: int,
+    population: int = 12,
+    step: float = _STEP,
+) -> Evaluated:
     """Runs of CMA-ES from the best basins among what was recorded, until the best two agree, all basins were tried, or
     about `evaluations` are recorded."""
     tried: list[np.ndarray] = []
@@ -51,7 +56,7 @@ def climb_basins(
     return recorder.found(tuple(sorted(ends, reverse=True)))
 
 
-def _sample(recorder: Recorder, dimensions: int, seed: int, evaluations: int) -> None:
+def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations: int) -> None:
     """Sobol points, until enough of them walk, or half of `evaluations` is spent."""
     sobol = qmc.Sobol(dimensions, rng=np.random.default_rng([seed, 2]))
     size = min(_SAMPLE, 1 << max(3, int(np.log2(max(evaluations, 16) / 2))))
@@ -60,17 +65,17 @@ def _sample(recorder: Recorder, dimensions: int, seed: int, evaluations: int) ->
         values = np.concatenate([values, recorder(sobol.random(len(values)))])
 
 
-def basins(seen: Found, wraps: np.ndarray, count: int, tried: Sequence[np.ndarray] = ()) -> np.ndarray:
+def basins(seen: Evaluated, wraps: np.ndarray, count: int, tried: Sequence[np.ndarray] = ()) -> np.ndarray:
     """The best points that no other near them beats, each the top of a basin as far as was seen, and that are in none
     of the basins tried; then the best of the others. At most `count`, (m, dimensions)."""
     tops = _tops(seen, wraps)
-    first = Found(seen.points[tops], seen.values[tops]).finalists(count, _APART, wraps, avoid=tried)
+    first = Evaluated(seen.points[tops], seen.values[tops]).finalists(count, _APART, wraps, avoid=tried)
     if len(first) >= count:
         return np.array(first)
     return np.array([*first, *seen.finalists(count - len(first), _APART, wraps, avoid=[*tried, *first])])
 
 
-def _tops(seen: Found, wraps: np.ndarray) -> np.ndarray:
+def _tops(seen: Evaluated, wraps: np.ndarray) -> np.ndarray:
     """Indices of the points that are better than their nearest `_NEIGHBORS`, among the best `_COMPARED`."""
     order = np.argsort(-seen.values, kind="stable")[:_COMPARED]
     order = order[seen.values[order] > 0.0]

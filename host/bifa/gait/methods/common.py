@@ -14,7 +14,7 @@ AGREE = 0.01  # relative, of what the best two of independent runs end at
 
 
 @dataclass(frozen=True)
-class Found:
+class Evaluated:
     """Everything that was evaluated: `points` (n, dimensions), folded into the cube, and `values` (n,).
 
     ends: what independent runs ended at, the best first, of a method that has several.
@@ -39,11 +39,11 @@ class Found:
         """The highest value."""
         return float(self.values.max())
 
-    def joined(self, *others: "Found") -> "Found":
+    def joined(self, *others: "Evaluated") -> "Evaluated":
         """Both, of one objective."""
         parts = (self, *others)
         points, values = (np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "values"))
-        return Found(points, values, self.ends)
+        return Evaluated(points, values, self.ends)
 
     def finalists(
         self,
@@ -81,7 +81,7 @@ def agree(ends: Sequence[float]) -> bool:
     return first > 0.0 and second >= (1.0 - AGREE) * first
 
 
-class Recorder:
+class RecordedObjective:
     """An objective that remembers what it was asked, folds points and reports progress."""
 
     def __init__(self, objective: Objective, wraps: np.ndarray, report: Report | None = None):
@@ -102,6 +102,6 @@ class Recorder:
             self._report(self.count, self.best)
         return values
 
-    def found(self, ends: tuple[float, ...] = ()) -> Found:
+    def found(self, ends: tuple[float, ...] = ()) -> Evaluated:
         """All of it; `ends` of independent runs."""
-        return Found(np.concatenate(self._points), np.concatenate(self._values), ends)
+        return Evaluated(np.concatenate(self._points), np.concatenate(self._values), ends)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import optimize
 
-from .common import Found, Objective, Recorder, Report
+from .common import Evaluated, Objective, RecordedObjective, Report
 
 
 def differential_evolution(
@@ -13,12 +13,12 @@ def differential_evolution(
     seed: int,
     report: Report | None = None,
     population: int = 50,
-) -> Found:
+) -> Evaluated:
     """Maximise `objective` with about `evaluations` calls; `wraps` (dimensions,) marks full turns.
 
     A full turn is searched over one and a half, so that no optimum lies at an end.
     """
-    recorder = Recorder(objective, wraps, report)
+    recorder = RecordedObjective(objective, wraps, report)
     bounds = [(-0.25, 1.25) if wrap else (0.0, 1.0) for wrap in wraps]
     generations = max(1, round(evaluations / population) - 1)
     optimize.differential_evolution(

@@ -72,7 +72,7 @@ class Address:
 
 
 @dataclass(eq=False)
-class Page:
+class OpenPage:
     """A page that is open. `is_owner`: it has shown the token."""
 
     number: int
@@ -95,7 +95,7 @@ class LivePage:
         self.pilot, self._page, self._foretelling = pilot, page.encode(), Foretelling(model)
         self.token = secrets.token_urlsafe(16)
         self.gate = Gate()
-        self.pages: set[Page] = set()
+        self.pages: set[OpenPage] = set()
         self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
@@ -194,7 +194,7 @@ class LivePage:
             await socket.close(1008)  # a page from elsewhere
             return
         given = [name for name in socket.scope["subprotocols"] if name != PROTOCOL]
-        page = Page(next(self._numbers), any(secrets.compare_digest(one, self.token) for one in given))
+        page = OpenPage(next(self._numbers), any(secrets.compare_digest(one, self.token) for one in given))
         await socket.accept(PROTOCOL if PROTOCOL in socket.scope["subprotocols"] else None)
         if page.is_owner and socket.client is not None:
             self.gate.prove(socket.client)
@@ -223,7 +223,7 @@ class LivePage:
 
     # -- asking -----------------------------------------------------------------------------------------------
 
-    def _hear(self, page: Page, text: str) -> None:
+    def _hear(self, page: OpenPage, text: str) -> None:
         """One request of a page: {"id": 1, "do": "apply", ...}; the answer has the same id."""
         try:
             asked = json.loads(text)
@@ -237,7 +237,7 @@ class LivePage:
         else:
             self._do(page, number, name, asked)
 
-    def _do(self, page: Page, number: Any, name: str, asked: Mapping[str, Any]) -> None:
+    def _do(self, page: OpenPage, number: Any, name: str, asked: Mapping[str, Any]) -> None:
         acts: dict[str, Callable[[], Awaitable[str] | str]] = {
             "run": lambda: _waited(self.pilot.ask(lambda uno: uno.run()), "walking"),
             "clear": lambda: _waited(self.pilot.ask(lambda uno: uno.clear()), "released: it may walk again"),
@@ -259,7 +259,7 @@ class LivePage:
         else:
             self._answer_later(page, number, said)
 
-    def _answer_later(self, page: Page, number: Any, answer: Awaitable[str]) -> None:
+    def _answer_later(self, page: OpenPage, number: Any, answer: Awaitable[str]) -> None:
         async def answering() -> None:
             page.tell({"id": number, **(await _answered(answer))[1]})
 
@@ -325,7 +325,7 @@ async def _refused(socket: WebSocket, reason: str) -> None:
         await socket.close(1007, reason)
 
 
-async def _send(socket: WebSocket, page: Page) -> None:
+async def _send(socket: WebSocket, page: OpenPage) -> None:
     with contextlib.suppress(WebSocketDisconnect, RuntimeError):
         while True:
             await socket.send_text(await page.messages.get())
