@@ -133,29 +133,31 @@ def optimize(
     settings = settings or Settings()
     if settings.method not in METHODS:
         raise SearchError(f"method {settings.method!r} is not one of {', '.join(METHODS)}")
-    say = on_progress or (lambda stage, share, best: None)
+    on_progress = on_progress or (lambda stage, share, best: None)
     started = runs.count
     flat, spread = plant(model), settings.knowledge(model)
     timing = spread.scatter
     metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
     settings = replace(settings, metric=metric)
     own = NominalSpeed(runs, flat, settings.space, metric.quicker() if settings.robust else metric)
-    explored = _explore(own, settings, say)
+    explored = _explore(own, settings, on_progress)
     if settings.robust and explored.best_value > 0.0:
-        explored = explore_on_robots(model, runs, spread, explored, settings, say)
+        explored = explore_on_robots(model, runs, spread, explored, settings, on_progress)
     if explored.best_value <= 0.0:
         raise SearchError(
             f"none of {len(explored.values)} gaits walks without slipping; widen the space or search longer"
         )
     if settings.robust:
-        refined = _refine_on_robots(model, runs, spread, explored, settings, say) if settings.refine else []
-        gait, nominal = best_of_finalists(model, runs, spread, explored, [explored, *refined][-1], settings, say)
+        refined = _refine_on_robots(model, runs, spread, explored, settings, on_progress) if settings.refine else []
+        gait, nominal = best_of_finalists(
+            model, runs, spread, explored, [explored, *refined][-1], settings, on_progress
+        )
     else:
-        refined = [_refine(own, explored, settings, say)] if settings.refine else []
-        gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, say)
+        refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
+        gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
     fresh = spread.plants(model, VERIFYING_DRAWS, settings.seed + 2_000_003)
     speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M))[0]
-    say("verify", 1.0, nominal)
+    on_progress("verify", 1.0, nominal)
     return Optimum(
         gait,
         nominal,
@@ -178,25 +180,27 @@ def _foretold(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, se
     return predict_speed(model, known, gait, seed=settings.seed)
 
 
-def _explore(objective: Objective, settings: Settings, say: OnProgress) -> Evaluated:
+def _explore(objective: Objective, settings: Settings, on_progress: OnProgress) -> Evaluated:
     budget = _budget(settings)
     return METHODS[settings.method](
         objective,
         settings.space.wraps,
         budget,
         settings.seed,
-        lambda count, best: say("search", min(count / budget, 1.0), best),
+        lambda count, best: on_progress("search", min(count / budget, 1.0), best),
     )
 
 
 def explore_on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, say: OnProgress
+    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> Evaluated:
     """CMA-ES on a few robots from the basins of the model's own speed: from slower copies too, since there the fastest
     are beyond the cliff of most robots, whose objective is 0."""
     objective, budget = on_robots(model, runs, spread, settings, EXPLORE, 0), _scaled(EXPLORE.evaluations, settings)
     recorder = RecordedObjective(
-        objective, settings.space.wraps, lambda count, best: say("search on robots", min(count / budget, 1.0), best)
+        objective,
+        settings.space.wraps,
+        lambda count, best: on_progress("search on robots", min(count / budget, 1.0), best),
     )
     recorder(np.concatenate(_at_periods(EXPLORE, settings.space, basins(explored, settings.space.wraps, _BASINS))))
     if not settings.refine:
@@ -213,20 +217,20 @@ def _scaled(evaluations: int, settings: Settings) -> int:
     return max(2 * _POPULATION, round(evaluations * _budget(settings) / EVALUATIONS[settings.method]))
 
 
-def _refine(objective: Objective, explored: Evaluated, settings: Settings, say: OnProgress) -> Evaluated:
+def _refine(objective: Objective, explored: Evaluated, settings: Settings, on_progress: OnProgress) -> Evaluated:
     """CMA-ES from the best."""
     share = _scaled(_FINAL, settings)
     recorder = RecordedObjective(
         objective,
         settings.space.wraps,
-        lambda count, best: say("refine", min(count / share, 1.0), max(best, explored.best_value)),
+        lambda count, best: on_progress("refine", min(count / share, 1.0), max(best, explored.best_value)),
     )
     climb(recorder, explored.best_point, _FINAL_STEP, share, settings.seed, _POPULATION)
     return recorder.found()
 
 
 def _refine_on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, say: OnProgress
+    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> list[Evaluated]:
     """CMA-ES in rounds of more robots each, every time from the gait of the round before that these robots like best:
     what was best on few robots may owe it to them."""
@@ -236,7 +240,7 @@ def _refine_on_robots(
         budget = _scaled(stage.evaluations, settings)
 
         def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
-            say(f"refine {number}", min(count / budget, 1.0), best)
+            on_progress(f"refine {number}", min(count / budget, 1.0), best)
 
         recorder = RecordedObjective(objective, settings.space.wraps, show)
         for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=0.02)):
@@ -258,12 +262,12 @@ def on_robots(
 
 
 def _nominally(
-    model: Model, runs: Simulations, explored: Evaluated, settings: Settings, say: OnProgress
+    model: Model, runs: Simulations, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fail: the fastest gaits live at a cliff."""
     rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=0.003)))
     speeds = _finely(model, runs, rows, settings)
-    say("verify", 0.5, float(speeds.max()))
+    on_progress("verify", 0.5, float(speeds.max()))
     return _best(rows, speeds)
 
 
@@ -274,7 +278,7 @@ def best_of_finalists(
     explored: Evaluated,
     refined: Evaluated,
     settings: Settings,
-    say: OnProgress,
+    on_progress: OnProgress,
 ) -> tuple[Gait, float]:
     """The best of the finalists, over robots that the search did not meet, that stands the check; slower copies of it
     follow, for the case that all are beyond the cliff. Where none stands, the one that walks best on average."""
@@ -283,7 +287,7 @@ def best_of_finalists(
     shortlist = np.concatenate(groups)
     # One by one: what is worse than the best so far meets few robots, the hardest first.
     values = np.concatenate([objective(point[None]) for point in shortlist])
-    say("verify", 0.6, float(values.max()))
+    on_progress("verify", 0.6, float(values.max()))
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from .common import Evaluated, Objective, RecordedObjective, Report
+from .common import Evaluated, Objective, OnEvaluated, RecordedObjective
 
 KAPPA = 0.5  # the paper's, favouring exploitation
 _INITIAL_SHARE, _INITIAL_LEAST = 0.1, 10  # of the evaluations, spread at random before the process is asked
@@ -20,7 +20,7 @@ def bayesian_optimization(
     wraps: np.ndarray,
     evaluations: int,
     seed: int,
-    report: Report | None = None,
+    on_progress: OnEvaluated | None = None,
 ) -> Evaluated:
     """Maximise `objective` with `evaluations` calls, one at a time; `wraps` (dimensions,) marks full turns.
 
@@ -33,7 +33,7 @@ def bayesian_optimization(
     from sklearn.gaussian_process.kernels import Matern
     from threadpoolctl import threadpool_limits
 
-    recorder = RecordedObjective(objective, wraps, report)
+    recorder = RecordedObjective(objective, wraps, on_progress)
     space = TargetSpace(None, dict.fromkeys([f"x{axis}" for axis in range(len(wraps))], (0.0, 1.0)))
     acquisition = UpperConfidenceBound(kappa=KAPPA)
     process = GaussianProcessRegressor(Matern(0.3, _LENGTHS, nu=2.5), alpha=1e-6, normalize_y=True)

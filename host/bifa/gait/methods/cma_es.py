@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-from .common import Evaluated, Objective, RecordedObjective, Report, agree
+from .common import Evaluated, Objective, OnEvaluated, RecordedObjective, agree
 
 _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled until enough of them walk
 _ENOUGH = 60
@@ -25,12 +25,12 @@ def cma_es(
     wraps: np.ndarray,
     evaluations: int,
     seed: int,
-    report: Report | None = None,
+    on_progress: OnEvaluated | None = None,
     population: int = 12,
 ) -> Evaluated:
     """Maximise `objective` in at most about `evaluations` calls, fewer where the landscape is simple; `wraps`
     (dimensions,) marks full turns."""
-    recorder = RecordedObjective(objective, wraps, report)
+    recorder = RecordedObjective(objective, wraps, on_progress)
     _sample(recorder, len(wraps), seed, evaluations)
     return climb_basins(recorder, wraps, evaluations, seed, population)
 

@@ -8,7 +8,7 @@ import numpy as np
 # (n, dimensions) points of the unit cube -> (n,) values to be maximised.
 Objective = Callable[[np.ndarray], np.ndarray]
 # (evaluations so far, best value so far) -> None
-Report = Callable[[int, float], None]
+OnEvaluated = Callable[[int, float], None]
 
 AGREE = 0.01  # relative, of what the best two of independent runs end at
 
@@ -84,8 +84,8 @@ def agree(ends: Sequence[float]) -> bool:
 class RecordedObjective:
     """An objective that remembers what it was asked, folds points and reports progress."""
 
-    def __init__(self, objective: Objective, wraps: np.ndarray, report: Report | None = None):
-        self._objective, self._wraps, self._report = objective, wraps, report
+    def __init__(self, objective: Objective, wraps: np.ndarray, on_progress: OnEvaluated | None = None):
+        self._objective, self._wraps, self._on_progress = objective, wraps, on_progress
         self._points: list[np.ndarray] = []
         self._values: list[np.ndarray] = []
         self.count, self.best = 0, -np.inf
@@ -98,8 +98,8 @@ class RecordedObjective:
         self._values.append(values)
         self.count += len(values)
         self.best = max(self.best, float(values.max()))
-        if self._report is not None:
-            self._report(self.count, self.best)
+        if self._on_progress is not None:
+            self._on_progress(self.count, self.best)
         return values
 
     def found(self, ends: tuple[float, ...] = ()) -> Evaluated:

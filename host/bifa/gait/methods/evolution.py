@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import optimize
 
-from .common import Evaluated, Objective, RecordedObjective, Report
+from .common import Evaluated, Objective, OnEvaluated, RecordedObjective
 
 
 def differential_evolution(
@@ -11,14 +11,14 @@ def differential_evolution(
     wraps: np.ndarray,
     evaluations: int,
     seed: int,
-    report: Report | None = None,
+    on_progress: OnEvaluated | None = None,
     population: int = 50,
 ) -> Evaluated:
     """Maximise `objective` with about `evaluations` calls; `wraps` (dimensions,) marks full turns.
 
     A full turn is searched over one and a half, so that no optimum lies at an end.
     """
-    recorder = RecordedObjective(objective, wraps, report)
+    recorder = RecordedObjective(objective, wraps, on_progress)
     bounds = [(-0.25, 1.25) if wrap else (0.0, 1.0) for wrap in wraps]
     generations = max(1, round(evaluations / population) - 1)
     optimize.differential_evolution(
