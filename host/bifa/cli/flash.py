@@ -34,18 +34,18 @@ def flash(
     from bifa.toolchain import build_image, choose_port, find_project, project_folder
 
     console = Console()
-    show = console.out if verbose else _ignore
+    on_line = console.out if verbose else _ignore
     project = project_folder() if build_only else find_project()
     chosen = None if build_only else choose_port(port)
     if project is not None:
         with console.status("building"):
-            image = build_image(project, show)
+            image = build_image(project, on_line)
         console.print(f"built {image.relative_to(project)}", highlight=False)
     if chosen is None:
         return
     with console.status(f"writing to {chosen}"):
         try:
-            _write(project, chosen, show)
+            _write(project, chosen, on_line)
         except KeyboardInterrupt:
             console.print("interrupted: the Uno may hold half an image; run `bifa flash` again")
             raise
@@ -54,14 +54,14 @@ def flash(
     console.print(f"firmware {hello.firmware} answers on {chosen}", highlight=False)
 
 
-def _write(project: Path | None, port: str, show: Callable[[str], None]) -> None:
+def _write(project: Path | None, port: str, on_line: Callable[[str], None]) -> None:
     from bifa.firmware import carried_image
     from bifa.toolchain import upload_image, write_with_avrdude
 
     if project is not None:
-        upload_image(project, port, show)
+        upload_image(project, port, on_line)
     else:
-        write_with_avrdude(carried_image(), port, show)
+        write_with_avrdude(carried_image(), port, on_line)
 
 
 def _ignore(_: str) -> None:
