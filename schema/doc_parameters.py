@@ -18,7 +18,7 @@ def _with_unit(value: int, parameter: Parameter) -> str:
 
 def _row(p: Parameter) -> str:
     bounds = f"{_number(p.minimum, p.decimals)} to {_with_unit(p.maximum, p)}"
-    return f"| `{p.name}` | {bounds} | {_with_unit(p.default, p)} | {_with_unit(1, p)} | {p.help} |"
+    return f"| `{p.name}` | {bounds} | {_with_unit(p.default, p)} | {_with_unit(1, p)} | {p.wire} | {p.help} |"
 
 
 def _presets(table: ParameterTable) -> str:
@@ -41,12 +41,12 @@ def page(table: ParameterTable, commands: CommandTable) -> str:
 Everything that can be set, under the same names on the [console](console.md), in [gait files](gaits.md) and in
 [frames](protocol.md). `help NAME` on the console says the same, and what the value is now.
 
-| name | range | default | step | meaning |
-|---|---|---|---|---|
+| name | range | default | step | in a frame | meaning |
+|---|---|---|---|---|---|
 {parameters}
 
-A value is a plain decimal number (`5`, `0.66`, `.5`) and is rounded to the step, in which the Uno keeps it. Anything
-else is refused with an error that names the range, and nothing changes.
+A value is a plain decimal number (`5`, `0.66`, `.5`) and is rounded to the step, in which the Uno keeps it; a
+frame has the number of steps. Anything else is refused with an error that names the range, and nothing changes.
 
 - `set` acts at once, also while the robot walks, without a jump of the phases. A set that is loaded or uploaded while
   it walks takes over as a whole at the next cycle boundary.

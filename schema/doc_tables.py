@@ -1,22 +1,8 @@
 """Writes the tables in docs/protocol.md, between the markers `<!-- table NAME -->` and `<!-- end -->`."""
 
 import re
-from decimal import Decimal
 
-from tables import CommandTable, Message, ParameterTable
-
-
-def _number(value: int, decimals: int) -> str:
-    return f"{float(Decimal(value).scaleb(-decimals)):g}"
-
-
-def _parameters(table: ParameterTable) -> str:
-    lines = ["| name | range | default | on the wire | meaning |", "|---|---|---|---|---|"]
-    for p in table.parameters:
-        bounds = f"{_number(p.minimum, p.decimals)} to {_number(p.maximum, p.decimals)} {p.unit}".rstrip()
-        wire = f"{p.wire}, value * 10^{p.decimals}"
-        lines.append(f"| `{p.name}` | {bounds} | {_number(p.default, p.decimals)} | {wire} | {p.help} |")
-    return "\n".join(lines)
+from tables import CommandTable, Message
 
 
 def _messages(messages: list[Message], usages: dict[str, str | None]) -> str:
@@ -28,12 +14,11 @@ def _messages(messages: list[Message], usages: dict[str, str | None]) -> str:
     return "\n".join(lines)
 
 
-def page(text: str, parameters: ParameterTable, commands: CommandTable) -> str:
+def page(text: str, commands: CommandTable) -> str:
     """`text` with its tables as they are now."""
     usages = {c.name: c.usage for c in commands.commands}
     results = [f"| {i} | `{name}` | {words} |" for i, (name, words) in enumerate(commands.results)]
     tables = {
-        "parameters": _parameters(parameters),
         "commands": _messages([c.message for c in commands.commands if c.message], usages),
         "reports": _messages(list(commands.reports), {}),
         "results": "\n".join(["| number | name | words |", "|---|---|---|", *results]),

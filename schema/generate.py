@@ -29,7 +29,7 @@ def generated() -> dict[Path, str]:
     protocol = ROOT / "docs/protocol.md"
     common, packed = phrases.packed_texts(parameters, commands)
     return {
-        protocol: doc_tables.page(protocol.read_text(), parameters, commands),
+        protocol: doc_tables.page(protocol.read_text(), commands),
         ROOT / "docs/parameters.md": doc_parameters.page(parameters, commands),
         ROOT / "lib/parameters/parameter_table.h": cpp_parameters.header(parameters),
         ROOT / "lib/parameters/parameter_table.cpp": cpp_parameters.source(parameters, packed),

@@ -9,7 +9,7 @@
 
 namespace bifa {
 
-/// Everything that can be set, as integers in wire units (see docs/protocol.md). Little-endian and without holes, so
+/// Everything that can be set, as integers in wire units (see docs/parameters.md). Little-endian and without holes, so
 /// that its bytes are its form on the wire and in EEPROM.
 struct ParameterSet {
   uint32_t period_us;  ///< period_s: time of one cycle (1/f)
