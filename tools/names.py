@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("host/bifa", "host/virtual_robot", "host/harness", "host/benchmarks", "schema", "tools")
+ROOMS = ("host/bifa", "host/lacuna", "host/virtual_robot", "host/harness", "host/benchmarks", "schema", "tools")
 LEFT_OUT = ("tools/stand_ins",)  # in the place of others' files
 OURS = (
     "host/bifa",
@@ -23,7 +23,7 @@ PRIVATE = {  # a word of ours: the field's
     "afresh": "cold_start",
     "anew": "cold_start",
     "besides": "absorbed",
-    "crew": "executor",
+    "crew": "workers",
     "foreseen": "predictive",
     "glance": "coarse",
     "mistake": "check",

@@ -30,8 +30,8 @@ from benchmarks.small.figures import report
 from benchmarks.small.offered import Offered
 from benchmarks.small.run import asked, diagnosed, opened, predicted_off
 
-_COUNTS = {"singles": ("single", 56), "none": ("none", 21), "withheld": ("outside", 21), "pairs": ("pair", 21)}
-_COUNTS["decoys"] = ("decoys", 28)
+COUNTS = {"singles": ("single", 56), "none": ("none", 21), "withheld": ("outside", 21), "pairs": ("pair", 21)}
+COUNTS["decoys"] = ("decoys", 28)
 
 
 def jobs(counts: dict[str, int], first_seed: int) -> list[tuple[str, int]]:
@@ -115,7 +115,7 @@ def against(these: Path, others: Path) -> None:
 
 def main(given: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, (_, count) in _COUNTS.items():
+    for name, (_, count) in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"sets, {count} by default")
     parser.add_argument("--first-seed", type=int, default=7000, metavar="SEED")
     parser.add_argument("--records", type=Path, default=Path("../out/small.jsonl"), metavar="FILE")
@@ -141,7 +141,7 @@ def main(given: list[str] | None = None) -> int:
         report(list(lines.read(options.records, place).values()))
         return 0
     options.records.parent.mkdir(parents=True, exist_ok=True)
-    todo = jobs({truth: getattr(options, name) for name, (truth, _) in _COUNTS.items()}, options.first_seed)
+    todo = jobs({truth: getattr(options, name) for name, (truth, _) in COUNTS.items()}, options.first_seed)
     try:
         found = run(todo, options.records, not options.without_peers)
     except KeyboardInterrupt:

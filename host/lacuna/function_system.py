@@ -79,7 +79,7 @@ class FunctionSystem(System):
     Raises DeclarationError if names conflict.
     """
 
-    nuisances_anew = True
+    nuisances_per_run = True
     tells_of_all = True
 
     def __init__(
@@ -115,7 +115,8 @@ class FunctionSystem(System):
         free = self.held.free(given)
         for p in free:
             if p.at_least is not None:
-                _check_known(f"at_least of {p.name}", [p.at_least], [q.name for q in free], "is not fitted")
+                fitted = [q.name for q in free]
+                _check_known(f"at_least of {p.name}", [p.at_least], fitted, "is no parameter that is fitted")
         ordered = {p.name for p in free if p.at_least} | {p.at_least for p in free}
         self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in free}
         self.parameters = tuple(self._coordinates[p.name].of(p) for p in free)

@@ -271,7 +271,7 @@ class System(Protocol):
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
     forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own
     tells_of_all: bool = False  # whether parameters are told from a fit to every record, those too that judged
-    nuisances_anew: bool = (
+    nuisances_per_run: bool = (
         False  # whether each run draws its own, so that repeats share nothing of them (`nuisances.py`)
     )
 

@@ -12,20 +12,20 @@ from lacuna.diagnosis.candidate import (
     judge,
     sharpened_floor,
 )
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, met_by_chance
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.race import continued, helps_at_once
 from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import (
     Fit,
     at_its_misfit,
     converged,
     evaluate_on,
     fit,
-    foreseen,
+    predictive,
     refit_on,
     released,
     renewed,
@@ -42,6 +42,7 @@ _ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another fol
 _HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away,
 _DOUBTFUL = 1.5  # and no last digits of it so much
 _ASTRAY = 1.1  # times the error on conditions never fitted
+_FITS = ("on_known", "settled", "intervals", "converged")  # questions whose answers no rule of decision changes
 
 
 Answer = TypeVar("Answer")
@@ -68,6 +69,12 @@ class Case:
         self.system, self.split, self.policy, self.seed = system, split, policy, seed
         self.by_turns: dict[Candidate, Candidate] = {}  # without repeats: as they predict each record from the others
         self._answers: dict[tuple[str, Candidate], Any] = {}
+
+    def ruled_by(self, policy: Policy) -> Case:
+        """The same case under other rules of decision: fits are kept, what rules decide is asked anew."""
+        other = Case(self.system, self.split, policy, self.seed)
+        other._answers = {asked: found for asked, found in self._answers.items() if asked[0] in _FITS}
+        return other
 
     def fit_base(self, starts: int) -> Fit:
         """Base fitted to the trials to fit, with a floor from what repeats' residuals differ by among all but the
@@ -164,7 +171,7 @@ class Case:
         """An effect that takes away what matters though repeats need not share it, so that the floor contains it: one
         that has values of its own in every trial, or one that the parameters shut out (`Effect.apart`), whose part the
         nuisances of each run take over."""
-        library, crew, parent = self.system.effects, Crew(lambda _: None), candidate.fitted
+        library, workers, parent = self.system.effects, Workers(lambda _: None), candidate.fitted
         if parent.structure.sites:  # nothing is grown on a learnt curve
             return None
         able = [
@@ -173,7 +180,7 @@ class Case:
             if name not in candidate.effects
             and (effect.apart or (effect.own and helps_at_once(parent, name, self.policy.gain)))
         ]
-        for effect, fitted in zip(able, continued(parent, able, crew), strict=True):
+        for effect, fitted in zip(able, continued(parent, able, workers), strict=True):
             other = judge(fitted, self.split, self.policy, near=candidate.checked)
             if candidate.cost - other.cost > self.policy.gain and self.exceeds(candidate, other):
                 return effect
@@ -182,7 +189,7 @@ class Case:
     @_once
     def followed(self, candidate: Candidate) -> tuple[Followed, ...]:
         """Nuisances that still follow the condition with an explanation: what none of the runs' own could be."""
-        if not self.system.nuisances_anew:
+        if not self.system.nuisances_per_run:
             return ()
         return find_followed(self._on_all(candidate), policy=self.policy, seed=self.seed)
 
@@ -199,7 +206,7 @@ class Case:
         known, unseen = self.converged(candidate), self.split.unseen
         return [known, evaluate_on(known, unseen)] if unseen else [known]
 
-    def outdone(self, candidate: Candidate, better: Candidate) -> bool:
+    def dominated(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by
         their friction differ so much from repeat to repeat that what these share may pass for chance."""
         mine, others = self.converged(candidate), self.converged(better)
@@ -216,7 +223,7 @@ class Case:
         """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
         would have left so if a run's factors had to be foreseen, which a few runs of one pair may be by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
-        foretold = (tuple([foreseen(fit) for fit in fits] for fits in pair) for pair in both)
+        foretold = (tuple([predictive(fit) for fit in fits] for fits in pair) for pair in both)
         ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in foretold)
         return max(known) > self.policy.relevance or min(ahead) > self.policy.relevance
 

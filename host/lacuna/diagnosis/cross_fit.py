@@ -13,9 +13,9 @@ from typing import Any
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.residual_error import failed, rms
 from lacuna.diagnosis.search import Search
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.system import Record, groups_of_repeats
 
@@ -54,7 +54,7 @@ def is_due(case: Case) -> bool:
     return len(case.split.known) > 2 and all(len(group) == 1 for group in groups_of_repeats(case.system.trials))
 
 
-def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
+def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
     """`found` with its leading explanations judged on every known record; the case knows them by their originals."""
     least = min(c.cost for c in found.tried)
     near = (c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least)
@@ -64,7 +64,7 @@ def cross_fitted(case: Case, found: Search, crew: Crew) -> Search:
     known = [case.on_known(candidate) for candidate in candidates]
     jobs = [(fit, fold) for fit in known for fold in folds]
     names = [c.effects or ("nothing",) for c in candidates for _ in folds]
-    left_out = crew.map("predicting each record in turn with", names, _left_out, jobs)
+    left_out = workers.map("predicting each record in turn with", names, _left_out, jobs)
     judged = case.by_turns
     for k, (candidate, fit) in enumerate(zip(candidates, known, strict=True)):
         mine = left_out[k * len(folds) : (k + 1) * len(folds)]

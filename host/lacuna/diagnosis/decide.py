@@ -65,7 +65,7 @@ def choose(search: Search, policy: Policy, matters: Judgement) -> Choice:
     against = Comparison(search, policy, matters)
     everything = sorted((*search.tried, *search.freed), key=lambda c: c.cost)
     best = everything[0]
-    held = [c for c in search.tried if not any(against.outdone(c, other) for other in everything)]
+    held = [c for c in search.tried if not any(against.dominated(c, other) for other in everything)]
     held.sort(key=lambda c: (len(c.effects), against.form(c).cost))
     weights = _weights(_compared(search, best), against.dispersion)
     chosen = next((c for c in held if not against.surely(c, best) or _supported(c, weights, policy)), None)
@@ -93,7 +93,7 @@ def _without_one(chosen: Candidate, search: Search, against: Comparison) -> Cand
     """`chosen` less an effect without which it predicts no worse."""
     for effect in chosen.effects:
         smaller = search.with_effects([e for e in chosen.effects if e != effect])
-        if smaller is not None and not against.outdone(smaller, against.form(chosen)):
+        if smaller is not None and not against.dominated(smaller, against.form(chosen)):
             return smaller
     return None
 
@@ -106,7 +106,7 @@ class Comparison:
     policy: Policy
     matters: Judgement
 
-    def outdone(self, candidate: Candidate, better: Candidate) -> bool:
+    def dominated(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation predicts worse, in whichever form of its own."""
         forms = {candidate, self.form(candidate)}
         return better not in forms and all(self.worse(form, better) for form in forms)

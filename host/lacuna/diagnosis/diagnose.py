@@ -11,10 +11,9 @@ from lacuna.check import check
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
-from lacuna.diagnosis.crew import Crew, Progress
 from lacuna.diagnosis.cross_fit import CrossFitted, cross_fitted, is_due
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of, weigh
-from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing, not_foreseen
+from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing, not_predicted
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.explain_nuisances import explain_nuisances
@@ -31,8 +30,9 @@ from lacuna.diagnosis.search import Search, search
 from lacuna.diagnosis.sign import impossible_signs
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
-from lacuna.diagnosis.stopped import STOPPED, Found
+from lacuna.diagnosis.stopped import STOPPED, Found, Stoppable
 from lacuna.diagnosis.warn import warnings_of
+from lacuna.diagnosis.workers import Progress, Workers
 from lacuna.errors import TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.estimation.solve import one_thread
@@ -114,45 +114,47 @@ def diagnose(
         raise TooLittleDataError(
             "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."
         )
-    crew, case = Crew(progress, executor, forks=system.forks), Case(system, split, policy, seed)
-    crew.say("fitting the base model")
-    base = case.fit_base(starts)
-    found, stopped = _explanations(case, base, crew)
-    say = (lambda _: None) if stopped else crew.say  # what was said of stopping stays to be read
-    say("deciding what is supported")
-    try:
-        choice = _chosen(case, found, None if stopped else crew)
-    except KeyboardInterrupt:
-        crew.say("stopped: one record in five chooses (Ctrl-C again gives up)")
-        stopped, say = True, lambda _: None
-        choice = _chosen(case, found, None)
+    case, hand = Case(system, split, policy, seed), Stoppable(Workers(progress, executor, forks=system.forks))
+    hand.say("fitting the base model")
+    found = explanations(case, case.fit_base(starts), hand)
+    hand.say("deciding what is supported")
+    found, choice, judged = decided(case, found, hand)
+    final = judged.explained
+    if judged.verdict != "none" and judged.left.matters:
+        final = hand.ask(
+            lambda: _corrected(case, found, choice, judged, hand.workers),
+            lambda: _corrected(case, found, choice, judged, None),
+            "no curve is learnt",
+        )
+    hand.say("estimating how well the parameters are known")
+    shown = choice.explanation if judged.verdict == "identified" else found.base
+    followed = followed_by_nothing(case.followed(shown))
+    told = _told(case, judged, shown, final)
+    said = (*([STOPPED] if hand.stopped else []), *cautions, *followed, *warnings_of(told, split))
+    return _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
+
+
+def decided(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice, Assessed]:
+    """What of everything tried is named, and the verdict; with what was tried on the way to it."""
+    choice = hand.ask(
+        lambda: _chosen(case, found, hand.workers),
+        lambda: choose(found, case.policy, case.exceeds),
+        "one record in five chooses",
+    )
     found, choice = eliminate(case, found, choice)
-    if not stopped:
-        try:
-            found, choice = explain_nuisances(case, found, choice, crew)
-        except KeyboardInterrupt:
-            crew.say("stopped: what nuisances follow is not asked (Ctrl-C again gives up)")
-            stopped, say = True, lambda _: None
+    found, choice = hand.ask(
+        lambda: explain_nuisances(case, found, choice, hand.workers),
+        lambda: (found, choice),
+        "what nuisances follow is not asked",
+    )
     judged = _judged(case, found, choice)
     while (smaller := _without_harm(case, found, choice, judged)) is not None:
         choice = smaller
         judged = _judged(case, found, choice)
-    final = judged.explained
-    if judged.verdict != "none" and judged.left.matters:
-        try:
-            final = _corrected(case, found, choice, judged, None if stopped else crew)
-        except KeyboardInterrupt:
-            crew.say("stopped: no curve is learnt (Ctrl-C again gives up)")
-            stopped, say = True, lambda _: None
-    say("estimating how well the parameters are known")
-    shown = choice.explanation if judged.verdict == "identified" else found.base
-    unforeseen = followed_by_nothing(case.followed(shown))
-    told = _told(case, judged, shown, final)
-    said = (*([STOPPED] if stopped else []), *cautions, *unforeseen, *warnings_of(told, split))
-    return _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
+    return found, choice, judged
 
 
-def _told(case: Case, judged: _Judged, shown: Candidate, final: Fit) -> Fit:
+def _told(case: Case, judged: Assessed, shown: Candidate, final: Fit) -> Fit:
     """The fit that a verdict tells parameters from: of the explanation or, with curves or where nothing is explained,
     of the final model."""
     if judged.verdict != "unexplained" and not final.structure.sites:
@@ -163,19 +165,19 @@ def _told(case: Case, judged: _Judged, shown: Candidate, final: Fit) -> Fit:
     return refit_on(final, (*final.problem.trials, *others), near=(final, evaluate_on(final, others)))
 
 
-def _chosen(case: Case, found: Search, crew: Crew | None) -> Choice:
-    """What explains best; without repeats, and with a crew, by what predicts every known record."""
-    if crew is None or len(found.tried) == 1 or not is_due(case):
+def _chosen(case: Case, found: Search, workers: Workers) -> Choice:
+    """What explains best; without repeats, by what predicts every known record."""
+    if len(found.tried) == 1 or not is_due(case):
         return choose(found, case.policy, case.exceeds)
-    choice = choose(cross_fitted(case, found, crew), case.policy, case.exceeds)
+    choice = choose(cross_fitted(case, found, workers), case.policy, case.exceeds)
     candidate, freed = cast(CrossFitted, choice.candidate), cast(CrossFitted | None, choice.freed)
     return replace(choice, candidate=candidate.of, freed=freed and freed.of)
 
 
 @dataclass(frozen=True)
-class _Judged:
+class Assessed:
     """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), and what each
-    leaves; `besides`: where the base model leaves what matters and repeats do not surely share, a sentence that says
+    leaves; `unshared`: where the base model leaves what matters and repeats do not surely share, a sentence that says
     so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict. `tested`: the share of the gap that
     these close on the final trials; None where there is no gap, or no such trial."""
 
@@ -184,21 +186,21 @@ class _Judged:
     explained: Fit
     remainder: Remainder
     left: Remainder
-    besides: str
+    unshared: str
     floor: Floor
     drifts: tuple[Drift, ...]
     tested: float | None
 
 
-def _judged(case: Case, found: Search, choice: Choice) -> _Judged:
+def _judged(case: Case, found: Search, choice: Choice) -> Assessed:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
-    besides = "" if remainder.matters else _besides(case, choice, found)
+    unshared = "" if remainder.matters else _unshared(case, choice, found)
     floor = floor_of(chosen, case.split)
     tested = _tested(case, base, chosen, floor) if remainder.matters else None
-    verdict = _verdict(case, choice, found, remainder.matters, besides, drifts, tested)
+    verdict = _verdict(case, choice, found, remainder.matters, unshared, drifts, tested)
     explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
-    return _Judged(verdict, base, explained, remainder, left, besides, floor, drifts, tested)
+    return Assessed(verdict, base, explained, remainder, left, unshared, floor, drifts, tested)
 
 
 def _tested(case: Case, base: Fit, chosen: Fit, floor: Floor) -> float | None:
@@ -208,7 +210,7 @@ def _tested(case: Case, base: Fit, chosen: Fit, floor: Floor) -> float | None:
     return share_of_gap(before, after, floor.held_out) if before**2 > least or after**2 > least else None
 
 
-def _without_harm(case: Case, found: Search, choice: Choice, judged: _Judged) -> Choice | None:
+def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -> Choice | None:
     """`choice` less the effect without which the final trials are predicted better, if it is one of several; these
     inform no choice, but what they contradict is not named."""
     if judged.tested is None or len(choice.candidate.effects) < 2:
@@ -222,10 +224,10 @@ def _without_harm(case: Case, found: Search, choice: Choice, judged: _Judged) ->
     return weigh(found, smaller, case.policy)
 
 
-def _besides(case: Case, choice: Choice, found: Search) -> str:
+def _unshared(case: Case, choice: Choice, found: Search) -> str:
     if hidden := case.hidden(found.base):
         return f"What repeats differ by, or what the nuisances of each take up, is no noise: {hidden} would explain it."
-    if choice.candidate.effects and case.outdone(found.base, choice.explanation):
+    if choice.candidate.effects and case.dominated(found.base, choice.explanation):
         named = " and ".join(choice.candidate.effects)
         return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
     if choice.candidate.effects and (taken_up := _taken_up(case, choice, found)):
@@ -240,11 +242,11 @@ def _taken_up(case: Case, choice: Choice, found: Search) -> list[Followed]:
 
 
 def _doubts(
-    case: Case, choice: Choice, judged: _Judged, effects: tuple[Named, ...], errors: tuple[Error, Error]
+    case: Case, choice: Choice, judged: Assessed, effects: tuple[Named, ...], errors: tuple[Error, Error]
 ) -> list[str]:
     """What speaks against a verdict that names `effects`, or none; `errors` before and with them."""
     if judged.verdict == "none":
-        return not_foreseen(judged.base, case.split, errors[0], judged.floor, case.policy)
+        return not_predicted(judged.base, case.split, errors[0], judged.floor, case.policy)
     if not effects:
         return but_too_little(choice, case.split, judged.tested) if choice.candidate.effects else []
     return doubts(choice, case.split, judged.tested, case.policy)
@@ -254,7 +256,7 @@ def _reported(
     case: Case,
     found: Search,
     choice: Choice,
-    judged: _Judged,
+    judged: Assessed,
     fits: tuple[Fit, Fit],
     said: tuple[str, ...],
     seconds: float,
@@ -278,7 +280,7 @@ def _reported(
         after=error_of(final, split),
         floor=judged.floor,
         remainder_before=judged.remainder,
-        signature=describe(judged.base, judged.remainder, judged.drifts, besides=judged.besides),
+        signature=describe(judged.base, judged.remainder, judged.drifts, unshared=judged.unshared),
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
@@ -297,23 +299,22 @@ def _reported(
     )
 
 
-def _explanations(case: Case, base: Fit, crew: Crew) -> tuple[Search, bool]:
-    """Everything tried, and whether the search was stopped by hand. Nothing is tried where the base model leaves
-    nothing that matters."""
+def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
+    """Everything tried. Nothing is where the base model leaves nothing that matters."""
     first = case.judge(base)
     if case.may_be_lost(first):
-        crew.say("fitting the base model from elsewhere, too")
-        first = from_elsewhere(first, case.split, case.seed, crew)
+        hand.say("fitting the base model from elsewhere, too")
+        first = from_elsewhere(first, case.split, case.seed, hand.workers)
     first = case.sharply(first)
     if case.suffices(first):
-        screened = score(first.fitted, list(case.system.effects), crew).screened()
-        return Search(first, first.fitted.problem.floor, (first,), screened), False
+        screened = score(first.fitted, list(case.system.effects), hand.workers).screened()
+        return Search(first, first.fitted.problem.floor, (first,), screened)
     found = Found()
-    try:
-        return search(case, first, enough=case.suffices, crew=crew, keep=found.keep), False
-    except KeyboardInterrupt:
-        crew.say("stopped: weighing what was found until now (Ctrl-C again gives up)")
-        return found.search(first, case.split), True
+    return hand.ask(
+        lambda: search(case, first, enough=case.suffices, workers=hand.workers, keep=found.keep),
+        lambda: found.search(first, case.split),
+        "weighing what was found until now",
+    )
 
 
 def _verdict(
@@ -321,29 +322,29 @@ def _verdict(
     choice: Choice,
     found: Search,
     matters: bool,
-    besides: str,
+    unshared: str,
     drifts: tuple[Drift, ...],
     tested: float | None,
 ) -> str:
-    if not matters and not besides:
+    if not matters and not unshared:
         return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
     if not choice.candidate.effects:
         return "unexplained"
     # of what passes for noise, or nuisances take up, there is no gap to close half of
-    hidden = besides or _taken_up(case, choice, found)
+    hidden = unshared or _taken_up(case, choice, found)
     explains = case.closed(choice.explanation, found.base) >= case.policy.half and (tested is None or tested >= 0.0)
     return "identified" if explains or (hidden and case.suffices(choice.explanation)) else "unexplained"
 
 
-def _corrected(case: Case, found: Search, choice: Choice, judged: _Judged, crew: Crew | None) -> Fit:
-    """What is explained with curves learnt on top, where they hold on trials that informed nothing; without a crew none
-    are learnt. Where nothing is supported, the best of everything tried stands beside them, so that what is reported is
-    never worse than that."""
+def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, workers: Workers | None) -> Fit:
+    """What is explained with curves learnt on top, where they hold on trials that informed nothing; without workers
+    none are learnt. Where nothing is supported, the best of everything tried stands beside them, so that what is
+    reported is never worse than that."""
     split, unexplained = case.split, judged.verdict == "unexplained"
     parents = list(dict.fromkeys((found.base, choice.explanation))) if unexplained else [choice.explanation]
     learnt = None
-    if crew and not any(case.suffices(parent) for parent in parents):
-        learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, crew=crew)
+    if workers and not any(case.suffices(parent) for parent in parents):
+        learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, workers=workers)
     offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
     if unexplained:
         offered += (*found.tried, *found.freed)

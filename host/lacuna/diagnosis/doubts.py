@@ -16,7 +16,7 @@ from lacuna.estimation.uncertainty import pieces_of
 _SURELY = 4.0  # standard deviations
 
 
-def not_foreseen(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
+def not_predicted(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
     """Of a verdict that nothing is missing: records that were not fitted, and are predicted worse than that beyond
     chance."""
     pieces = sum(pieces_of(trial, found.problem.floor) for trial in split.final)
@@ -52,9 +52,9 @@ def doubts(choice: Choice, split: Split, tested: float | None, policy: Policy) -
         )
     likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
     if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
-        besides = [effect for effect in likeliest if effect not in choice.candidate.effects]
+        further = [effect for effect in likeliest if effect not in choice.candidate.effects]
         said.append(
-            f"With {listed(besides)}, too, the explanation would have more weight ({weight:.2f}), but that closes too"
+            f"With {listed(further)}, too, the explanation would have more weight ({weight:.2f}), but that closes too"
             " little of what is left to be named, or helps too little where nothing was fitted."
         )
     if tested is not None and len(split.final) == 1:

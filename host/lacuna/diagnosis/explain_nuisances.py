@@ -6,15 +6,15 @@ from dataclasses import replace
 
 from lacuna.diagnosis.candidate import judge
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.decide import Choice, weigh
 from lacuna.diagnosis.race import continued, to_the_end
 from lacuna.diagnosis.search import Search, reweighed
+from lacuna.diagnosis.workers import Workers
 
 _FINISHED = 3  # of the most promising, to the end
 
 
-def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> tuple[Search, Choice]:
+def explain_nuisances(case: Case, found: Search, choice: Choice, workers: Workers) -> tuple[Search, Choice]:
     """`choice` with the effect more that nuisances follow the condition by, if there is one; and the search with what
     was tried for it. What a condition sets (where its runs begin) may have any value in each, and some effect meets
     such values roughly; so it has to do so better than by chance."""
@@ -25,11 +25,11 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, crew: Crew) -> 
     if not parent.fitted.solution.sensitivities:
         parent = reweighed(parent, case.split, found.floor)
     fresh = [name for name in case.system.effects if name not in parent.effects]
-    crew.say(f"asking what {followed[0].nuisance} follows")
-    near = continued(parent.fitted, fresh, crew)
+    workers.say(f"asking what {followed[0].nuisance} follows")
+    near = continued(parent.fitted, fresh, workers)
     grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]
-    finished = to_the_end(promising, case.split, crew)
+    finished = to_the_end(promising, case.split, workers)
     tried = {frozenset(c.effects): c for c in found.tried}
     for one in (*grown, *finished):
         same = frozenset(one.effects)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after, stacked
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.race import cold, initial_guess
 from lacuna.diagnosis.residual_error import rms
 from lacuna.diagnosis.split import Split
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on, starting_point
 from lacuna.estimation.problem import Point, Problem
 from lacuna.estimation.solve import Solution, solve
@@ -25,7 +25,7 @@ _MOST = 4  # curves in one correction
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
 _SOUGHT = 8  # sites where further curves are sought
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
-_SKETCH: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
+_COARSE: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
 _REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
 
 
@@ -39,19 +39,24 @@ class _Promise:
     cost: float
 
 
-def free_form(candidate: Candidate, split: Split, *, policy: Policy, crew: Crew) -> Candidate | None:
+def free_form(candidate: Candidate, split: Split, *, policy: Policy, workers: Workers) -> Candidate | None:
     """`candidate` with the curve that helps most where one of its effects may act in another form than its formula's,
     since no real mechanism follows the formula exactly. None if none helps."""
     structure = candidate.fitted.structure
     sites = {site: None for effect in structure.effects for site in structure.system.effects[effect].freed_at}
     if not sites:
         return None
-    promises = sorted(_promises(candidate, list(sites), split, crew), key=lambda p: p.cost)
-    return _best_grown([candidate], promises[:_FITTED], split, policy, crew)
+    promises = sorted(_promises(candidate, list(sites), split, workers), key=lambda p: p.cost)
+    return _best_grown([candidate], promises[:_FITTED], split, policy, workers)
 
 
 def learn_correction(
-    candidates: Sequence[Candidate], split: Split, *, enough: Callable[[Candidate], bool], policy: Policy, crew: Crew
+    candidates: Sequence[Candidate],
+    split: Split,
+    *,
+    enough: Callable[[Candidate], bool],
+    policy: Policy,
+    workers: Workers,
 ) -> Candidate | None:
     """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
     `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
@@ -62,9 +67,9 @@ def learn_correction(
         parents = [best] if best else candidates
         promises: list[_Promise] = []
         for parent in parents:
-            promises = sorted([*promises, *_promises(parent, sites, split, crew)], key=lambda p: p.cost)
+            promises = sorted([*promises, *_promises(parent, sites, split, workers)], key=lambda p: p.cost)
             sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
-        grown = _best_grown(parents, promises[:_FITTED], split, policy, crew)
+        grown = _best_grown(parents, promises[:_FITTED], split, policy, workers)
         if grown is None:
             break
         best = grown
@@ -78,7 +83,7 @@ def _best_grown(
     promises: Sequence[_Promise],
     split: Split,
     policy: Policy,
-    crew: Crew,
+    workers: Workers,
 ) -> Candidate | None:
     before = min(parents, key=lambda c: c.checked.cost)
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
@@ -88,7 +93,7 @@ def _best_grown(
         (p.problem, p.start, initial_guess(p.problem.structure, p.candidate.fitted.theta) if lost else None)
         for p in promises
     ]
-    solutions = crew.map("learning a curve for", names, _sketched, jobs)
+    solutions = workers.map("learning a curve for", names, _coarse, jobs)
     grown = [
         judge(Fit(p.problem, solution, 1, 1), split, policy) for p, solution in zip(promises, solutions, strict=True)
     ]
@@ -114,22 +119,22 @@ def _excess(fit: Fit) -> float:
     return max(fit.cost - 0.5 * effective_samples(fit), 0.0)
 
 
-def _sketched(problem: Problem, start: Point, cold_values: np.ndarray | None) -> Solution:
+def _coarse(problem: Problem, start: Point, cold_values: np.ndarray | None) -> Solution:
     """From where the parent stands; where that may be lost, cold as well."""
-    found = [solve(problem, start, **_SKETCH)]
+    found = [solve(problem, start, **_COARSE)]
     if cold_values is not None:
         found.append(cold(problem, cold_values))
     return min(found, key=lambda s: s.cost)
 
 
-def _refined(sketched: Fit) -> Fit:
+def _refined(coarse: Fit) -> Fit:
     """To the end, from where the sketch stands: a curve leads the others nowhere else."""
-    return Fit(sketched.problem, solve(sketched.problem, sketched.solution.point, **_REFINED), 1, 1)
+    return Fit(coarse.problem, solve(coarse.problem, coarse.solution.point, **_REFINED), 1, 1)
 
 
-def _promises(candidate: Candidate, sites: Sequence[str], split: Split, crew: Crew) -> list[_Promise]:
+def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers: Workers) -> list[_Promise]:
     """The curve of each of `sites`, regressed on what `candidate` leaves and its own parameters cannot take up."""
-    crew.say("asking where a curve would help")
+    workers.say("asking where a curve would help")
     parent = candidate.fitted
     basis, remaining = remaining_after(parent)
     found = []

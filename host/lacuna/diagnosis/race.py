@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.score import Promise
 from lacuna.diagnosis.sizes import grown, starts
 from lacuna.diagnosis.split import Split
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, best_of, renewed, spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.problem import Point, Problem
@@ -72,25 +72,25 @@ def race(
     *,
     split: Split,
     enough: Callable[[Candidate], bool],
-    crew: Crew,
+    workers: Workers,
     keep: Callable[[Sequence[Candidate]], None] = lambda _: None,
 ) -> list[Candidate]:
     """`promises`, the most promising first, fitted coarsely, and the best of them, `most` at most, to the end. `keep`
     is called with what there is, in case that somebody stops the race."""
     policy, done = parent.policy, []
-    raced, rest = coarse_fits(parent, promises[:_FIRST], split, crew), list(promises[_FIRST:])
+    raced, rest = coarse_fits(parent, promises[:_FIRST], split, workers), list(promises[_FIRST:])
     keep(raced)
     if raced and min(raced, key=_cost).checked_error <= (0, policy.lost):
-        done = to_the_end([min(raced, key=_cost)], split, crew)
+        done = to_the_end([min(raced, key=_cost)], split, workers)
         raced.remove(min(raced, key=_cost))
         keep(done)
         if enough(done[0]):
             least = policy.rival * max(one.gain for one in promises)
             rest = [one for one in rest if one.gain > least]
-    raced = sorted([*raced, *coarse_fits(parent, rest, split, crew)], key=_cost)
+    raced = sorted([*raced, *coarse_fits(parent, rest, split, workers)], key=_cost)
     keep(raced)
     chosen = [c for c in raced if _worth_it(c, parent, done, enough)][: most - len(done)]
-    done += to_the_end(chosen, split, crew)
+    done += to_the_end(chosen, split, workers)
     keep(done)
     return sorted([*done, *(c for c in raced if c not in chosen)], key=_cost)
 
@@ -110,10 +110,10 @@ def _cost(candidate: Candidate) -> float:
     return candidate.cost
 
 
-def coarse_fits(parent: Candidate, promises: Sequence[Promise], split: Split, crew: Crew) -> list[Candidate]:
+def coarse_fits(parent: Candidate, promises: Sequence[Promise], split: Split, workers: Workers) -> list[Candidate]:
     names = [one.problem.structure.effects for one in promises]
     jobs = [(one.problem, cold_starts(one), one.start, parent.fitted.cost) for one in promises]
-    solutions = crew.map("fitting", names, _begun, jobs)
+    solutions = workers.map("fitting", names, _begun, jobs)
     fits = [Fit(one.problem, solution, 1, 1) for one, solution in zip(promises, solutions, strict=True)]
     return [judge(fitted, split, parent.policy, near=parent.checked) for fitted in fits]
 
@@ -130,11 +130,11 @@ def cold(problem: Problem, values: np.ndarray) -> Solution:
     return solve_graduated(problem, values, **COARSE)
 
 
-def to_the_end(candidates: Sequence[Candidate], split: Split, crew: Crew) -> list[Candidate]:
+def to_the_end(candidates: Sequence[Candidate], split: Split, workers: Workers) -> list[Candidate]:
     """The explanations fitted to convergence."""
     names = [c.effects or ("nothing",) for c in candidates]
     jobs = [(c.fitted.problem, c.fitted.solution) for c in candidates]
-    solutions = crew.map("finishing", names, converged, jobs)
+    solutions = workers.map("finishing", names, converged, jobs)
     each = zip(candidates, solutions, strict=True)
     ended = [judge(Fit(c.fitted.problem, s, 1, 1), split, c.policy, near=c.checked) for c, s in each]
     return [min(before, after, key=_cost) for before, after in zip(candidates, ended, strict=True)]
@@ -147,7 +147,7 @@ def converged(problem: Problem, coarse: Solution) -> Solution:
     return renewed(problem, min(coarse, again, key=lambda s: s.cost), **_TO_THE_END)
 
 
-def from_elsewhere(candidate: Candidate, split: Split, seed: int, crew: Crew) -> Candidate:
+def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Workers) -> Candidate:
     """The better of a converged explanation and its refits that begin anywhere plausible, its effects as they are."""
     fitted, structure = candidate.fitted, candidate.fitted.structure
     problem, values = fitted.problem, fitted.solution.point.values
@@ -155,7 +155,7 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, crew: Crew) ->
     for start in begun:
         start[structure.base_size :] = values[structure.base_size :]
     names = [structure.effects or ("nothing",)] * len(begun)
-    found = crew.map("from elsewhere, fitting", names, cold, [(problem, start) for start in begun])
+    found = workers.map("from elsewhere, fitting", names, cold, [(problem, start) for start in begun])
     best = min(found, key=lambda s: s.cost)
     if best.cost > NEAR * fitted.cost:
         return candidate
@@ -163,7 +163,7 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, crew: Crew) ->
     return min(candidate, ended, key=_cost)
 
 
-def continued(parent: Fit, effects: Sequence[str], crew: Crew) -> list[Fit]:
+def continued(parent: Fit, effects: Sequence[str], workers: Workers) -> list[Fit]:
     """Each effect more on a parent that leaves little, so that it is where it should be: a coarse fit from there."""
     library, nuisances = parent.structure.system.effects, parent.solution.point.nuisances
     problems = [grown(parent, effect) for effect in effects]
@@ -171,7 +171,7 @@ def continued(parent: Fit, effects: Sequence[str], crew: Crew) -> list[Fit]:
         (one, starts(parent, one.structure, effect), nuisances, bool(library[effect].apart))
         for effect, one in zip(effects, problems, strict=True)
     ]
-    found = crew.map("trying", [p.structure.effects for p in problems], _continued, jobs)
+    found = workers.map("trying", [p.structure.effects for p in problems], _continued, jobs)
     return [Fit(one, solution, 1, 1) for one, solution in zip(problems, found, strict=True)]
 
 

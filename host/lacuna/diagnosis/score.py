@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.sizes import grown, starts
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Point, Problem
 
@@ -114,7 +114,7 @@ class Scores:
         return tuple(found)
 
 
-def score(parent: Fit, effects: Sequence[str], crew: Crew) -> Scores:
+def score(parent: Fit, effects: Sequence[str], workers: Workers) -> Scores:
     """What each of `effects` could take away from what `parent` leaves, at each of its sizes."""
     basis, remaining = remaining_after(parent)
     reference = np.concatenate(parent.problem.residuals(parent.solution.point))
@@ -123,7 +123,7 @@ def score(parent: Fit, effects: Sequence[str], crew: Crew) -> Scores:
         (one, starts(parent, one.structure, e), parent.solution.point.nuisances)
         for e, one in zip(effects, problems, strict=True)
     ]
-    moved = crew.map("scoring", [p.structure.effects for p in problems], _moved, jobs)
+    moved = workers.map("scoring", [p.structure.effects for p in problems], _moved, jobs)
     secants = tuple(Secant(one, start) for one, (begun, _) in zip(problems, moved, strict=True) for start in begun)
     changes = np.array([row - reference for _, rows in moved for row in rows]).reshape(len(secants), len(reference)).T
     left = changes - basis @ (basis.T @ changes)

@@ -9,11 +9,11 @@ from itertools import combinations
 from lacuna.diagnosis.candidate import LOWER, Candidate, judge, sharpened_floor
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.race import NEAR, joined, race
 from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import reweigh, starting_point
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.solve import cost_of
@@ -59,7 +59,7 @@ def search(
     first: Candidate,
     *,
     enough: Callable[[Candidate], bool],
-    crew: Crew,
+    workers: Workers,
     keep: Callable[[Sequence[Candidate]], None] = lambda _: None,
 ) -> Search:
     """Race single effects, then pairs, then sets of three, until one is `enough(candidate)` or none promises to take
@@ -69,17 +69,17 @@ def search(
 
     def raced(parent: Candidate, promises: Sequence[Promise]) -> list[Candidate]:
         size = len(promises[0].problem.structure.effects) if promises else 1
-        return race(parent, promises, _FINISHED[size], split=split, enough=enough, crew=crew, keep=keep)
+        return race(parent, promises, _FINISHED[size], split=split, enough=enough, workers=workers, keep=keep)
 
-    scores = score(first.fitted, list(case.system.effects), crew)
+    scores = score(first.fitted, list(case.system.effects), workers)
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     freed: list[Candidate] = []
     found = raced(first, _singles(scores))
     if better := led_out(first, found, split):
-        crew.say("the base model was in a wrong minimum: from the better one")
+        workers.say("the base model was in a wrong minimum: from the better one")
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
-        scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), crew), better
+        scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), workers), better
         begun = {one.effects for one in found}  # cold: they owe nothing to the base model
         found += raced(better, [e for e in _singles(scores) if e.problem.structure.effects not in begun])
     _keep(tried, found)
@@ -89,18 +89,18 @@ def search(
             break
         lower = sharpened_floor(ranked[0], split, floor)
         if lower.share_of(floor) < LOWER:
-            crew.say("weighing again against a lower floor")
+            workers.say("weighing again against a lower floor")
             floor = lower
             tried = _against(tried, size, split, lower, case.policy.reach)
             freed = [reweighed(c, split, lower) for c in freed]
             ranked = _ranked(tried, size)
         if enough(ranked[0]):
             break
-        if own := free_form(ranked[0], split, policy=case.policy, crew=crew):
+        if own := free_form(ranked[0], split, policy=case.policy, workers=workers):
             freed.append(own)
-            if enough(own) and ranked[0].left < case.policy.half * tried[frozenset()].left:
+            if ranked[0].left < case.policy.half * tried[frozenset()].left and enough(own):
                 break
-        promises = _larger(case, tried, ranked, crew) if size < LARGEST_SET else []
+        promises = _larger(case, tried, ranked, workers) if size < LARGEST_SET else []
         if not promises:
             break
         _keep(tried, raced(ranked[0], promises))
@@ -129,7 +129,7 @@ def _blind(effect: Effect) -> bool:
 
 
 def _larger(
-    case: Case, tried: dict[frozenset[str], Candidate], ranked: Sequence[Candidate], crew: Crew
+    case: Case, tried: dict[frozenset[str], Candidate], ranked: Sequence[Candidate], workers: Workers
 ) -> list[Promise]:
     """Sets of one effect more, those first that promise to cost least: grown from the best, of the very best with what
     a score may miss, too; and of what the best have, two and two, since a limit that another one has taken the place of
@@ -138,10 +138,10 @@ def _larger(
     size, always, offers = len(best.effects) + 1, [], []
     for parent in ranked[:_PARENTS]:
         fresh = [e for e in library if e not in parent.effects]
-        for promise in score(with_derivatives(parent).fitted, fresh, crew).singles():
+        for promise in score(with_derivatives(parent).fitted, fresh, workers).singles():
             gain = best.fitted.cost - parent.fitted.cost + promise.gain
             offers.append(promise._replace(gain=gain))
-            if parent is best and _blind(library[promise.effect]):
+            if parent is best and library[promise.effect].apart:
                 always.append(offers[-1])
     for one, other in combinations(ranked[:_JOINED], 2):
         if len({*one.effects, *other.effects}) == size:

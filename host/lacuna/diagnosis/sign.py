@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.score import score
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit
 from lacuna.system import Effect
 
@@ -15,7 +15,7 @@ def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
     system, found = fitted.structure.system, []
     able = [name for name, e in system.effects.items() if name not in fitted.structure.effects and e.sizes == 1]
     able = [name for name in able if system.effects[name].absent in _bounds(system.effects[name])]
-    for one in score(fitted, able, Crew(lambda _: None)).screened() if able else ():
+    for one in score(fitted, able, Workers(lambda _: None)).screened() if able else ():
         if one.wrong_sign > policy.share:
             effect = system.effects[one.effect]
             size = effect.parameters[0]

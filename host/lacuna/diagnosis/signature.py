@@ -40,7 +40,7 @@ class Signature:
     text: str
 
 
-def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, besides: str = "") -> Signature:
+def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, unshared: str = "") -> Signature:
     """The signature of the residual of `fitted`, given its test for structure, the drifts over the session, and whether
     repeats differ by what is no noise."""
     top, found = remainder.largest, set(remainder.found)
@@ -58,7 +58,7 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
         experiments,
         tuple(depends_on),
         tuple(dependences),
-        _sentence(places, remainder, dependences, drifts, besides, repeated=_repeated(fitted)),
+        _sentence(places, remainder, dependences, drifts, unshared, repeated=_repeated(fitted)),
     )
 
 
@@ -161,11 +161,11 @@ def _sentence(
     remainder: Remainder,
     dependences: Sequence[Dependence],
     drifts: Sequence[Drift],
-    besides: str,
+    unshared: str,
     *,
     repeated: bool,
 ) -> str:
-    if not places and not drifts and not besides:
+    if not places and not drifts and not unshared:
         known = "the differences between repeats" if repeated else "the noise"
         return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder)}"
     parts = []
@@ -183,8 +183,8 @@ def _sentence(
         )
     if places and not dependences:
         parts.append("No single quantity of the model explains it.")
-    if besides:
-        parts.append(besides)
+    if unshared:
+        parts.append(unshared)
     if drifts:
         parts.append(
             f"{', '.join(d.parameter for d in drifts)} drift{'s' if len(drifts) == 1 else ''} over the session."

@@ -1,16 +1,42 @@
-"""A search that is interrupted (Ctrl-C) still gives a verdict, from what it had finished by then."""
+"""A diagnosis that is interrupted (Ctrl-C) still gives a verdict, from what it had finished by then."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from lacuna.diagnosis.candidate import Candidate
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import Search, reweighed
 from lacuna.diagnosis.split import Split
+from lacuna.diagnosis.workers import Workers
 
 STOPPED = "The search was stopped by hand: the verdict is based on the best result found so far."
+
+Answer = TypeVar("Answer")
+
+
+class Stoppable:
+    """A diagnosis in steps: once Ctrl-C has stopped it, every further step gives its short answer. `stopped`: whether
+    that has happened."""
+
+    def __init__(self, workers: Workers) -> None:
+        self.workers, self.stopped = workers, False
+
+    def say(self, what: str) -> None:
+        """Once stopped, nothing: what was said of that stays to be read."""
+        if not self.stopped:
+            self.workers.say(what)
+
+    def ask(self, full: Callable[[], Answer], short: Callable[[], Answer], said: str) -> Answer:
+        """The full answer; where it is stopped, `said` is shown, and the answer is short."""
+        if not self.stopped:
+            try:
+                return full()
+            except KeyboardInterrupt:
+                self.workers.say(f"stopped: {said} (Ctrl-C again gives up)")
+                self.stopped = True
+        return short()
 
 
 class Found:
@@ -31,5 +57,5 @@ class Found:
             known = found.setdefault(frozenset(one.effects), same)
             found[frozenset(one.effects)] = min(known, same, key=lambda c: c.cost)
         first = found[frozenset()]
-        screened = score(first.fitted, list(first.fitted.structure.system.effects), Crew(lambda _: None)).screened()
+        screened = score(first.fitted, list(first.fitted.structure.system.effects), Workers(lambda _: None)).screened()
         return Search(first, floor, tuple(found.values()), screened)

@@ -155,9 +155,9 @@ def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL
     for _ in range(_ROUNDS):
         further = [] if solution.converged else [solve(problem, solution.point, **options)]
         if letting_go:
-            begun_anew = solve(problem, problem.start(solution.point.values), **options)
-            letting_go = begun_anew.cost < min((s.cost for s in further), default=solution.cost)
-            further.append(begun_anew)
+            from_means = solve(problem, problem.start(solution.point.values), **options)
+            letting_go = from_means.cost < min((s.cost for s in further), default=solution.cost)
+            further.append(from_means)
         best = min(further, key=lambda s: s.cost, default=solution)
         gained = solution.cost - best.cost
         solution = min(solution, best, key=lambda s: s.cost)
@@ -185,7 +185,7 @@ def released(fitted: Fit) -> Fit:
     return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
 
 
-def foreseen(fitted: Fit) -> Fit:
+def predictive(fitted: Fit) -> Fit:
     """The fit with each run's factors of parameters (`Parameter.factor_of`) at their means: what could be said of a
     run before it is made."""
     problem, point = fitted.problem, fitted.solution.point

@@ -54,7 +54,7 @@ class Solution:
 
 
 @dataclass
-class _Linearised:
+class _Linearized:
     """Blocks of the Gauss-Newton system: structure first, then the trials' nuisances one after the other."""
 
     normal: np.ndarray
@@ -111,7 +111,7 @@ def solve(
             break
         steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
         sensitivities, age = _sensitivities(problem, here.point, free, steps), 0
-    normal = _linearise(problem, here.point, free, here.residuals, sensitivities).normal
+    normal = _linearize(problem, here.point, free, here.residuals, sensitivities).normal
     return Solution(
         here.point, here.cost, converged, iteration, free, _eliminate(normal, len(free)), tuple(sensitivities)
     )
@@ -158,7 +158,7 @@ def _descended(
 ) -> tuple[_Taken | None, float, bool]:
     """A step from `here` that leads down, damped the more the oftener it did not (one try where derivatives are old,
     `once`); the damping for the next; and whether the last step tried promised too little to be worth it."""
-    system = _linearise(problem, here.point, free, here.residuals, sensitivities)
+    system = _linearize(problem, here.point, free, here.residuals, sensitivities)
     lower, upper, scale = _limits(problem, here.point, free)
     reach = _REACH * scale
     bounds = np.maximum(lower, here.x - reach), np.minimum(upper, here.x + reach)
@@ -240,13 +240,13 @@ def _unpack(point: Point, free: tuple[int, ...], x: np.ndarray) -> Point:
     return Point(values, tuple(nuisances))
 
 
-def _linearise(
+def _linearize(
     problem: Problem,
     point: Point,
     free: tuple[int, ...],
     residuals: Sequence[np.ndarray],
     sensitivities: Sequence[Sensitivity],
-) -> _Linearised:
+) -> _Linearized:
     p = len(free)
     size = p + sum(len(n) for n in point.nuisances)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
@@ -270,11 +270,11 @@ def _linearise(
             normal[own, own] = one.gram[p:, p:] + np.diag(spread**-2.0)
             gradient[own] = change[p:] + (nuisance - means) / spread**2
         at += q
-    return _Linearised(normal, gradient)
+    return _Linearized(normal, gradient)
 
 
 def _step(
-    system: _Linearised, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, scale: np.ndarray, damping: float
+    system: _Linearized, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, scale: np.ndarray, damping: float
 ) -> tuple[np.ndarray, float]:
     """A damped step within the bounds and the decrease of the quadratic model that it promises."""
     diagonal = np.diag(system.normal)

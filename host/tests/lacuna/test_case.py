@@ -10,18 +10,18 @@ from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis import race as race_module
 from lacuna.diagnosis.candidate import judge
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import from_elsewhere
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import led_out, search, with_derivatives
 from lacuna.diagnosis.split import split_trials
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 
-NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
+NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 
 
 @pytest.fixture
@@ -54,9 +54,9 @@ def test_what_a_better_explanation_takes_away_matters_whatever_repeats_share(cas
     right = case.judge(case.fit_base(1))
     a_little, much = (case.judge(moved(right.fitted, by)) for by in (0.003, 0.3))
     monkeypatch.setattr(Case, "converged", lambda self, candidate: candidate.fitted)
-    assert not case.outdone(right, much)
-    assert not case.outdone(a_little, right)
-    assert case.outdone(much, right)
+    assert not case.dominated(right, much)
+    assert not case.dominated(a_little, right)
+    assert case.dominated(much, right)
 
 
 def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
@@ -99,7 +99,7 @@ def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case
 @pytest.mark.slow
 def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case):
     right = case.judge(case.fit_base(1))
-    found = search(case, case.judge(moved(right.fitted, 0.3)), enough=case.suffices, crew=NOBODY)
+    found = search(case, case.judge(moved(right.fitted, 0.3)), enough=case.suffices, workers=NOBODY)
     assert found.base.cost < right.cost + 1e-3 * right.cost, "as far as such a refit goes"
     assert case.suffices(found.base)
 
@@ -128,7 +128,7 @@ def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
 def test_what_has_to_be_foreseen_counts_only_where_it_is_so_of_every_pair(monkeypatch, known, ahead, exceeds):
     """Of a few runs, one pair of fits may differ so by chance."""
     pairs = [([0], ["other"]), ([1], ["other"])]
-    monkeypatch.setattr(case_module, "foreseen", lambda fitted: ("ahead", fitted))
+    monkeypatch.setattr(case_module, "predictive", lambda fitted: ("ahead", fitted))
     monkeypatch.setattr(
         case_module, "excess_over", lambda mine, *_: ahead[mine[0][1]] if isinstance(mine[0], tuple) else known[mine[0]]
     )

@@ -6,11 +6,11 @@ import pytest
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.cross_fit import cross_fitted, is_due
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.search import Search
 from lacuna.diagnosis.split import split_trials
+from lacuna.diagnosis.workers import Workers
 from lacuna.run import with_records
 
 NOISE = 0.2
@@ -52,8 +52,8 @@ def case_of(*given, **more):
 
 def judged(case):
     base = case.judge(case.fit_base(1))
-    crew = Crew(lambda _: None)
-    return cross_fitted(case, Search(base, base.fitted.problem.floor, (base,), ()), crew).base
+    workers = Workers(lambda _: None)
+    return cross_fitted(case, Search(base, base.fitted.problem.floor, (base,), ()), workers).base
 
 
 def test_each_record_is_predicted_by_the_mean_of_the_others():

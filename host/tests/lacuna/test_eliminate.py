@@ -7,13 +7,13 @@ import pytest
 from toy import hide
 
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.decide import weigh
 from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.search import Search
 from lacuna.diagnosis.split import split_trials
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import fit, starting_point
 from lacuna.estimation.structure import Structure
 
@@ -51,7 +51,7 @@ def test_an_effect_stays_beside_a_curve_only_if_its_formula_does_most_of_the_wor
     structure, floor = Structure(system, ("cubic_spring",)), base.fitted.problem.floor
     start = [starting_point(base.fitted, structure)]
     cubic = case.judge(fit(structure, case.split.fit, floor, starts=start))
-    freed = free_form(cubic, case.split, policy=POLICY, crew=Crew(lambda _: None))
+    freed = free_form(cubic, case.split, policy=POLICY, workers=Workers(lambda _: None))
     found = Search(base, floor, (base, cubic), (), (freed,))
     found, kept = eliminate(case, found, weigh(found, cubic, POLICY))
     assert kept.candidate is (cubic if stays else base)

@@ -11,19 +11,19 @@ from lacuna import Effect, Parameter
 from lacuna.diagnosis import race as race_module
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.learn import learn_correction
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import cold, cold_starts, initial_guess, joined, race, to_the_end
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.split import split_trials
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
 
-NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
+NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 TIME_S = np.linspace(0.0, 10.0, 200)
 SHAPES = {"a": np.cos(2 * TIME_S), "b": np.cos(3 * TIME_S), "c": np.cos(2 * TIME_S) + np.cos(3 * TIME_S), "d": TIME_S}
 
@@ -88,12 +88,12 @@ def test_a_race_ends_where_one_is_enough_and_runs_on_where_none_is(monkeypatch):
         race_module, "coarse_fits", lambda parent, some, *more: begun.extend(some) or before(parent, some, *more)
     )
     given = promises(case, base)
-    found = race(base, given, 3, split=case.split, enough=lambda c: True, crew=NOBODY)
+    found = race(base, given, 3, split=case.split, enough=lambda c: True, workers=NOBODY)
     least = POLICY.rival * given[0].gain
     assert [one.gain for one in begun] == [one.gain for k, one in enumerate(given) if k < 2 or one.gain > least]
     assert found[0].effects == ("a",)
     begun.clear()
-    race(base, given, 3, split=case.split, enough=lambda c: False, crew=NOBODY)
+    race(base, given, 3, split=case.split, enough=lambda c: False, workers=NOBODY)
     assert len(begun) == len(given)
 
 
@@ -125,7 +125,7 @@ def test_a_set_begun_cold_owes_nothing_to_a_lost_parent():
     astray = lost(case)
     (one,) = score(astray.fitted, ["delay"], NOBODY).singles()
     assert cost_of(one.problem, one.start) > 5.0 * cold(one.problem, cold_starts(one)[0]).cost
-    (found,) = race(astray, [one], 1, split=case.split, enough=case.suffices, crew=NOBODY)
+    (found,) = race(astray, [one], 1, split=case.split, enough=case.suffices, workers=NOBODY)
     assert found.fitted.theta["delay.delay_s"] == pytest.approx(0.03, rel=0.1)
 
 
@@ -159,7 +159,7 @@ def test_a_curve_is_begun_cold_where_what_it_stands_on_may_be_lost():
     case = bench({"cubic_spring.stiffness_N_m3": 4000.0}, 42)
     astray = lost(case)
     assert astray.checked_error > (0, POLICY.lost)
-    found = learn_correction([astray], case.split, enough=case.suffices, policy=POLICY, crew=NOBODY)
+    found = learn_correction([astray], case.split, enough=case.suffices, policy=POLICY, workers=NOBODY)
     assert found.fitted.structure.sites == ("spring",)
     assert found.checked_error < (0, 1.5)
 

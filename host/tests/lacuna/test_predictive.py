@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.crew import Crew
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import COARSE, continued
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.sizes import starts
 from lacuna.diagnosis.split import split_trials
-from lacuna.estimation.fit import fit, foreseen
+from lacuna.diagnosis.workers import Workers
+from lacuna.estimation.fit import fit, predictive
 from lacuna.estimation.problem import Point
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
@@ -27,7 +27,7 @@ SD = 0.02  # N
 REPEATS = 4
 SPEEDS_MM_S = (2.0, 5.0, 8.0, 12.0, 20.0)
 HOLDING_N, SLIDING_N = 1.07, 1.0
-NOBODY = Crew(lambda _: None)  # says nothing, and forks nothing
+NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 
 
 def friction(holding_N, sliding_N, speed_mm_s, fading_mm_s):
@@ -94,7 +94,7 @@ class Diagnosed:
 def test_what_is_foreseen_of_a_run_is_the_mean_of_its_factors():
     fitted = Diagnosed(10.0, 1).base.fitted
     assert any(abs(values[0] - 1.0) > SCATTER for values in fitted.solution.point.nuisances)
-    before = foreseen(fitted)
+    before = predictive(fitted)
     assert all(values[0] == 1.0 for values in before.solution.point.nuisances)
     assert before.cost > fitted.cost
     assert before.theta == fitted.theta

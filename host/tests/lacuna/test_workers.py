@@ -9,7 +9,7 @@ from multiprocessing import active_children
 
 import pytest
 
-from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.problem import use_threads
 
 NAMES = [("one",), ("two",), ("three",)]
@@ -25,7 +25,7 @@ def cores():
 def test_children_answer_in_order_what_need_not_be_shipped(cores):
     cores(2)
     said = []
-    found = Crew(said.append, forks=True).map("trying", NAMES, lambda x: (10 * x, os.getpid()), JOBS)
+    found = Workers(said.append, forks=True).map("trying", NAMES, lambda x: (10 * x, os.getpid()), JOBS)
     assert [value for value, _ in found] == [10, 20, 30]
     assert os.getpid() not in {pid for _, pid in found}
     assert said == ["trying one", "trying two", "trying three"]
@@ -35,21 +35,21 @@ def test_children_answer_in_order_what_need_not_be_shipped(cores):
 @pytest.mark.parametrize(("count", "jobs", "forks"), [(1, JOBS, True), (2, JOBS[:1], True), (2, JOBS, False)])
 def test_one_core_or_one_job_needs_no_children_and_a_system_may_forbid_them(cores, count, jobs, forks):
     cores(count)
-    found = Crew(lambda _: None, forks=forks).map("trying", NAMES[: len(jobs)], lambda _: os.getpid(), jobs)
+    found = Workers(lambda _: None, forks=forks).map("trying", NAMES[: len(jobs)], lambda _: os.getpid(), jobs)
     assert set(found) == {os.getpid()}
 
 
 def test_an_executor_is_preferred_to_children(cores):
     cores(2)
     with ThreadPoolExecutor(2) as pool:
-        found = Crew(lambda _: None, pool, forks=True).map("trying", NAMES, lambda _: os.getpid(), JOBS)
+        found = Workers(lambda _: None, pool, forks=True).map("trying", NAMES, lambda _: os.getpid(), JOBS)
     assert set(found) == {os.getpid()}
 
 
 def test_what_goes_wrong_in_a_child_is_said(cores):
     cores(2)
     with pytest.raises(ZeroDivisionError):
-        Crew(lambda _: None, forks=True).map("trying", NAMES, lambda x: 1 // (x - 2), JOBS)
+        Workers(lambda _: None, forks=True).map("trying", NAMES, lambda x: 1 // (x - 2), JOBS)
     assert not active_children()
 
 
@@ -60,7 +60,7 @@ def test_an_interruption_leaves_no_child_at_work(cores):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        Crew(interrupted, forks=True).map("trying", NAMES, lambda _: time.sleep(3600.0), JOBS)
+        Workers(interrupted, forks=True).map("trying", NAMES, lambda _: time.sleep(3600.0), JOBS)
     assert not active_children()
 
 
@@ -78,7 +78,7 @@ def test_children_do_not_outlive_a_parent_that_is_killed():
 
 _FOREVER = """
 import os, time
-from lacuna.diagnosis.crew import Crew
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.problem import use_threads
 
 def job(_):
@@ -86,7 +86,7 @@ def job(_):
     time.sleep(3600.0)
 
 use_threads(2)
-Crew(lambda _: None, forks=True).map("trying", [("one",), ("two",)], job, [(1,), (2,)])
+Workers(lambda _: None, forks=True).map("trying", [("one",), ("two",)], job, [(1,), (2,)])
 """
 
 

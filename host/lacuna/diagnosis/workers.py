@@ -19,7 +19,7 @@ Progress = Callable[[str], None]
 Jobs = Sequence[tuple[Any, ...]]
 
 
-class Crew:
+class Workers:
     """Runs pure functions and says what is being done. Any `concurrent.futures.Executor` will do that can ship a
     `Problem`, and so its system: threads, processes, dask. Without one, jobs go to forked children if these are allowed
     (`System.forks`), there is more than one job and more than one core, and this is Linux."""
