@@ -25,6 +25,8 @@ PRIVATE = {  # a word of ours: the field's
     "besides": "absorbed",
     "crew": "workers",
     "foreseen": "predictive",
+    "foretelling": "predicting",
+    "foretold": "predicted",
     "glance": "coarse",
     "mistake": "check",
     "mistakes": "checks",

@@ -39,8 +39,8 @@ _STAGE = 70  # the first of the rig's numbers for these walks
 
 @dataclass(frozen=True)
 class Step:
-    """One gait: by what part its period is shorter, the probability of walking and the interval that were foretold, and
-    the speeds of its runs; `walked`: which of them walk."""
+    """One gait: by what part its period is shorter, the predicted probability of walking and interval, and the
+    speeds of its runs; `walked`: which of them walk."""
 
     faster: float
     probability: float
@@ -50,17 +50,17 @@ class Step:
 
 
 def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
-    """Parts by which the period is shorter, and what is foretold there, for each of the probabilities `WANTED`; none of
-    a gait that all robots walk with however fast."""
+    """Parts by which the period is shorter, and what is predicted there, for each of the probabilities `WANTED`;
+    none of a gait that all robots walk with however fast."""
     predictor = Predictor(model, spread_of(model))
 
-    def foretold(faster: float) -> Prediction:
+    def predicted(faster: float) -> Prediction:
         return predictor.of(replace(gait, period_s=gait.period_s * (1.0 - faster)), cycles=_CYCLES)
 
-    least = FELL * foretold(0.0).speed_mm_s  # what falls may still creep
+    least = FELL * predicted(0.0).speed_mm_s  # what falls may still creep
 
     def share(faster: float) -> float:
-        return float(np.mean(foretold(faster).speeds_mm_s >= least))
+        return float(np.mean(predicted(faster).speeds_mm_s >= least))
 
     if share(_MOST_FASTER) > WANTED[-1]:
         return []
@@ -70,7 +70,7 @@ def at_the_cliff(model: Model, gait: Gait) -> list[tuple[float, Prediction]]:
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if share(middle) > wanted else (low, middle)
-        found.append((0.5 * (low + high), foretold(0.5 * (low + high))))
+        found.append((0.5 * (low + high), predicted(0.5 * (low + high))))
     return found
 
 
@@ -100,13 +100,13 @@ def row(name: str, steps: Sequence[Step]) -> str:
 
 
 def summed_up(found: Sequence[Sequence[Step]]) -> dict[str, float]:
-    """Foretold and walked share by `WANTED`, and the Brier score; printed and returned."""
+    """Predicted and walked share by `WANTED`, and the Brier score; printed and returned."""
     with_cliff = [steps for steps in found if steps]
     if not with_cliff:
         return {}
     print(f"\n{f'robots: {len(with_cliff)}':24}" + "".join(f"{f'{100 * wanted:.0f} %':>9}" for wanted in WANTED))
     by_wanted = list(zip(*with_cliff, strict=True))
-    print(f"{'foretold':24}" + "".join(f"{mean(step.probability for step in steps):9.2f}" for steps in by_wanted))
+    print(f"{'predicted':24}" + "".join(f"{mean(step.probability for step in steps):9.2f}" for steps in by_wanted))
     shares = [mean(walks for step in steps for walks in step.walked) for steps in by_wanted]
     print(f"{'walked':24}" + "".join(f"{share:9.2f}" for share in shares))
     every = [(step.probability, walks) for steps in with_cliff for step in steps for walks in step.walked]

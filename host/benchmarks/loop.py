@@ -7,9 +7,9 @@ For each effect of the library at its full size and each seed, a whole campaign 
 `realistic`, as `bifa campaign` runs it: another specimen of the robot, other noise. Five gaits are walked: the paper's
 baseline; with the base model, at the edge of its fit's covariance alone (naive, what people do) and of all that is
 known of it (fair: its remainder is large, and so its margin); with the completed model, robust against 2 % (what
-campaigns did before) and at the edge. Each has the interval and the probability of walking that its model foretold.
+campaigns did before) and at the edge. Each has the interval and the probability of walking that its model predicted.
 Campaigns stay in OUT, so that an interrupted run goes on where it was; FILE has a line for each, with which it goes on
-on another machine. A run "walks" if it advances by at least four fifths of what was foretold, and by 1 mm/s.
+on another machine. A run "walks" if it advances by at least four fifths of what was predicted, and by 1 mm/s.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from benchmarks import records as lines
 from bifa.campaign.loop import campaign, found_gait
 from bifa.campaign.setup import Effort, Setup
 from bifa.campaign.stages import Stage, run_stages
-from bifa.campaign.walks import foretold, measure_walks, planned_cycles, speed_of, walks_of
+from bifa.campaign.walks import measure_walks, planned_cycles, prediction_of, speed_of, walks_of
 from bifa.data import read_dataset
 from bifa.gait import SearchError
 from bifa.gait.prediction import FELL
@@ -47,7 +47,7 @@ _LEVELS = (0.8, 0.9, 0.95)
 
 @dataclass(frozen=True)
 class Walked:
-    """One gait: foretold speed, its intervals by level, the probability of walking; the speeds of its runs."""
+    """One gait: predicted speed, its intervals by level, the probability of walking; the speeds of its runs."""
 
     predicted_mm_s: float
     intervals_mm_s: dict[str, tuple[float, float]]
@@ -131,7 +131,7 @@ def _walk_base(folder: Path, name: str, naive: bool, setup: Setup, effort: Effor
 def _walked(walks: Path, model: Path, name: str) -> Walked:
     dataset = read_dataset(walks)
     trials = walks_of(BASELINE, dataset) if name == "baseline" else dataset.trials
-    prediction = foretold(load_model(model), trials[0], naive=name == "naive")
+    prediction = prediction_of(load_model(model), trials[0], naive=name == "naive")
     return Walked(
         prediction.speed_mm_s,
         {str(level): prediction.interval_mm_s(level) for level in _LEVELS},
@@ -144,7 +144,7 @@ HEADING = f"{'effect, seed':24}{'named':12}" + "".join(f"{title:>26}" for title 
 
 
 def row(one: Gain) -> str:
-    """A line of the table under `HEADING`: of each gait the interval foretold, the speed walked; * where runs fell."""
+    """A line of the table under `HEADING`: of each gait the interval predicted, the speed walked; * where runs fell."""
     alone = "yes" if one.named == (one.effect,) else "and others" if one.effect in one.named else "no"
     cells = [_cell(one.gaits[name]) if name in one.gaits else "none" for name in GAITS]
     return f"{f'{one.effect}, {one.seed}':24}{alone:12}" + "".join(f"{cell:>26}" for cell in cells)
@@ -194,7 +194,7 @@ def _against(gains: Sequence[Gain]) -> dict[str, float]:
 
 
 def reliability(gains: Sequence[Gain], bins: Sequence[float] = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)) -> list[tuple]:
-    """Foretold probability of walking against the share that walked: (mean foretold, share, runs) of each bin."""
+    """Predicted probability of walking against the share that walked: (mean predicted, share, runs) of each bin."""
     pairs = np.array([(g.walks_probability, w) for one in gains for g in one.gaits.values() for w in g.walks], float)
     found = []
     for low, high in pairwise(bins):
@@ -211,11 +211,11 @@ def plot(gains: Sequence[Gain], file: Path) -> None:
     figure = Figure((4.0, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], color="0.7")
-    for foretold_share, share, runs in reliability(gains):
-        axes.plot(foretold_share, share, "o", color="C0")
-        axes.annotate(f"{runs}", (foretold_share, share), xytext=(4, -10), textcoords="offset points")
+    for predicted_share, share, runs in reliability(gains):
+        axes.plot(predicted_share, share, "o", color="C0")
+        axes.annotate(f"{runs}", (predicted_share, share), xytext=(4, -10), textcoords="offset points")
     axes.set(
-        xlabel="probability of walking, foretold", ylabel="share of runs that walk", xlim=(0, 1.03), ylim=(0, 1.03)
+        xlabel="probability of walking, predicted", ylabel="share of runs that walk", xlim=(0, 1.03), ylim=(0, 1.03)
     )
     figure.savefig(file, dpi=120)
 

@@ -23,7 +23,7 @@ class Bin:
     there: int
 
 
-def foretold(records: Sequence[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+def predicted(records: Sequence[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
     """Of every effect of every explanation that was weighed, its probability, and whether it is there."""
     probability, there = [], []
     for record in records:

@@ -21,7 +21,7 @@ from typing import Any
 from benchmarks import records as lines
 from benchmarks.blind_figures import share_text
 from benchmarks.blind_records import losses_beside, place
-from benchmarks.reliability import bins, brier, draw, foretold
+from benchmarks.reliability import bins, brier, draw, predicted
 from benchmarks.rules import RULES, Rule
 
 _KINDS = {"single": "one effect", "none": "none", "outside": "withheld", "pair": "two", "decoys": "20 decoys"}
@@ -69,13 +69,13 @@ def reliable(found: Sequence[dict[str, Any]], picture: Path | None) -> str:
     """How often effects of each probability are there; and the same where what is there is on offer at all."""
     offered = [s for s in found if s["kind"] != "outside"]
     if picture:
-        draw(bins(*foretold(found)), picture)
+        draw(bins(*predicted(found)), picture)
     cases = {"": found, ", without those whose effect is withheld": offered if len(offered) < len(found) else []}
     return "\n\n".join(_reliable(sets, of) for of, sets in cases.items() if sets)
 
 
 def _reliable(found: Sequence[dict[str, Any]], of: str) -> str:
-    probability, there = foretold(found)
+    probability, there = predicted(found)
     if not len(probability):
         return f"no explanation was weighed{of}: there are no probabilities"
     rows = [f"{len(probability)} probabilities{of}; Brier score {brier(probability, there):.4f}", "said    is there"]

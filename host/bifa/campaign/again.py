@@ -18,7 +18,7 @@ import numpy as np
 
 from bifa.campaign.resolve import joined
 from bifa.campaign.stages import StageError
-from bifa.campaign.walks import foretold, predict, predicted_speed, speed_of
+from bifa.campaign.walks import predict, predicted_speed, prediction_of, speed_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.files import write_text
 from bifa.gait.prediction import FELL
@@ -44,7 +44,7 @@ class Round:
     with the standard deviation of its repeats; `error_mm`, RMS of the ends' places against the prediction all along the
     walk, `floor_mm`, what repeats differ by there (None: there is one only). `ended`: of the last round, why it is.
     `at_edge`: whether the gait was sought for what is known of the model, not for a spread of 2 %; `interval_90_mm_s`,
-    `walks_probability`: as foretold; `inside`: whether the measured speed lies in the interval.
+    `walks_probability`: as predicted; `inside`: whether the measured speed lies in the interval.
     """
 
     effects: tuple[str, ...]
@@ -106,7 +106,7 @@ class Trades:
 def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool = False) -> Round:
     """How well `model` predicts the repeats of one gait."""
     trials = walks.trials
-    prediction = foretold(model, trials[0])
+    prediction = prediction_of(model, trials[0])
     residuals = _residuals(model, trials)
     between = residuals - residuals.mean(axis=0)
     several = len(trials) > 1

@@ -13,7 +13,7 @@ import bifa
 from bifa.campaign.again import read_rounds
 from bifa.campaign.page import campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
-from bifa.campaign.walks import foretold, predict, predicted_speed, speed_of, walks_of
+from bifa.campaign.walks import predict, predicted_speed, prediction_of, speed_of, walks_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.data.dataset import labels_of
 from bifa.gait import simulations
@@ -40,7 +40,7 @@ PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3, "edge": 23.3}
 @dataclass(frozen=True)
 class GaitResult:
     """Speeds in mm/s over the settled cycles, of which `settled_cycles` were measured in all; `spread` is that of the
-    repeats. `interval_90_mm_s`, `walks_probability`: what the model foretold with which the gait was found (of the
+    repeats. `interval_90_mm_s`, `walks_probability`: what the model predicted with which the gait was found (of the
     baseline, the completed model). `stand_in`: the baseline, since no gait walks on the model."""
 
     gait: str
@@ -124,7 +124,7 @@ def _edge(inputs: Path) -> Sequence[Trial]:
 def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> GaitResult:
     measured, trial = [speed_of(one) for one in trials], trials[0]
     means = [speed.mean_mm_s for speed in measured]
-    prediction = foretold(base if gait == "base" else completed, trial)
+    prediction = prediction_of(base if gait == "base" else completed, trial)
     return GaitResult(
         gait,
         predicted_speed(base, trial),

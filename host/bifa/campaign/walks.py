@@ -80,7 +80,7 @@ def walks_of(gait: Gait, dataset: Dataset) -> list[Trial]:
     return [trial for trial in dataset.trials if trial.gait == gait.as_dict()]
 
 
-def foretold(model: Model, trial: Trial, naive: bool = False) -> Prediction:
+def prediction_of(model: Model, trial: Trial, naive: bool = False) -> Prediction:
     """The model's prediction of the walk in `trial`, of which only the clock's rate is used; naive: from its
     covariance alone."""
     known = spread_of(model)

@@ -1,4 +1,4 @@
-"""What is foretold of a gait: an interval of the speed, and the probability that the robot walks with it at all."""
+"""What is predicted of a gait: an interval of the speed, and the probability that the robot walks with it at all."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bifa.simulate import gait_rows, speeds
 DRAWS = 256
 FINE_M = 1e-6  # a gait at the edge is judged with the fine step
 CYCLES = 16
-FELL = 0.8  # of the median of those that walk: what is slower does not walk as foretold
+FELL = 0.8  # of the median of those that walk: what is slower does not walk as predicted
 _FASTEST = 0.98  # of the draws are slower than where those that walk are looked for: at a cliff most may fall
 
 
@@ -92,7 +92,7 @@ class Prediction:
 
 
 class Predictor:
-    """Foretells one gait after another of the same robots, drawn once from what is `known` of `model`."""
+    """Predicts one gait after another of the same robots, drawn once from what is `known` of `model`."""
 
     def __init__(self, model: Model, known: Knowledge, *, draws: int = DRAWS, seed: int = 0):
         self._timing, self._noise_share = known.scatter.timing, known.scatter.speed
@@ -131,7 +131,7 @@ class Predictor:
 def predict_speed(
     model: Model, known: Knowledge, gait: Gait, *, draws: int = DRAWS, seed: int = 0, clock_rate: float | None = None
 ) -> Prediction:
-    """What is foretold of one gait: see `Predictor`."""
+    """What is predicted of one gait: see `Predictor`."""
     return Predictor(model, known, draws=draws, seed=seed).of(gait, clock_rate=clock_rate)
 
 

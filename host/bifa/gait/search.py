@@ -168,11 +168,11 @@ def optimize(
         sum(len(found.values) for found in (explored, *refined)),
         runs.count - started,
         explored,
-        _foretold(model, spread, gait, speeds, settings),
+        _predicted(model, spread, gait, speeds, settings),
     )
 
 
-def _foretold(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, settings: Settings) -> Prediction:
+def _predicted(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, settings: Settings) -> Prediction:
     """By the rule of measured walks; where the metric is another (up a pipe, through a tunnel), by the metric's own."""
     plain = isinstance(settings.metric, Metric) and settings.metric.is_plain
     if not plain:

@@ -24,7 +24,7 @@ _STEPS = 20  # a round: cheap beside its derivatives
 _ENOUGH = 1.0  # log-likelihood: after a round that gains less, derivatives from where it began still hold
 # Of the square of what a step should change. Less: it was too short, and its derivative is mostly error. More: it met a
 # jump (a foot that slips a sample sooner).
-_FORETOLD = (0.5, 4.0)
+_PREDICTED = (0.5, 4.0)
 _LONGEST = 1.0  # scales that a derivative may step, where the data leave a direction open
 
 
@@ -53,7 +53,7 @@ def settle(fitted: Fit) -> Fit:
         options: dict[str, Any] = {"free": solution.free, "sensitivities": taken, "relative": 0.0}
         here = solve(problem, solution.point, max_iterations=0, **options)
         ahead = solve(problem, solution.point, max_iterations=_STEPS, **options)
-        trusted = _as_foretold(along, solution.normal, here.normal)
+        trusted = _as_predicted(along, solution.normal, here.normal)
         converged = trusted and here.cost - ahead.cost < _ENOUGH
         # The steps' own corrections would bring the simulation's error back in.
         fitted = replace(fitted, solution=replace(here, point=ahead.point, cost=ahead.cost, converged=converged))
@@ -93,11 +93,11 @@ def _room(problem: Problem, solution: Solution, directions: np.ndarray) -> np.nd
     return np.where(ahead >= back, ahead, -back)
 
 
-def _as_foretold(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
+def _as_predicted(along: _Directions, before: np.ndarray, after: np.ndarray) -> bool:
     """Whether steps along the directions changed the residuals about as much as they were meant to."""
     meant, seen = (np.einsum("pk,pq,qk->k", along.structure, normal, along.structure) for normal in (before, after))
     whole = meant > 0.5  # others stopped short of a standard deviation, because the data leave them open
-    return bool(((seen > _FORETOLD[0] * meant) & (seen < _FORETOLD[1] * meant))[whole].all())
+    return bool(((seen > _PREDICTED[0] * meant) & (seen < _PREDICTED[1] * meant))[whole].all())
 
 
 def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _Directions) -> list[Sensitivity]:

@@ -30,7 +30,7 @@ _ALONE_SDS = 4.0  # but where nothing else is free, or it would stand in for wha
 _REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
 _TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
-_FORETOLD = 0.5  # of what it promised: a small step that kept so much of it ends the search with old derivatives too
+_PREDICTED = 0.5  # of what it promised: a small step that kept so much of it ends the search with old derivatives too
 _OLDEST = 8  # steps that derivatives serve at most
 
 
@@ -101,7 +101,7 @@ def solve(
             if keep or (taken.ratio > _TRUSTED and age < _OLDEST and not enough):
                 sensitivities, age = _corrected(sensitivities, taken.step, scale, *change, len(free)), age + 1
                 continue
-            if enough and (age == 0 or taken.ratio > _FORETOLD):
+            if enough and (age == 0 or taken.ratio > _PREDICTED):
                 converged = True
                 break
         elif age == 0:

@@ -24,7 +24,7 @@ def test_gaits_are_found_with_which_nearly_all_to_few_of_the_robots_walk():
     assert cliff.at_the_cliff(nominal(), BASELINE) == [], "which has none"
 
 
-def test_what_was_foretold_is_compared_with_what_walked(capsys):
+def test_what_was_predicted_is_compared_with_what_walked(capsys):
     speeds = [(20.5, 20.5)] * 3 + [(20.5, 0.5), (22.0, 0.5)]
     steps = [step(probability, *runs) for probability, runs in zip(cliff.WANTED, speeds, strict=True)]
     figures = cliff.summed_up([steps, []])

@@ -7,7 +7,7 @@ import pytest
 
 import lacuna
 from benchmarks import blind_records, records, replay
-from benchmarks.reliability import bins, brier, foretold
+from benchmarks.reliability import bins, brier, predicted
 from benchmarks.rules import RULES, within_confidence
 from benchmarks.search_record import searched
 from benchmarks.simulations import SimulationCount
@@ -109,7 +109,7 @@ def test_probabilities_that_hold_lie_on_the_line():
 
 def test_a_probability_is_that_of_every_explanation_that_holds_the_effect():
     weighed = search(BASE, weights=[(("leak",), 0.6), (("leak", "lag"), 0.3), ((), 0.1)]) | {"truth": ["leak"]}
-    probability, there = foretold([weighed])
+    probability, there = predicted([weighed])
     assert probability == pytest.approx([0.9, 0.3])
     assert there.tolist() == [True, False]
 

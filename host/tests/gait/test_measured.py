@@ -47,7 +47,7 @@ def test_what_never_settles_says_so_and_has_the_speed_of_its_second_half():
 
 
 def test_a_robot_that_stands_still_at_first_walks_all_the_same():
-    """The demo's seed 8: after two such cycles it was said to stand still, at 0.7 mm/s where 20.7 were foretold."""
+    """The demo's seed 8: after two such cycles it was said to stand still, at 0.7 mm/s where 20.7 were predicted."""
     speed = measured_speed(*walk([19.0, 2.2, 97.0, *[58.5] * 5], 2.83), 2.83)
     assert (speed.walking, speed.begins) == (Walking.SETTLED, 3)
     assert speed.mean_mm_s == pytest.approx(20.67, abs=0.01)

@@ -70,7 +70,7 @@ def test_without_a_fit_two_per_cent_is_called_a_guess():
     assert not spread_of(known()).is_guess
 
 
-def test_the_baseline_is_foretold_with_an_interval():
+def test_the_baseline_is_predicted_with_an_interval():
     model = known(Scatter(friction=0.01, speed=0.01))
     prediction = predict_speed(model, spread_of(model), BASELINE, draws=128)
     low, high = prediction.interval_90_mm_s
@@ -90,17 +90,17 @@ def test_cycles_of_a_slow_clock_are_longer():
     assert slow.speed_mm_s == pytest.approx(fast.speed_mm_s, rel=5e-3)
 
 
-def test_what_is_foretold_is_what_the_uno_does_which_vents_between_the_supplies():
+def test_what_is_predicted_is_what_the_uno_does_which_vents_between_the_supplies():
     """At the edge 4 ms decide: with this gait the robot walks because of the vent."""
     edge = library.load("fast").gait
     edge = replace(edge, period_s=0.999 * edge.period_s)
     as_the_uno, without = known(Scatter(dead_time_s=0.004)), known(Scatter())
-    foretold, other = (predict_speed(m, spread_of(m), edge, draws=4).speed_mm_s for m in (as_the_uno, without))
+    predicted, other = (predict_speed(m, spread_of(m), edge, draws=4).speed_mm_s for m in (as_the_uno, without))
     end_s = 16 * edge.period_s
     commands = vented_between(of_gait(edge, end_s), 0.004)
     way_mm = walk(nominal(), commands=commands, time_s=np.linspace(0.0, end_s, 17))["displacement_head_mm"]
-    assert foretold == pytest.approx((way_mm[-1] - way_mm[-2]) / edge.period_s, abs=0.1)
-    assert foretold > 20.0
+    assert predicted == pytest.approx((way_mm[-1] - way_mm[-2]) / edge.period_s, abs=0.1)
+    assert predicted > 20.0
     assert other < 2.0
 
 

@@ -81,8 +81,6 @@ def test_files_know_the_ranges_of_the_uno():
 
 def test_docs_have_the_present_tables():
     page = (ROOT / "docs/protocol.md").read_text()
-    for parameter in table.PARAMETERS:
-        assert f"| `{parameter.name}` | {range_text(parameter)} |" in page
     for message in [*table.COMMANDS.values(), *table.REPORTS.values()]:
         assert f"| 0x{message.number:02X} | `{message.name}` |" in page
 

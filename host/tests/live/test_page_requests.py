@@ -201,9 +201,9 @@ def test_every_page_is_told_the_same(live, page):
     shown = other.until(lambda state: state["prediction"]["gait"]["period_s"] == 4.0)
     assert shown["draft"]["gait"]["period_s"] == 4.0
     assert shown["draft"]["by"] == seen[0]["you"]["number"]
-    told = other.until(lambda state: "foretold" in state["prediction"])["prediction"]
-    assert float(told["foretold"].split()[0]) == pytest.approx(told["speed_mm_s"], rel=0.1)
-    assert "if it walks, with probability" in told["foretold"]
+    told = other.until(lambda state: "predicted" in state["prediction"])["prediction"]
+    assert float(told["predicted"].split()[0]) == pytest.approx(told["speed_mm_s"], rel=0.1)
+    assert "if it walks, with probability" in told["predicted"]
 
 
 def nominal_gait() -> dict[str, float]:

@@ -103,7 +103,7 @@ def test_a_stop_is_at_the_port_within_a_tenth_of_a_second(bifa, flood, figure):
     assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
 
 
-def test_a_stop_does_not_wait_for_what_is_foretold_of_the_sliders(bifa, figure):
+def test_a_stop_does_not_wait_for_what_is_predicted_of_the_sliders(bifa, figure):
     owner = WebSocket(int(bifa.origin.rpartition(":")[2]), bifa.token)
     assert bifa.until("running") == "running"
     drafts = itertools.count()
@@ -113,11 +113,11 @@ def test_a_stop_does_not_wait_for_what_is_foretold_of_the_sliders(bifa, figure):
 
     try:
         slide()
-        owner.until(lambda state: "foretold" in (state["prediction"] or {}))  # imported, drawn and compiled
+        owner.until(lambda state: "predicted" in (state["prediction"] or {}))  # imported, drawn and compiled
         taken = _stops(bifa, owner, slide)
     finally:
         owner.close()
-    figure(f"stop at the port while gaits are foretold: worst of {len(taken)} {1e3 * max(taken):.0f} ms")
+    figure(f"stop at the port while gaits are predicted: worst of {len(taken)} {1e3 * max(taken):.0f} ms")
     assert max(taken) < WITHIN_S
 
 

@@ -34,9 +34,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bifa.errors import BifaError
 from bifa.link import Uno
-from bifa.live.web.foretelling import Foretelling, step_back
 from bifa.live.web.gate import ACCEPTED_AT_ONCE, LARGEST_HEADERS, LARGEST_MESSAGE, Gate
 from bifa.live.web.pilot import MOVING, BusyError, NobodyThereError, Pilot, wall_clock
+from bifa.live.web.predicting import GaitPrediction, step_back
 from bifa.live.web.state import LiveState
 from bifa.ranges import RANGES
 from bifa.robot import Model
@@ -92,14 +92,14 @@ class LivePage:
 
     def __init__(self, pilot: Pilot, page: str, model: Model) -> None:
         """page: the HTML document; model: what predicts the speeds."""
-        self.pilot, self._page, self._foretelling = pilot, page.encode(), Foretelling(model)
+        self.pilot, self._page, self._model = pilot, page.encode(), GaitPrediction(model)
         self.token = secrets.token_urlsafe(16)
         self.gate = Gate()
         self.pages: set[OpenPage] = set()
         self._numbers = itertools.count(1)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
-        self._predictor.submit(lambda: self._foretelling.predictor)  # drawn before anybody asks
+        self._predictor.submit(lambda: self._model.predictor)  # drawn before anybody asks
         self._prediction: asyncio.Task[None] | None = None
         self.state = LiveState(
             robot="connecting",
@@ -168,7 +168,7 @@ class LivePage:
     async def _predict(self) -> None:
         asked = None
         while asked != (asked := self.state.content["draft"]["gait"]):
-            for look in (self._foretelling.at_once, self._foretelling.in_full):
+            for look in (self._model.at_once, self._model.in_full):
                 loop = asyncio.get_running_loop()
                 found = await loop.run_in_executor(self._predictor, look, Gait(**asked))
                 self._change({"prediction": {**found, "gait": asked}})

@@ -120,7 +120,7 @@
     const found = live.prediction;
     const isAsked = live.draft && (!found || sliders.some(({ name }) => found.gait[name] !== live.draft.gait[name]));
     if (isAsked) tell(predicted, "Predicting the speed of this gait…");
-    else if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.foretold || `${found.speed_mm_s.toFixed(2)} mm/s`}; ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
+    else if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.predicted || `${found.speed_mm_s.toFixed(2)} mm/s`}; ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
     const there = Object.keys(live.presets || {});
     if (there.join() !== [...presets.options].map((option) => option.value).join()) presets.replaceChildren(...there.map((name) => new Option(name)));
     return differs;

@@ -25,7 +25,7 @@ def step_back() -> None:
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
 
 
-class Foretelling:
+class GaitPrediction:
     """Of a model, drawn once. For a thread of its own: it computes without holding up the others."""
 
     def __init__(self, model: Model):
@@ -42,9 +42,9 @@ class Foretelling:
         return {"speed_mm_s": round(float(progress.speed_mm_s), 2), "slip_mm": slip_mm}
 
     def _in_full(self, gait: Gait) -> dict[str, Any]:
-        """The same with what is foretold by all that is known of the robot, in words."""
+        """The same with what is predicted by all that is known of the robot, in words."""
         found = self.at_once(gait)
-        return found if "error" in found else found | {"foretold": self.predictor.of(gait, workers=1).text}
+        return found if "error" in found else found | {"predicted": self.predictor.of(gait, workers=1).text}
 
     @cached_property
     def predictor(self) -> Predictor:
