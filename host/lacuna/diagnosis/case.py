@@ -223,8 +223,8 @@ class Case:
         """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
         would have left so if a run's factors had to be foreseen, which a few runs of one pair may be by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
-        predictive = (tuple([predictive(fit) for fit in fits] for fits in pair) for pair in both)
-        ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in predictive)
+        unseen = (tuple([predictive(fit) for fit in fits] for fits in pair) for pair in both)
+        ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in unseen)
         return max(known) > self.policy.relevance or min(ahead) > self.policy.relevance
 
     @_once
