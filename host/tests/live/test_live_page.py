@@ -122,7 +122,7 @@ def test_a_server_that_ends_while_the_robot_is_gone_leaves_no_page_that_waits_fo
     expect(page.locator("#state")).to_have_text("the robot is gone")
     bifa.process.kill()
     expect(page.locator("#state")).to_have_text("not connected")
-    expect(page.locator("#alarm")).to_contain_text("bifa monitor does not answer: what is shown is old.")
+    expect(page.locator("#alarm")).to_contain_text("bifa monitor does not answer; the data shown are old.")
     expect(page.locator("#alarm")).to_contain_text("is gone; plug the Uno in again")
 
 
@@ -161,7 +161,7 @@ def test_who_has_no_token_may_look_and_stop_and_nothing_else(monitor, tab):
     bifa = monitor("--run")
     bifa.until("running")
     page = tab(bifa.origin)
-    page.get_by_text("Only to look at, and to stop").wait_for()
+    page.get_by_text("View and stop only").wait_for()
     for name in ("Walk", "Apply", "Load", "Save as preset", "Release the stop"):
         assert page.get_by_role("button", name=name, exact=True).is_disabled()
     page.close()
@@ -199,11 +199,11 @@ def test_a_page_of_an_earlier_server_says_so_and_still_stops(monitor, tab):
     page = tab(earlier.url)
     earlier.process.send_signal(signal.SIGINT)
     earlier.process.wait(15)
-    expect(page.locator("#alarm")).to_contain_text("what is shown is old")
+    expect(page.locator("#alarm")).to_contain_text("the data shown are old")
     assert page.get_by_role("button", name="Walk").is_disabled()
     bifa = monitor("--run", "--web-port", port)
     assert bifa.until("running") == "running"
-    expect(page.locator("#alarm")).to_contain_text("This page is of an earlier bifa monitor")
+    expect(page.locator("#alarm")).to_contain_text("This page belongs to an earlier bifa monitor")
     assert page.get_by_role("button", name="Walk").is_disabled()
     assert float(page.locator("#alarm").evaluate("box => parseFloat(getComputedStyle(box).fontSize)")) > 20
     page.get_by_role("button", name="Stop", exact=True).click()

@@ -9,8 +9,8 @@
   const sliders = [...document.querySelectorAll("input[type=range]")];
   const chambers = [...document.querySelectorAll("[data-chamber]")].map((row) => row.dataset.chamber);
   const SHOWN_S = 20, LEVEL = { vacuum: 0, off: 0.5, positive: 1, both: 1 };
-  const OLD = "bifa monitor does not answer: what is shown is old.";
-  const STALE = "This page is of an earlier bifa monitor: open the address that the terminal prints now. Stop works here all the same.";
+  const OLD = "bifa monitor does not answer; the data shown are old.";
+  const STALE = "This page belongs to an earlier bifa monitor: open the address that the terminal shows now. Stop still works here.";
   // who listens to a page is told of changes, not ten times a second of what is as it was
   const tell = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 
@@ -108,7 +108,7 @@
     if (stopped.why) return `Stopped at ${stopped.at}: ${stopped.why}.`;
     const by = stopped.by === `page ${you.number}` ? "this page" : stopped.by;
     if (stopped.is_confirmed) return `Stopped by ${by} at ${stopped.at}; all valves are off.`;
-    return stopped.is_confirmed === false ? `THE ROBOT MAY STILL BE MOVING: the stop by ${by} at ${stopped.at} is not confirmed. Press the emergency stop.` : `Being stopped by ${by}.`;
+    return stopped.is_confirmed === false ? `THE ROBOT MAY STILL BE MOVING: the stop by ${by} at ${stopped.at} is not confirmed. Press the emergency stop.` : `The robot is being stopped by ${by}.`;
   };
 
   const showGait = () => {
@@ -116,11 +116,11 @@
     for (const output of document.querySelectorAll("[data-robot]")) if (robot) tell(output, String(rounded(robot[output.dataset.robot])));
     showDraft();
     const differs = robot && live.draft && sliders.some(({ name }) => Math.abs(live.draft.gait[name] - robot[name]) > 6e-4);
-    tell(unsent, live.is_pending ? "The robot takes its new gait at its next cycle." : differs ? "Not sent: the robot has another gait than the sliders show." : robot ? "The sliders show the robot's gait." : "");
+    tell(unsent, live.is_pending ? "The robot adopts its new gait at its next cycle." : differs ? "Not sent yet: the robot still has another gait." : robot ? "The sliders show the robot's gait." : "");
     const found = live.prediction;
     const isAsked = live.draft && (!found || sliders.some(({ name }) => found.gait[name] !== live.draft.gait[name]));
     if (isAsked) tell(predicted, "Predicting the speed of this gait…");
-    else if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.predicted || `${found.speed_mm_s.toFixed(2)} mm/s`}; ${found.slip_mm.toFixed(2)} mm of slip a cycle.`);
+    else if (found) tell(predicted, found.error ? `No prediction: ${found.error}` : `The model predicts ${found.predicted || `${found.speed_mm_s.toFixed(2)} mm/s`}; ${found.slip_mm.toFixed(2)} mm of slip per cycle.`);
     const there = Object.keys(live.presets || {});
     if (there.join() !== [...presets.options].map((option) => option.value).join()) presets.replaceChildren(...there.map((name) => new Option(name)));
     return differs;
@@ -166,7 +166,7 @@
       // a slider to 60 s would leave no room for the gaits that there are; the number beside it goes to its end
       if (slider.name === "period_s") slider.max = 12;
     }
-    if (!token) say("Only to look at, and to stop: open the page by the address that bifa monitor printed, to the end.");
+    if (!token) say("View and stop only. For control, open the page by the full address that bifa monitor printed.");
   };
 
   // A panel for pressures, valves and, where it is seen, the head's position; made when there is something to draw.
