@@ -57,7 +57,7 @@ frame has the number of steps. Anything else is refused with an error that names
 
 {_presets(table)}
 
-Up to eight of your own are kept in EEPROM besides. `save` without a name writes the one that every start loads;
+Up to eight of your own are kept in EEPROM as well. `save` without a name writes the one that every start loads;
 until there is one, a start loads `{table.presets[0].name}`.
 
 ## Commands

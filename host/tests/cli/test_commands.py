@@ -15,6 +15,9 @@ from bifa.cli import app
 from bifa.cli.optimize import pictures_beside
 from bifa.files import TargetError
 
+GAIT = (
+    "period_s = 2.72\npsi12_deg = 204.5\npsi13_deg = 331.7\nduty_body = 0.6535\nduty_head = 0.439\nduty_tail = 0.439\n"
+)
 COMMANDS = sorted(typer.main.get_command(app).commands)
 
 
@@ -222,3 +225,43 @@ def test_the_gaits_are_listed_whole_on_any_terminal(width):
     assert "…" not in said
     assert max(map(len, said.partition("files:")[0].splitlines())) <= width
     assert all(figure in said for figure in ("speed", "period", "23.5", "208, 334", "0.65, 0.43,"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["monitor", "--model", "{here}", "--port", "nowhere"], "require --web"),
+        (["monitor", "--web-port", "0", "--port", "nowhere"], "require --web"),
+        (["monitor", "--web", "--model", "{missing}", "--port", "nowhere"], "does not exist"),
+        (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds requires --run"),
+        (["compare", "{here}"], "two campaigns or more"),
+    ],
+    ids=" ".join,
+)
+def test_options_that_do_nothing_are_refused_before_anything_else(tmp_path, arguments, words):
+    (tmp_path / "here").write_text(GAIT)
+    places = {"here": tmp_path / "here", "missing": tmp_path / "missing"}
+    result = CliRunner().invoke(app, [argument.format(**places) for argument in arguments], env={"COLUMNS": "300"})
+    assert result.exit_code == 2
+    assert words in result.output
+
+
+def test_compare_looks_first_where_it_shall_write(tmp_path):
+    result = CliRunner().invoke(app, ["compare", "one", "two", "--report", str(tmp_path / "missing" / "x.html")])
+    assert isinstance(result.exception, TargetError)
+
+
+@pytest.mark.uno
+def test_upload_and_console_on_the_virtual_robot(tmp_path):
+    path = tmp_path / "gait.toml"
+    path.write_text(GAIT)
+    runner = CliRunner()
+    done = runner.invoke(app, ["upload", str(path), "--port", "virtual", "--save", "fast", "--run", "--seconds", "1"])
+    assert done.exit_code == 0, done.output
+    assert "read back equal, saved as fast walking for 1 s valves off" in " ".join(done.output.split())
+    done = runner.invoke(app, ["console", "--port", "virtual"], input="show period_s\nset period_s 4\nshow period_s\n")
+    period = "s (0.5 to 60 s, default 5.7 s)"
+    assert done.output.splitlines() == [
+        f"[period_s 5.7 {period}", "ok", "[period_s 5.700 -> 4.000 s", "ok", f"[period_s 4 {period} * power-up 5.7 s",
+        "ok"]  # fmt: skip
+    assert runner.invoke(app, ["console", "--port", "virtual"], input="fly\n").exit_code == 1

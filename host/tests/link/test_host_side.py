@@ -1,30 +1,20 @@
-"""The host's own part: units, gait files, versions, ports, the commands."""
+"""The host's own part of the link: units, versions, samples, clocks."""
 
 import itertools
 import random
-import re
 from decimal import Decimal
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from bifa.cli import app
-from bifa.files import TargetError
-from bifa.link import MismatchError, NoAnswerError, PortGoneError, Uno, UnoParameterError
+from bifa.link import MismatchError, NoAnswerError, Uno, UnoParameterError
 from bifa.link.clock_relation import ClockRelation
 from bifa.link.frames import Report
 from bifa.link.table import PARAMETERS, TABLE_HASH
 from bifa.link.terminal import type_line
 from bifa.link.units import from_wire, to_wire
-from bifa.rig import RigError, SerialRig, open_rig
 from harness.board import Board
-from harness.pty_uno import PtyUno
-
-GAIT = (
-    "period_s = 2.72\npsi12_deg = 204.5\npsi13_deg = 331.7\nduty_body = 0.6535\nduty_head = 0.439\nduty_tail = 0.439\n"
-)
 
 
 @given(st.sampled_from(PARAMETERS), st.data())
@@ -185,83 +175,3 @@ def test_exchanges_that_contradict_one_another_widen_the_bound(wobbles):
     for i, wobble_s in enumerate(wobbles):
         host = relation.to_host(float(i))
         assert abs(host.time_s - (100.0 + i + wobble_s)) <= host.bound_s + 2e-6
-
-
-def test_wrong_ports_are_named():
-    with pytest.raises(RigError, match="virtuall"):
-        open_rig("virtuall")
-    with pytest.raises(PortGoneError, match="/dev/does-not-exist"):
-        open_rig("/dev/does-not-exist")
-
-
-def test_a_serial_port_exclusive_and_unplugged():
-    plugged = PtyUno()
-    with SerialRig(plugged.device) as rig:
-        uno = Uno(rig.transport, rig.clock)
-        uno.connect()
-        uno.set("period_s", 3.0)
-        assert uno.get("period_s") == 3.0
-        with pytest.raises(PortGoneError, match="is in use by"):
-            SerialRig(plugged.device)
-        uno.stream(True)
-        began_s = rig.clock.now()
-        samples = uno.samples(1.5)
-        assert rig.clock.now() - began_s >= 1.5
-        assert len(samples) > 20, "all that came in that time, and not only the first"
-        plugged.unplug()
-        with pytest.raises(PortGoneError, match="gone"):
-            uno.set("period_s", 4.0)
-
-
-@pytest.mark.uno
-def test_upload_and_console_on_the_virtual_robot(tmp_path):
-    path = tmp_path / "gait.toml"
-    path.write_text(GAIT)
-    runner = CliRunner()
-    done = runner.invoke(app, ["upload", str(path), "--port", "virtual", "--save", "fast", "--run", "--seconds", "1"])
-    assert done.exit_code == 0, done.output
-    assert "read back equal, saved as fast walking for 1 s valves off" in " ".join(done.output.split())
-    done = runner.invoke(app, ["console", "--port", "virtual"], input="show period_s\nset period_s 4\nshow period_s\n")
-    period = "s (0.5 to 60 s, default 5.7 s)"
-    assert done.output.splitlines() == [
-        f"[period_s 5.7 {period}", "ok", "[period_s 5.700 -> 4.000 s", "ok", f"[period_s 4 {period} * power-up 5.7 s",
-        "ok"]  # fmt: skip
-    assert runner.invoke(app, ["console", "--port", "virtual"], input="fly\n").exit_code == 1
-
-
-@pytest.mark.uno
-def test_a_recording_is_a_data_set(tmp_path):
-    from bifa.data import read_dataset
-
-    command = ["record", "--out", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2", "--repeats", "2"]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0, done.output
-    trials = read_dataset(tmp_path / "walks").trials
-    assert [trial.experiment for trial in trials] == ["locomotion"] * 2
-    told = [int(samples) for samples in re.findall(r"walk \d: samples (\d+)  lost 0", done.output)]
-    # each walk's own, and some before and after it
-    assert all(len(trial.time_s) <= count < 1.5 * len(trial.time_s) for trial, count in zip(trials, told, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["monitor", "--model", "{here}", "--port", "nowhere"], "require --web"),
-        (["monitor", "--web-port", "0", "--port", "nowhere"], "require --web"),
-        (["monitor", "--web", "--model", "{missing}", "--port", "nowhere"], "does not exist"),
-        (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds requires --run"),
-        (["compare", "{here}"], "two campaigns or more"),
-    ],
-    ids=" ".join,
-)
-def test_options_that_do_nothing_are_refused_before_anything_else(tmp_path, arguments, words):
-    (tmp_path / "here").write_text(GAIT)
-    places = {"here": tmp_path / "here", "missing": tmp_path / "missing"}
-    result = CliRunner().invoke(app, [argument.format(**places) for argument in arguments], env={"COLUMNS": "300"})
-    assert result.exit_code == 2
-    assert words in result.output
-
-
-def test_compare_looks_first_where_it_shall_write(tmp_path):
-    result = CliRunner().invoke(app, ["compare", "one", "two", "--report", str(tmp_path / "missing" / "x.html")])
-    assert isinstance(result.exception, TargetError)

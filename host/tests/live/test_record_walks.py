@@ -3,7 +3,9 @@
 import re
 
 import pytest
+from typer.testing import CliRunner
 
+from bifa.cli import app
 from bifa.data import read_dataset
 from bifa.live.record import record_walks
 from bifa.lock import LockedError, locked
@@ -40,3 +42,14 @@ def test_a_recording_says_the_speed_of_the_settled_cycles(tmp_path, capsys):
         record_walks(rig, "virtual", tmp_path / "walks", None, 5, 1, Console())
     said = capsys.readouterr().out
     assert re.search(r"walk 1: 10\.8\d mm/s over [3-5] settled cycles", said)
+
+
+def test_a_recording_is_a_data_set(tmp_path):
+    command = ["record", "--out", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2", "--repeats", "2"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    trials = read_dataset(tmp_path / "walks").trials
+    assert [trial.experiment for trial in trials] == ["locomotion"] * 2
+    told = [int(samples) for samples in re.findall(r"walk \d: samples (\d+)  lost 0", done.output)]
+    # each walk's own, and some before and after it
+    assert all(len(trial.time_s) <= count < 1.5 * len(trial.time_s) for trial, count in zip(trials, told, strict=True))

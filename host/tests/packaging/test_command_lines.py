@@ -44,7 +44,7 @@ RUN_BY = {
     "record": "live/test_monitor_and_record.py",
     "rig": "virtual_robot/test_rig_command.py",
     "simulate": "simulate/test_simulate_command.py",
-    "upload": "link/test_host_side.py",
+    "upload": "cli/test_commands.py",
 }
 QUICK = (  # run here, as they stand
     "docs/gaits.md: bifa gaits",

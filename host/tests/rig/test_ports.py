@@ -1,0 +1,33 @@
+"""What `--port` names: wrong ones are said, a serial port is opened exclusively."""
+
+import pytest
+
+from bifa.link import PortGoneError, Uno
+from bifa.rig import RigError, SerialRig, open_rig
+from harness.pty_uno import PtyUno
+
+
+def test_wrong_ports_are_named():
+    with pytest.raises(RigError, match="virtuall"):
+        open_rig("virtuall")
+    with pytest.raises(PortGoneError, match="/dev/does-not-exist"):
+        open_rig("/dev/does-not-exist")
+
+
+def test_a_serial_port_exclusive_and_unplugged():
+    plugged = PtyUno()
+    with SerialRig(plugged.device) as rig:
+        uno = Uno(rig.transport, rig.clock)
+        uno.connect()
+        uno.set("period_s", 3.0)
+        assert uno.get("period_s") == 3.0
+        with pytest.raises(PortGoneError, match="is in use by"):
+            SerialRig(plugged.device)
+        uno.stream(True)
+        began_s = rig.clock.now()
+        samples = uno.samples(1.5)
+        assert rig.clock.now() - began_s >= 1.5
+        assert len(samples) > 20, "all that came in that time, and not only the first"
+        plugged.unplug()
+        with pytest.raises(PortGoneError, match="gone"):
+            uno.set("period_s", 4.0)
