@@ -38,7 +38,7 @@ class Tls:
     key: Path | None = None
 
     def security(self) -> Any:
-        """As distributed wants it; None leaves it to its configuration. Raises ClusterError."""
+        """The security settings for distributed; None leaves them to its configuration. Raises ClusterError."""
         files = {"--dask-ca": self.ca, "--dask-cert": self.cert, "--dask-key": self.key}
         given = {name: file for name, file in files.items() if file is not None}
         if not given:

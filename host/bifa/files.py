@@ -83,7 +83,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
-    """As read_bytes(), from UTF-8; also UnicodeDecodeError."""
+    """All of a regular file as UTF-8 text; raises as read_bytes(), and UnicodeDecodeError."""
     return read_bytes(path).decode("utf-8").replace("\r\n", "\n")
 
 

@@ -43,7 +43,7 @@ class Robot:
         return Trial(f"{self.model.name}_simulated.csv", "locomotion", columns, gait=chosen.as_dict())
 
     def speed_mm_s(self, gait: Gait | str | Path = BASELINE, cycles: int = 10) -> float:
-        """Of the last cycle."""
+        """Speed of the last cycle."""
         from bifa.simulate import gait_rows, speeds
 
         return float(speeds(self.model, gait_rows([_gait(gait)]), cycles, 1e-6).speed_mm_s[0])

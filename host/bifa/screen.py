@@ -68,5 +68,5 @@ def words(template: str, **options: Any) -> "TextColumn":
 
 
 def warning(text: str) -> Text:
-    """As every command shows one."""
+    """A warning, as every command shows one."""
     return Text.assemble(("warning", "yellow"), " ", text)

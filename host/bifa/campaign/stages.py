@@ -258,7 +258,8 @@ def _other_inputs(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> list[st
 
 
 def _read_asked(path: Path) -> dict[str, Any]:
-    """Empty where an earlier version of bifa, or an interruption at the very beginning, left none."""
+    """What the scratch was begun with; empty where an earlier version of bifa, or an interruption at the very
+    beginning, left nothing."""
     return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
 

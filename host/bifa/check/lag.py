@@ -94,7 +94,7 @@ def misfit_of_last(trials: Sequence[Trial]) -> str | None:
 
 
 def _in_words(late_s: float) -> str:
-    """As "8.8 ms early"."""
+    """In words, such as "8.8 ms early"."""
     return f"{abs(1e3 * late_s):.1f} ms {'late' if late_s > 0.0 else 'early'}"
 
 

@@ -34,7 +34,7 @@ def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
 
 
 def seen_gait(trial: Trial, commands: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Those parameters of a gait that the columns `command_body` ... tell, by name, phases in 0 to 360 degrees."""
+    """The parameters of a gait that the columns `command_body` ... show, by name, phases in 0 to 360 degrees."""
     time_s = trial.time_s * trial.extra.get("clock_rate", 1.0)  # by the Uno's clock, as the gait is
     falls, rises = {}, {}
     for chamber in CHAMBERS:
@@ -100,7 +100,8 @@ def _vacuum_s(falls_s: np.ndarray, rises_s: np.ndarray) -> np.ndarray:
 
 
 def _ahead(falls_s: np.ndarray, body_s: np.ndarray, period_s: float) -> np.ndarray:
-    """By how many turns each fall, where a phase begins, is ahead of the body's next; near to one another."""
+    """How many turns each fall, where a phase begins, is ahead of the body's next one; wrapped to be near one
+    another."""
     if not len(falls_s) or not len(body_s):
         return np.zeros(0)
     next_one = np.minimum(np.searchsorted(body_s, falls_s), len(body_s) - 1)

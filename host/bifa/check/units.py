@@ -30,7 +30,7 @@ _LONGEST_MM = 200.0  # that a body is at its longest more than at its shortest; 
 
 @dataclass(frozen=True)
 class _Kind:
-    """Of an actuator, far outside what any of its kind has: range of a static loading's displacement and force."""
+    """Of an actuator: ranges of displacement and force in a static loading, far wider than any of its kind has."""
 
     stroke_mm: tuple[float, float]
     force_N: tuple[float, float]
@@ -100,7 +100,7 @@ def _length_mm(trial: Trial) -> np.ndarray:
 
 
 def _speed(trial: Trial) -> Iterator[Finding]:
-    """Where the declared rate and the measured one differ, or the actuator cannot have gone so far."""
+    """A finding where the declared rate and the measured one differ, or the actuator cannot have gone so far."""
     speed_mm_s = _speed_mm_s(trial)
     low, high = _KINDS[trial.actuator].stroke_mm if trial.actuator else (0.0, np.inf)
     moved_mm = _stroke_mm(trial)
@@ -126,7 +126,7 @@ def _speed_mm_s(trial: Trial) -> float | None:
 
 
 def _force(trial: Trial) -> Iterator[Finding]:
-    """Where the spring's force, area times pressure, or what an anchor holds is out of all proportion."""
+    """A finding where the spring's force, area times pressure, or what an anchor holds is out of all proportion."""
     force_N = trial.columns["force_N"]
     for seen, (low, high), what in _forces(trial, force_N):
         if not low <= seen <= high:
@@ -152,7 +152,7 @@ def _forces(trial: Trial, force_N: np.ndarray) -> Iterator[tuple[float, tuple[fl
 
 
 def _or_else(seen: float, expected: float, units: Mapping[str, float], within: float = 0.5) -> str:
-    """In which unit it would be right, if in one; and what to do."""
+    """The unit in which it would be right, if there is one; and what to do."""
     for unit, size in units.items():
         if abs(np.log(seen * size / expected)) < within if seen > 0.0 else False:
             return f": is it in {unit}? Declare the unit of the export, or multiply by {size:g}"

@@ -182,7 +182,7 @@ def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
 
 
 def _sync(seen: "Look") -> dict[str, Any]:
-    """Where the strobe's edges stand."""
+    """Where the strobe's edges are recorded."""
     answer = typer.prompt(
         "Where is the strobe (D10)? file: edges in a file beside it; frames: every row is a frame that it triggered; "
         "or the column in which it was sampled",

@@ -159,7 +159,7 @@ def _scale(export: Export, name: str) -> float:
 
 
 def _dates(sheet: Sheet, export: Export, source: str) -> np.ndarray:
-    """Of one column, or of several that make one date together ("Date + Time")."""
+    """Dates from one column, or from several that make one date together ("Date + Time")."""
     return _seconds(sheet, export, _date_cells(sheet, source), source)
 
 
@@ -177,7 +177,7 @@ def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.
 
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
-    """Where the file has rows of units, they and the declaration agree."""
+    """Refuse a declared unit that a file's row of units contradicts."""
     told = told_unit(sheet, place)
     if told and unit and unit in _sizes(name) and told != unit:
         raise sheet.error(

@@ -77,7 +77,8 @@ def _exports(top: Fields, source: Source) -> dict[str, Export]:
 
 
 def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> dict[str, np.ndarray]:
-    """Of a file in the data set's own form, or as the instrument of its experiment is declared to write it."""
+    """The columns of a file in the data set's own form, or in the form declared for the instrument of its
+    experiment."""
     layout = EXPERIMENTS[head["experiment"]]
     export = exports.get(ROLES[head["experiment"]])
     if export is None:

@@ -166,8 +166,8 @@ class Sheet:
         return frame.iloc[:last]
 
     def _parsed(self) -> Any:
-        """By pandas; where it finds no table, or other lines than the file has (a quote that is left open), line by
-        line as it was written."""
+        """The table as pandas reads it; where pandas finds none, or other lines than the file has (a quote left
+        open), line by line as it was written."""
         import pandas
 
         try:
@@ -346,8 +346,8 @@ def listed(names: Iterable[str]) -> str:
 
 
 def _parts(rows: Sequence[Sequence[str]], place: int) -> tuple[str, ...]:
-    """Of a column's name, from top to bottom. Above the last row a name that spans several columns (a marker's, over
-    its X, Y and Z) stands in the first of them."""
+    """The parts of a column's name, from top to bottom. Above the last row a name that spans several columns (a
+    marker's, over its X, Y and Z) stands in the first of them."""
     found = [_cell(row, place) or _spanning(row, place) for row in rows[:-1]] + [_cell(row, place) for row in rows[-1:]]
     return tuple(part for part in found if part)
 

@@ -16,7 +16,7 @@ EFFECT = PhysicalEffect(
 
 
 def initial(position_m):
-    """In the middle of the play."""
+    """The middle of the play."""
     return position_m
 
 

@@ -35,7 +35,8 @@ def with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[str
 
 
 def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
-    """By each of the fit's parameters the values of `model` that it moves, by how much: itself, or those of a curve."""
+    """For each of the fit's parameters the values of `model` that it moves, and by how much: itself, or those of a
+    curve."""
     structure = fit.structure
     system = cast(RobotSystem, structure.system)
     own = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}

@@ -60,7 +60,7 @@ def _supply_psi(fit: Fit) -> float:
 
 
 def switch_timing(system: RobotSystem) -> Scatter:
-    """That of the walks, in the mean: near the edge a quarter of a per cent of the period decides, and a few
+    """The mean timing of the walks' switches: near the edge a quarter of a per cent of the period decides, and a few
     milliseconds do."""
     walks = [trial for trial in system.dataset.trials if trial.experiment == WALK]
     if not walks:
@@ -113,7 +113,7 @@ def _joined(residual: Channels, quantity: str) -> np.ndarray:
 
 
 def _speed(fit: Fit) -> float:
-    """By what part of the way walks end ahead of or behind the model, alike in every repeat."""
+    """By what share walks end ahead of or behind the model, alike in every repeat."""
     ways = {w.name: _end(w.channels) for w in fit.problem.trials if w.experiment == WALK}
     residuals = fit.residuals()
     conditions: dict[object, list[np.ndarray]] = {}

@@ -52,7 +52,7 @@ class ClockRelation:
         return HostTime(self._origin()[1] + (low + high) / 2, (high - low) / 2)
 
     def estimate(self, uno_s: float) -> float:
-        """As to_host() without the bound, and cheap: for every sample of a stream."""
+        """to_host() without the bound, and cheap enough for every sample of a stream."""
         if self._line is None:
             uno_0 = self._origin()[0]
             self._line = (uno_0, self.to_host(uno_0).time_s, 1 + self.drift)

@@ -201,7 +201,8 @@ def stop_until_confirmed(session: Session, ask: Callable[[float], Report], timeo
 
 
 def stop_in_new_session(session: Session, timeout_s: float = CONFIRMED_WITHIN_S) -> None:
-    """As stop_until_confirmed(), in a session of its own: nothing of an interrupted one is waited for or sent again."""
+    """stop_until_confirmed() in a session of its own: it waits for nothing of an interrupted one, and resends
+    nothing."""
     new = session.successor()
 
     def ask(attempt_s: float) -> Report:

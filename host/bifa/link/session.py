@@ -51,7 +51,7 @@ class Counters:
         return Counters(**{one.name: getattr(self, one.name) - getattr(before, one.name) for one in fields(self)})
 
     def text(self) -> str:
-        """As people see it everywhere."""
+        """The counters, as people see them everywhere."""
         return f"samples {self.samples}  lost {self.lost}  bad frames {self.bad}  sent again {self.resent}"
 
 
@@ -68,7 +68,7 @@ class Hello:
 
     @classmethod
     def of(cls, report: frames.Report) -> "Hello":
-        """From a hello message."""
+        """Read a hello message."""
         return cls(
             ".".join(map(str, report["firmware"])),
             report["protocol"],
@@ -223,7 +223,7 @@ class Session:
         return self.call_timed(name, *values, timeout_s=timeout_s).report
 
     def call_timed(self, name: str, *values: Any, timeout_s: float = 5.0) -> Answer:
-        """As call(); with the times between which the Uno carried the command out."""
+        """call(), with the times between which the Uno carried the command out."""
         return self.call_all([(name, values)], timeout_s)[0]
 
     def call_all(self, commands: Sequence[tuple[str, tuple[Any, ...]]], timeout_s: float = 5.0) -> list[Answer]:

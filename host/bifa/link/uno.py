@@ -165,7 +165,7 @@ class Uno:
         return {name: from_wire(name, value) for name, value in self._read_set()[0].items()}
 
     def parameters_and_pending(self) -> tuple[dict[str, float], bool]:
-        """As parameters(); and whether a walking robot adopts them only at its next cycle."""
+        """parameters(), and whether a walking robot adopts them only at its next cycle."""
         values, is_pending = self._read_set()
         return {name: from_wire(name, value) for name, value in values.items()}, is_pending
 

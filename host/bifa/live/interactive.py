@@ -40,7 +40,7 @@ def status_lines(conversation: Conversation, columns: int = _WIDE) -> StyleAndTe
 
 
 def _history() -> History:
-    """That of earlier consoles; where no file can be kept, of this one alone."""
+    """The history of earlier consoles; where no file can be kept, of this one alone."""
     try:
         folder = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "bifa"
         folder.mkdir(parents=True, exist_ok=True)

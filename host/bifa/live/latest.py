@@ -21,6 +21,6 @@ class Latest:
 
     @property
     def warning(self) -> str:
-        """Empty while telemetry flows."""
+        """A warning if telemetry has stopped; empty while it flows."""
         silence_s = time.monotonic() - self._taken_s
         return f"no telemetry for {silence_s:.0f} s" if silence_s > STALE_S else ""

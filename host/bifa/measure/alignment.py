@@ -61,7 +61,7 @@ def align(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray, marked: i
 
 
 def align_after_restart(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray) -> ClockLine:
-    """As `align`, where the mark is the Uno's restart: the first edge after the last long pause is its sample 1."""
+    """`align` with the Uno's restart as the mark: the first edge after the last long pause is its sample 1."""
     pauses = np.flatnonzero(_gaps(sync_s) > _RESTART_PERIODS)
     if not len(pauses):
         raise AlignmentError(

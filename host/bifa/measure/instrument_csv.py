@@ -109,7 +109,8 @@ def _next_repeat(recorded: Dataset, planned: PlannedTrial) -> PlannedTrial:
 
 
 def _refuse_copy(recorded: Dataset, trial: Trial, instrument: Path) -> None:
-    """By what the instrument measured: the pressures are the telemetry's, and may be another's."""
+    """Refuse a record that the data set has already, by what the instrument measured: the pressures are the
+    telemetry's."""
     own = {name: values for name, values in trial.columns.items() if name.startswith(("displacement", "force"))}
     for old in recorded.trials:
         if all(name in old.columns and np.array_equal(old.columns[name], values) for name, values in own.items()):
@@ -169,7 +170,7 @@ def _refuse_codes(path: Path, columns: dict[str, np.ndarray], lines: Sequence[in
 
 
 def sync_file(path: Path) -> Path:
-    """Where the edges of the strobe stand that belong to the record in `path`."""
+    """The file with the strobe's edges that belongs to the record in `path`."""
     for name in (f"{path.stem}.sync{path.suffix}", f"{path.stem}.sync.CSV"):
         if path.suffix.lower() == ".csv" and (there := path.with_name(name)).exists():
             return there
@@ -215,7 +216,7 @@ def _refuse_few(path: Path, lines: Sequence[int]) -> None:
 
 
 def _line(row: int, lines: Sequence[int] | None) -> int:
-    """Without `lines` the rows stand below one line of names."""
+    """The line of a row; without `lines` the rows stand below one line of names."""
     return row + 2 if lines is None else lines[row]
 
 
@@ -330,7 +331,7 @@ def _camera(
 
 
 def _refuse_silence(uno_s: np.ndarray, time_s: np.ndarray) -> None:
-    """Nothing is made up for samples of the Uno that were lost."""
+    """Refuse a trial within which samples of the Uno were lost."""
     steps = np.diff(uno_s)
     silent = np.flatnonzero((steps > LONGEST_GAP_S) & (uno_s[1:] > time_s[0]) & (uno_s[:-1] < time_s[-1]))
     if len(silent):

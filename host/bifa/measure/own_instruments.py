@@ -47,7 +47,7 @@ class Turn:
     total: int
 
     def told(self) -> dict[str, Any]:
-        """For `next.toml`: the trial, plain values."""
+        """The trial for `next.toml`, as plain values."""
         planned, trial = self.planned, self.planned.as_trial()
         settings: dict[str, Any] = {
             "actuator": planned.actuator,

@@ -73,7 +73,7 @@ class FittedCurve:
 
     @cached_property
     def changes(self) -> dict[str, dict[str, float]]:
-        """Of each shape by how much it changes the coefficients of the model's curve, by their names in a model."""
+        """By how much each shape changes the coefficients of the model's curve, by their names in a model."""
         return {
             name: {f"{self.prefix}_stiffness.{power}": float(change) for power, change in enumerate(way)}
             for name, way in zip(self.names, self._ways, strict=True)
@@ -85,5 +85,5 @@ class FittedCurve:
         return [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]
 
     def _sizes(self, shapes: np.ndarray) -> np.ndarray:
-        """By how many N each shape changes K where it changes it most."""
+        """How many N each shape changes K by, where it changes it most."""
         return np.abs(chebyshev.chebval(np.linspace(-1.0, 1.0, 200), shapes.T)).max(axis=1)

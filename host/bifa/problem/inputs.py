@@ -111,7 +111,7 @@ class StaticInputs:
         return np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
 
     def sampled(self, columns: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-        """Without the turns."""
+        """The columns without the turns."""
         return {name: column[self._is_sample] for name, column in columns.items()}
 
     @staticmethod
@@ -303,7 +303,7 @@ def _pull(trial: Trial) -> PullInputs:
 
 
 def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) -> np.ndarray:
-    """For how long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
+    """How long the puller has been moving, so that rate times it is the pulled distance; shape (n,), rising."""
     path_m = imposed_motion(time_s, pulled_mm / _MM).displacement_m
     return np.maximum.accumulate(np.clip(path_m * _MM / rate_mm_s, 0.0, None))
 

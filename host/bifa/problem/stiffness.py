@@ -64,7 +64,7 @@ class StiffnessFit:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Of the coefficients [N^2], shape (16, 16)."""
+        """Covariance of the coefficients [N^2], shape (16, 16)."""
         return np.linalg.pinv(self.information, hermitian=True)
 
     def mean_force_sd(self, x: np.ndarray) -> float:

@@ -37,7 +37,7 @@ def shifted(commands: Timeline, late_s: float) -> Timeline:
 
 
 def delayed(commands: Timeline, to_vacuum_s: float, to_positive_s: float) -> Timeline:
-    """As valves switch that take so long. Not sorted anew: a simulation does that."""
+    """The switches of valves that take so long. Not re-sorted: a simulation does that."""
     delay_s = np.where(commands.command == COMMANDS["positive"], to_positive_s, to_vacuum_s)
     return Timeline(commands.time_s + delay_s, commands.chamber, commands.command)
 
@@ -66,7 +66,7 @@ def switch_sd_s(trial: Trial) -> float:
 
 
 def step_timeline(trial: Trial) -> Timeline:
-    """Of a step response, as chamber 0; times as `elapsed_s` gives them."""
+    """The switches of a step response, as chamber 0; times as `elapsed_s` gives them."""
     time_s = elapsed_s(trial)
     state = (trial.columns["command"] > 0.5).astype(int)
     at = np.flatnonzero(np.diff(state)) + 1
@@ -79,7 +79,7 @@ def step_timeline(trial: Trial) -> Timeline:
 
 
 def walk_timeline(trial: Trial) -> Timeline:
-    """Of a walk; times as `elapsed_s` gives them."""
+    """The switches of a walk; times as `elapsed_s` gives them."""
     time_s = elapsed_s(trial)
     commands = recorded_commands(trial.columns)
     recorded = of_samples(time_s - trial.extra.get("command_age_s", 0.0), commands)

@@ -37,7 +37,7 @@ class Axis:
 
     @property
     def log_ticks(self) -> list[float] | None:
-        """Of a logarithmic axis over less than two decades, on which powers of ten would be one mark or none."""
+        """Ticks of a logarithmic axis over less than two decades, on which powers of ten would be one mark or none."""
         if not self.log or self.range is None or self.range[1] >= 100.0 * self.range[0]:
             return None
         low, high = self.range
@@ -105,7 +105,7 @@ def thinned(x: np.ndarray, y: np.ndarray, most: int = 500) -> tuple[np.ndarray, 
 
 
 def edges(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of values that hold until the next: only where they change, and the ends."""
+    """Values that hold until the next, reduced to where they change, and the ends."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     at = np.flatnonzero(np.concatenate(([True], np.diff(y) != 0, [False])))
     at = np.append(at, len(y) - 1)

@@ -67,7 +67,7 @@ def write_page(page: Page, path: Path) -> None:
 
 @cache
 def environment() -> jinja2.Environment:
-    """Where this package's templates and the engine's are found; all text is escaped."""
+    """Templates of this package and of the engine; all text is escaped."""
     return engine.environment(jinja2.PackageLoader("bifa.report", "templates"))
 
 
@@ -82,5 +82,5 @@ def template_file(name: str) -> Markup:
 
 
 def _embedded(value: object) -> Markup:
-    """As JSON that cannot end the element it stands in."""
+    """JSON that cannot end the element it stands in."""
     return Markup(json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))

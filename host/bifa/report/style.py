@@ -26,7 +26,7 @@ class ColorScheme:
     after: str
 
     def colors(self) -> dict[str, str]:
-        """By role, chambers included."""
+        """Colors by role, chambers included."""
         return asdict(self) | CHAMBER_COLORS
 
 

@@ -27,7 +27,7 @@ class SameBoard:
 
 
 def _serial_number_at(port: str | None) -> str | None:
-    """Of the board behind `port`, or of the one Uno there is; None where it has none."""
+    """Serial number of the board behind `port`, or of the one Uno there is; None where it has none."""
     unos = [one for one in serial_ports() if (one.device == port if port is not None else one.board)]
     return unos[0].serial_number if len(unos) == 1 else None
 

@@ -21,7 +21,7 @@ STIFFNESS, LEARNT = ("body_stiffness", "small_stiffness"), "learnt"
 
 @dataclass(frozen=True)
 class Covariance:
-    """Of some of the model's values: `matrix[i, j]` belongs to `names[i]`, `names[j]`."""
+    """Covariance of some of the model's values: `matrix[i, j]` belongs to `names[i]`, `names[j]`."""
 
     names: tuple[str, ...]
     matrix: np.ndarray = field(repr=False)

@@ -31,7 +31,7 @@ class Advance:
 
     @property
     def speed_mm_s(self) -> np.ndarray:
-        """Of the last cycle."""
+        """Speed of the last cycle."""
         return 1e3 * self.advance_m[..., -1] / self.period_s
 
     @property

@@ -41,7 +41,7 @@ def plant(model: Model | Plant) -> Plant:
 def of_values(
     values: Mapping[str, float], active: Mapping[str, Mapping[str, float]], body: Tabulated, small: Tabulated
 ) -> Plant:
-    """From values by name (those of effects too), the active effects' own, and the two curves."""
+    """A plant from values by name (those of effects too), the active effects' own, and the two curves."""
     return Plant(_numbers(values, body, small), mask(active), body.rows, small.rows)
 
 

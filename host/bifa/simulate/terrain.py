@@ -47,7 +47,7 @@ class Obstacle:
 
     @property
     def narrowing_m(self) -> float:
-        """In radius."""
+        """Narrowing in radius."""
         return 0.5 * (PIPE_DIAMETER_M - self.diameter_m)
 
 
@@ -74,7 +74,7 @@ OBSTACLES = {"tunnel": tunnel, "subtunnels": subtunnels, "arcs": arcs}
 
 
 def obstacles(name: str) -> tuple[Obstacle, ...]:
-    """Those of a name, 10 cm ahead; SimulationError for an unknown one."""
+    """The obstacles of a name, 10 cm ahead; SimulationError for an unknown one."""
     if name not in OBSTACLES:
         raise SimulationError(f"obstacle {name!r} is not one of {', '.join(OBSTACLES)}")
     return OBSTACLES[name]()

@@ -66,7 +66,7 @@ def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
 
 
 def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
-    """From rows (time_s, chamber, command) in any order; of equal times the later row wins."""
+    """A timeline from rows (time_s, chamber, command) in any order; of equal times the later row wins."""
     rows = np.array(list(switches), dtype=float).reshape(-1, 3)
     if not np.all(np.isfinite(rows)):
         raise TimelineError("a switch needs a time, a chamber (0 to 2) and a command (0 to 2), all numbers")
@@ -93,10 +93,8 @@ def of_phases(
 
 
 def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:
-    """From recorded commands: `columns` (3, n) of body, head, tail; 1, 0, and NaN for off.
-
-    A switch is put where the new command is first seen. `refine` places it better where the gait is known.
-    """
+    """A timeline from recorded commands: `columns` (3, n) of body, head, tail; 1, 0, and NaN for off. A switch is
+    put where the new command is first seen. `refine` places it better where the gait is known."""
     rows = []
     for chamber, column in enumerate(np.asarray(columns, dtype=float)):
         state = np.where(np.isnan(column), OFF, column)

@@ -324,5 +324,5 @@ def _shown(sample: Sample) -> dict[str, Any]:
 
 
 def wall_clock() -> str:
-    """For what people are told: when a stop was confirmed."""
+    """The time of day, for people: when a stop was confirmed."""
     return time.strftime("%H:%M:%S")

@@ -26,14 +26,14 @@ def step_back() -> None:
 
 
 class GaitPrediction:
-    """Of a model, drawn once. For a thread of its own: it computes without holding up the others."""
+    """Predictions of one model, for a thread of its own: it computes without holding up the others."""
 
     def __init__(self, model: Model):
         self._model = model
         self.in_full = lru_cache(_REMEMBERED)(self._in_full)
 
     def at_once(self, gait: Gait) -> dict[str, Any]:
-        """By the model itself."""
+        """The model's own prediction."""
         try:
             progress = speed(self._model, gait)
         except BifaError as error:
@@ -48,5 +48,5 @@ class GaitPrediction:
 
     @cached_property
     def predictor(self) -> Predictor:
-        """With its robots drawn."""
+        """The predictor, with its robots drawn."""
         return Predictor(self._model, spread_of(self._model), draws=_DRAWS)

@@ -120,7 +120,7 @@ class LivePage:
         return any(page.is_owner for page in list(self.pages))
 
     def tell(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
-        """To every page; from any thread."""
+        """Send to every page; from any thread."""
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
                 self._loop.call_soon_threadsafe(self._heard, changes, samples)
@@ -314,7 +314,8 @@ class LivePage:
 
 
 async def _in_pieces(content: bytes) -> AsyncIterator[bytes]:
-    """So that a reader who is slow, or never reads, does not have all of it waiting, and many let others in between."""
+    """The page in pieces, so that little of it waits for a reader who is slow or never reads, and others get their
+    turn."""
     for begin in range(0, len(content), _PIECE):
         yield content[begin : begin + _PIECE]
         await asyncio.sleep(0)
@@ -351,7 +352,7 @@ def _gait(asked: Mapping[str, Any]) -> Gait:
 
 
 def _of_gait(parameters: Mapping[str, float]) -> dict[str, float]:
-    """As sliders show it."""
+    """A gait's values, as the sliders show them."""
     return {name: round(parameters[name], 4) for name in GAIT_NAMES}
 
 

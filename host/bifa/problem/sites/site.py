@@ -90,7 +90,7 @@ def remembered(values: np.ndarray, time_s: np.ndarray, curve: LearntCurve, row: 
 
 
 def row_of(channel: str, inputs: Inputs) -> int:
-    """Of curves by actuator, the large one's first, that of a pressure channel."""
+    """The row of a pressure channel in curves by actuator, the large one's first."""
     return 0 if inputs.actuator == "large" or channel == "pressure_body_psi" else 1
 
 
