@@ -85,7 +85,7 @@ def _session(
     setup: Setup, effort: Effort, on_progress: OnProgress, data: str, name: str, known: Mapping[str, float]
 ) -> tuple[Callable[[Path, Path], None], int]:
     """What records the characterisation into the data set `data`, named `name`, and of how many trials it is."""
-    trials, told = plan.session(quick=effort.quick), _told(setup, on_progress)
+    trials, on_trial = plan.session(quick=effort.quick), _unless_by_hand(setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         with setup.open(0) as rig:
@@ -97,7 +97,7 @@ def _session(
                 known=known_of(rig, known),
                 provenance=setup.settings(0),
                 record=setup.hands,
-                on_event=lambda e: told(e.planned.title, (e.number - 1 + e.share) / e.total),
+                on_event=lambda e: on_trial(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
 
     return run, len(trials)
@@ -165,8 +165,8 @@ def _walk(
         robot = load_model(inputs / model)
         cycles = {key: planned_cycles(robot, gait, effort.cycles) for key, gait in loaded.items()}
         with setup.open(number) as rig:
-            told = _told(setup, on_progress)
-            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, told, setup.hands)
+            on_walk = _unless_by_hand(setup, on_progress)
+            measure_walks(rig, outputs / walks, loaded, cycles, effort.repeats, on_walk, setup.hands)
 
     needs = (model, *(file for file in gaits.values() if file))
     settings = setup.settings(number) | {"effort": asdict(effort)}
@@ -212,8 +212,8 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
         cycles = planned_cycles(model, gait, effort.cycles)
         with setup.open(_FURTHER + number) as rig:
-            gaits, told = {f"round-{number}": gait}, _told(setup, on_progress)
-            return measure_walks(rig, folder, gaits, cycles, effort.repeats, told, setup.hands)
+            gaits, on_walk = {f"round-{number}": gait}, _unless_by_hand(setup, on_progress)
+            return measure_walks(rig, folder, gaits, cycles, effort.repeats, on_walk, setup.hands)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -231,8 +231,8 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
 
 
-def _told(setup: Setup, on_progress: OnProgress) -> OnProgress:
-    """Who hears how a walk is getting on: nobody where a person at the bench is asked things meanwhile."""
+def _unless_by_hand(setup: Setup, on_progress: OnProgress) -> OnProgress:
+    """`on_progress`, but nobody where a person at the bench is asked things meanwhile."""
     return (lambda what, share: None) if setup.is_by_hand else on_progress
 
 

@@ -178,16 +178,16 @@ def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
     """Refuse a declared unit that a file's row of units contradicts."""
-    told = told_unit(sheet, place)
-    if told and unit and unit in _sizes(name) and told != unit:
+    written = unit_in_file(sheet, place)
+    if written and unit and unit in _sizes(name) and written != unit:
         raise sheet.error(
-            f"the file says {told}, but units.{name} is declared as {unit}: correct the declaration",
+            f"the file says {written}, but units.{name} is declared as {unit}: correct the declaration",
             -1,
             sheet.labels()[place],
         )
 
 
-def told_unit(sheet: Sheet, place: int) -> str | None:
+def unit_in_file(sheet: Sheet, place: int) -> str | None:
     """The unit that a file itself gives for a column: in a row of units, or in brackets behind its name."""
     name = sheet.names[place][-1] if sheet.names[place] else ""
     return unit_in(sheet.units[place]) or (unit_in(name) if _BRACKETS.search(name) else None)

@@ -155,7 +155,7 @@ def _model(
     return labeled(model, system, "bifa fit", date)
 
 
-_TOLD = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before
+_SETTLED = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before
 
 
 def _open(
@@ -164,8 +164,10 @@ def _open(
     prior_sd = {p.name: p.prior_sd for p in system.parameters}
     # what the data tell hardly more of than was known before is as open as what they do not tell
     sd = {e.name: intervals[e.name].sd if e.name in intervals else e.sd for e in known.estimates}
-    told = {e.name for e in known.estimates if e.determined and sd[e.name] <= _TOLD * (prior_sd[e.name] or np.inf)}
-    loose = {e.name for e in known.estimates} - told
+    settled = {
+        e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)
+    }
+    loose = {e.name for e in known.estimates} - settled
     absent = [n for n in system.model.parameters if n not in system.fitted and n not in dataset.known]
     names = [n for n in system.model.parameters if n in loose or n in absent]
     found = [Open(n, system.model.parameters[n].value, _GIVEN_BY[n]) for n in names]

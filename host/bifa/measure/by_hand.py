@@ -107,7 +107,7 @@ class ByHand:
         findings: Sequence[str] = (),
     ) -> bool:
         self._desk.ask(
-            "review", f"{seen} {choice}, q discards it and stops.", turn.told() | {"findings": list(findings)}
+            "review", f"{seen} {choice}, q discards it and stops.", turn.as_dict() | {"findings": list(findings)}
         )
         while True:
             while (answer := self._desk.answer()) is None:

@@ -46,7 +46,7 @@ class Turn:
     number: int
     total: int
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """The trial for `next.toml`, as plain values."""
         planned, trial = self.planned, self.planned.as_trial()
         settings: dict[str, Any] = {
@@ -199,7 +199,7 @@ class OwnInstruments:
 
     def _ask(self, step: str, text: str) -> None:
         self._step = step
-        self._desk.ask(step, text, self._present.told())
+        self._desk.ask(step, text, self._present.as_dict())
 
     def _files(self) -> list[Path]:
         """What lies in the watched folder and below, without what is bifa's or an operating system's."""

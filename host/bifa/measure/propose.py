@@ -16,7 +16,7 @@ import tomli_w
 
 from bifa.data.clocks import DATE, FRAME
 from bifa.data.errors import DatasetError
-from bifa.data.export import ROLES, UNITS, Export, parse_exports, presets, told_unit, unit_in
+from bifa.data.export import ROLES, UNITS, Export, parse_exports, presets, unit_in, unit_in_file
 from bifa.data.fields import Fields, Source
 from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, workbook
 from bifa.measure.instruments import CHANNELS
@@ -56,7 +56,7 @@ class Look:
     def unit(self, name: str, column: str) -> str | None:
         """The unit that the file itself gives for a column, if it may be that of `name`."""
         place = self.sheet.find(column)
-        told = told_unit(self.sheet, place)
+        told = unit_in_file(self.sheet, place)
         return told if told in units_for(name) else None
 
 
