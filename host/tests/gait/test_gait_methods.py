@@ -85,7 +85,7 @@ def test_climbs_begin_at_the_basins_that_were_seen():
     found = climb_basins(recorder, np.zeros(5, bool), 600, 0)
     assert found.best_value > 0.99
     assert found.ends[0] == found.best_value
-    assert len(found.values) <= 620
+    assert len(found.values) < 600 + 5 * 12, "a generation of five runs more at most"
 
 
 @pytest.mark.parametrize("method", ["de", "cma", "bo"])

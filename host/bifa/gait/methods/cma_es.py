@@ -17,7 +17,8 @@ _CLIMBS = 5  # at once, and as many in each restart
 _STEP = 0.06  # initial standard deviation, of the unit cube
 _TRIAL = 10  # generations after which a run far behind the best is given up
 _BEHIND = 0.9  # of the best value
-_STALLED, _GAIN = 10, 2e-3  # generations in which a run has gained less than this part ends it
+_SAME = 2.5e-3  # two runs that end within this part of each other are enough
+_STALLED, _GAIN = 10, 5e-4  # generations in which a run has gained less than this part ends it
 
 
 def cma_es(
@@ -47,7 +48,7 @@ def climb_basins(
     about `evaluations` are recorded."""
     tried: list[np.ndarray] = []
     ends: list[float] = []
-    while recorder.count < evaluations and not agree(ends):
+    while recorder.count < evaluations and not agree(ends, _SAME):
         starts = basins(recorder.found(), wraps, _CLIMBS, tried)
         if not len(starts):
             break
@@ -106,7 +107,7 @@ def climb_together(
         best = max(one[-1] for one in bests)
         alive = [k for k in alive if not (runs[k].stop() or _is_hopeless(bests[k], best) or _has_stalled(bests[k]))]
         ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
-        if len(ended) > 1 and agree([best, ended[-2]]):  # nothing that still runs is ahead of two that have ended
+        if len(ended) > 1 and agree([best, ended[-2]], _SAME):  # nothing that runs is ahead of two that ended
             break
     return [one[-1] for one in bests]
 

@@ -75,10 +75,10 @@ def _distances(points: np.ndarray, point: np.ndarray, turns: np.ndarray) -> np.n
     return np.where(turns, np.minimum(difference, 1.0 - difference), difference).max(axis=1)
 
 
-def agree(ends: Sequence[float]) -> bool:
+def agree(ends: Sequence[float], within: float = AGREE) -> bool:
     """Whether the best two of independent runs have come to the same value."""
     first, second = [*sorted(ends, reverse=True), 0.0, 0.0][:2]
-    return first > 0.0 and second >= (1.0 - AGREE) * first
+    return first > 0.0 and second >= (1.0 - within) * first
 
 
 class RecordedObjective:
