@@ -38,4 +38,4 @@ def test_the_number_the_convention_and_what_to_do_are_said(day):
     (found,) = check_plausibility(mistaken(day, "anchor_8.5psi_2.csv", turned("force_N")))
     assert str(found).startswith("anchor_8.5psi_2.csv, force_N: -")
     assert "N in the middle (median), where a resistance is positive" in str(found)
-    assert str(found).endswith("Turn the sign")
+    assert str(found).endswith("Reverse the sign")

@@ -109,7 +109,7 @@ def test_what_is_refused_when_it_is_added_changes_nothing(files):
         import_trial(second, files, PULL, folder, {"supply_positive_psi": 8.0}, add=True)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     (folder / "anchor_8.5psi_20mm_s_2.csv").write_text("mine")
-    with pytest.raises(InstrumentFileError, match="in the way"):
+    with pytest.raises(InstrumentFileError, match="is not listed"):
         import_trial(second, files, PULL, folder, add=True)
     assert (folder / "anchor_8.5psi_20mm_s_2.csv").read_text() == "mine"
 
@@ -282,7 +282,7 @@ def test_rows_of_a_camera_that_are_missing_are_named_with_file_and_column(files)
     header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
     text = "\n".join([f"{header},command_body", *(f"{row},{float(row[:4]) >= 2.5:d}" for row in rows)])
     (files / "telemetry_1.csv").write_text(text)
-    with pytest.raises(InstrumentFileError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not made up"):
+    with pytest.raises(InstrumentFileError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not filled in"):
         import_trial(files / "cam.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
 
 
@@ -291,7 +291,9 @@ def test_a_code_for_no_value_is_no_value(files, code):
     lines = (files / "pull.csv").read_text().splitlines()
     time_s, _, force = lines[40].split(",")
     (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{code},{force}", *lines[41:]]))
-    with pytest.raises(InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ stands for no"):
+    with pytest.raises(
+        InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ is a code for a missing value"
+    ):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
