@@ -190,6 +190,16 @@ class FunctionSystem(System):
         other._noise_time_s, other.estimates_noise_time = dict(seconds), False
         return other
 
+    def with_grains(self, grains: Mapping[str, float]) -> FunctionSystem:
+        """The same system, with `Parameter.grain` by full name, as fitted."""
+        other = copy(self)
+        other.parameters = tuple(replace(p, grain=grains.get(p.name, 0.0)) for p in self.parameters)
+        other.effects = {
+            name: replace(e, parameters=tuple(replace(p, grain=grains.get(e.full_name(p), 0.0)) for p in e.parameters))
+            for name, e in self.effects.items()
+        }
+        return other
+
     # -- in the person's parameters ---------------------------------------------------------------------------
 
     def coordinate(self, name: str) -> Coordinate:

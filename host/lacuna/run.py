@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from lacuna.check.grains import grains_of
 from lacuna.check.numbers import listed
 from lacuna.cores import usable_cores
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
-from lacuna.errors import MisuseError
+from lacuna.errors import LacunaError, MisuseError
 from lacuna.estimation.problem import use_threads
 from lacuna.function_system import FunctionSystem
 from lacuna.misfit import compared_at_misfit
@@ -68,6 +69,7 @@ def diagnose(
         _log.info("%s: %s", system.name, what)
         told(what)
 
+    system, in_steps = _in_steps(system)
     how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "progress": say}
     try:
         with _workers(n_jobs, executor) as workers:
@@ -83,12 +85,36 @@ def diagnose(
                     found = answer(system)
                 found, raised = compared_at_misfit(system, found, answer)
             found = _cautioned(found, system, raised, answer)
+            found = replace(found, warnings=(*found.warnings, *in_steps))
     finally:
         if isinstance(told, Progress):
             told.end()
     verdict = Verdict(system, found)
     _log.info("%s: %r", system.name, verdict)
     return verdict
+
+
+def _in_steps(system: System) -> tuple[System, list[str]]:
+    """`system` with what is known of parameters that act in steps, and a sentence on each."""
+    if not isinstance(system, FunctionSystem):
+        return system, []
+    try:
+        grains = grains_of(system, system.trials)
+    except LacunaError:  # of the model, which the check says better
+        return system, []
+    said = [
+        f"{name} changes predictions only in steps, of about {_told_width(system, name, width):.2g}: let the model"
+        " interpolate between them, and it is fitted better."
+        for name, width in grains.items()
+    ]
+    return system.with_grains(grains), said
+
+
+def _told_width(system: FunctionSystem, name: str, width: float) -> float:
+    effect, _, own = name.rpartition(".")
+    parameters = system.effects[effect].parameters if effect else system.parameters
+    (value,) = (p.value for p in parameters if p.name == own)
+    return abs(system.told(name, value + width) - system.told(name, value))
 
 
 def _tested_on(system: System, names: tuple[str, ...]) -> System:

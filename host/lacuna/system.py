@@ -39,10 +39,11 @@ class Parameter:
     `at_least` names another parameter that it cannot be below. `elsewhere`: further initial values for graduated
     fits, for a parameter whose isolating trials fit equally well at several values. `factor_of`: of a nuisance, the
     parameters that it multiplies in its trial; its derivatives are theirs then, to the last digit, and data do not
-    seem to tell a change of all trials' factors from one of the parameters. `periodic`: of an effect's own parameter,
-    `lower` and `upper` mean the same and are no bounds (a phase). `prior_from_trials`: what is known of it beforehand
-    comes from the trials that are fitted, by a base model that knew of no effect; it guides the search, and stands back
-    where the parameters are finally told.
+    seem to tell a change of all trials' factors from one of the parameters. `grain`: the least change that changes a
+    prediction, where a model counts (a delay in whole samples): derivatives step as far at least. `periodic`:
+    of an effect's own parameter, `lower` and `upper` mean the same and are no bounds (a phase). `prior_from_trials`:
+    what is known of it beforehand comes from the trials that are fitted, by a base model that knew of no effect; it
+    guides the search, and stands back where the parameters are finally told.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Parameter:
     at_least: str | None = None
     elsewhere: tuple[float, ...] = ()
     factor_of: tuple[str, ...] = ()
+    grain: float = 0.0
     periodic: bool = False
     prior_from_trials: bool = False
 

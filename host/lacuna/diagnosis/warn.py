@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from lacuna.check.numbers import listed
 from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import uncertainty
+from lacuna.system import Parameter
 
 _NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably absorbs model error
 
@@ -51,19 +54,43 @@ def _parameters(fitted: Fit) -> list[str]:
 
 
 def _strayed(fits: list[Fit]) -> list[str]:
-    far: dict[str, list[str]] = {}
+    """Nuisances far from what is expected, in single trials or, by less, in all of them."""
+    runs: dict[str, list[_Run]] = {}
     for fit in fits:
-        for trial, values, parameters in zip(
-            fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True
-        ):
-            for value, parameter in zip(values, parameters, strict=True):
-                if "." not in parameter.name and abs(value - parameter.value) > _NEAR_LIMIT * parameter.step_scale:
-                    far.setdefault(parameter.name, []).append(trial.name)
-    return [
-        f"{name} is more than {_NEAR_LIMIT:g} standard deviations from what is expected in {listed(trials)}: it"
-        " probably absorbs model error."
-        for name, trials in far.items()
-    ]
+        every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
+        for trial, values, parameters in every:
+            for value, p in zip(values, parameters, strict=True):
+                if "." not in p.name:  # an effect's own (a phase) may do as it likes
+                    runs.setdefault(p.name, []).append(_Run(trial.name, float(value), p))
+    found = []
+    for name, each in runs.items():
+        if far := [one.trial for one in each if abs(one.away) > _NEAR_LIMIT]:
+            found.append(
+                f"{name} is more than {_NEAR_LIMIT:g} standard deviations from what is expected in {listed(far)}: it"
+                " probably absorbs model error."
+            )
+        if abs(sum(one.away for one in each)) > _NEAR_LIMIT * len(each) ** 0.5:
+            mean = sum(one.value for one in each) / len(each)
+            expected = sum(one.nuisance.value for one in each) / len(each)
+            unit = each[0].nuisance.unit
+            found.append(
+                f"{name} is {_quantity(mean, unit)} on average over {len(each)} trials, where"
+                f" {_quantity(expected, unit)} is expected: declare that, or other runs are predicted worse."
+            )
+    return found
+
+
+class _Run(NamedTuple):
+    """What a trial has of a nuisance."""
+
+    trial: str
+    value: float
+    nuisance: Parameter
+
+    @property
+    def away(self) -> float:
+        """From what is expected, in standard deviations."""
+        return (self.value - self.nuisance.value) / self.nuisance.step_scale
 
 
 def _combined(names: list[str]) -> str:

@@ -18,6 +18,7 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     one."""
     known = uncertainty(fitted)
     variance = np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted)))
+    variance += fitted.structure.grains()[list(fitted.solution.free)] ** 2 / 12.0  # anywhere within a step
     conditions = len({(t.experiment, t.condition) for t in fitted.problem.trials})
     half = np.sqrt(variance) * student.ppf(0.5 + _CONFIDENCE / 2, max(conditions - 1, 1))
     found = {}

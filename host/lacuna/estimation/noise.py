@@ -269,15 +269,34 @@ def _smallest(trials: Sequence[Record], channel: str) -> float:
 
 
 def _rounding_step(samples: np.ndarray) -> float:
-    """The least step between the values of a record that was rounded; 0 if it was not. In a rounded record values recur
-    that are all multiples of one step apart, or else most samples are the same as their neighbours."""
+    """The step that the values of a record were rounded to; 0 if they were not. In a rounded record values recur that
+    are all multiples of one step apart, to the decimals that they were written with, or else most samples are the same
+    as their neighbours."""
     known = samples[np.isfinite(samples)]
     values = np.unique(known)
     steps = np.diff(values)
     steps = steps[steps > _SAME_VALUE * np.ptp(known)] if len(steps) else steps  # what arithmetic makes of equal ones
     if len(steps) < 2:
         return 0.0
-    least = float(steps.min())
-    off_the_grid = np.abs(steps / least - np.round(steps / least))
-    recur = len(steps) + 1 < _RECUR * len(known) and bool((off_the_grid < _ON_THE_GRID).all())
-    return least if recur or np.mean(np.diff(known) == 0.0) > 0.5 else 0.0
+    step, written = _common_step(steps), _last_decimal(values)
+    off_the_grid = np.abs(steps - np.round(steps / step) * step)
+    near = max(_ON_THE_GRID * step, written if written < step / 3.0 else 0.0)
+    recur = len(steps) + 1 < _RECUR * len(known) and bool((off_the_grid <= near).all())
+    if recur:
+        return step
+    return float(steps.min()) if np.mean(np.diff(known) == 0.0) > 0.5 else 0.0
+
+
+def _common_step(steps: np.ndarray) -> float:
+    """What `steps` are multiples of, if of anything: the mean of those that may be single ones, then of all."""
+    single = float(np.mean(steps[steps < 1.5 * steps.min()]))
+    return float(steps.sum() / np.maximum(np.round(steps / single), 1.0).sum())
+
+
+def _last_decimal(values: np.ndarray) -> float:
+    """The power of ten that values were written to the nearest of; 0 if they have more digits than anybody writes."""
+    largest = float(np.abs(values).max()) or 1.0
+    for power in range(int(np.ceil(np.log10(largest))), int(np.floor(np.log10(_SAME_VALUE * largest))), -1):
+        if np.allclose(values, np.round(values, -power), rtol=0.0, atol=_SAME_VALUE * largest):
+            return float(10.0**power)
+    return 0.0

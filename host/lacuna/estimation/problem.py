@@ -215,7 +215,7 @@ class Problem:
         """A tenth of the largest step."""
         share = 0.1 * LARGEST_STEP
         return Steps(
-            share * self.structure.scales(),
+            np.maximum(share * self.structure.scales(), self.structure.grains()),
             tuple(np.array([share * p.step_scale for p in ps]) for ps in self.nuisances),
         )
 
@@ -226,6 +226,7 @@ class Problem:
         scales, p = self.structure.scales(), len(free)
         structure = steps.structure.copy()
         structure[list(free)] = _tuned(sum((s[:p] for s in squares), start=np.zeros(p)), scales[list(free)])
+        structure = np.maximum(structure, self.structure.grains())
         nuisances = tuple(
             _tuned(s[p:], np.array([parameter.step_scale for parameter in ps]))
             for s, ps in zip(squares, self.nuisances, strict=True)

@@ -42,8 +42,11 @@ class _Directions:
 @one_thread
 def settle(fitted: Fit) -> Fit:
     """The fit at its optimum, with derivatives and a normal matrix to be trusted. A round costs P simulations of all
-    trials; there are one to six, two as a rule. A fit that is stopped by a bound stays as it is: the model is wrong."""
+    trials; there are one to six, two as a rule. A fit that is stopped by a bound stays as it is: the model is wrong;
+    and so does one with a parameter that acts in steps, which are longer than these."""
     problem = fitted.problem
+    if problem.structure.grains().any():
+        return fitted
     for _ in range(_ROUNDS):
         if fitted.at_bound.any():
             break

@@ -98,6 +98,9 @@ class Structure:
     def scales(self) -> np.ndarray:
         return np.array([p.step_scale for p in self.parameters])
 
+    def grains(self) -> np.ndarray:
+        return np.array([p.grain for p in self.parameters])
+
     def theta(self, values: np.ndarray) -> dict[str, float]:
         return dict(zip(self.names, map(float, values), strict=True))
 

@@ -43,8 +43,21 @@ def test_a_floor_is_at_least_what_rounding_leaves(step, seed):
         assert floor_of(rounded) >= 0.999 * step / np.sqrt(12.0)
 
 
+@given(st.floats(0.2, 1.0), st.integers(1, 4), st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_a_rounded_record_written_with_few_decimals_has_the_same_floor(step, decimals, seed):
+    """An ADC of 0.3226 K, logged as 22.83, 23.15, 23.48: steps of 0.32 and 0.33."""
+    draw = np.random.default_rng(seed)
+    slow = 20.0 + np.cumsum(draw.standard_normal(400)) * 0.3 * step
+    rounded = np.round(step * np.round(slow / step), decimals)
+    if len(np.unique(rounded)) > 3 and step > 3.0 * 10.0**-decimals:
+        assert floor_of(rounded) == pytest.approx(step / np.sqrt(12.0), rel=0.1)
+
+
 def test_a_record_that_was_not_rounded_has_no_rounding():
     draw = np.random.default_rng(0)
+    decimals = np.round(np.sin(np.linspace(0, 9, 400)) + 1e-2 * draw.standard_normal(400), 3)
+    assert floor_of(decimals, residuals={"record 1": {"y": 0 * decimals}, "record 2": {"y": 0 * decimals}}) < 1e-3
     assert floor_of(np.sin(np.linspace(0, 9, 400)) + 1e-3 * draw.standard_normal(400)) < 1.5e-3
     again = np.tile(np.sin(np.linspace(0, 2 * np.pi, 20, endpoint=False)), 20)  # the same values, and no grid
     assert floor_of(again, residuals={"record 1": {"y": 0 * again}, "record 2": {"y": 0 * again}}) < 1e-3

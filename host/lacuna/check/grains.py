@@ -1,0 +1,83 @@
+"""Parameters that act in steps, as a delay that counts whole samples does: within one, no prediction changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from lacuna.check.numbers import differ
+from lacuna.system import Channels, Parameter, Record, System, Theta
+
+_SMALL = 0.02  # of a parameter's scale: a step that derivatives take; what changes nothing by it acts in larger ones
+_DOUBLED, _HALVED = 10, 14  # times, to find an edge between two steps
+
+Predict = Callable[[float], Channels]
+
+
+def grains_of(system: System, trials: Sequence[Record]) -> dict[str, float]:
+    """By the full name of each parameter that acts in steps, the width of one, as it is fitted. Costs three simulations
+    of a trial for each of the other parameters."""
+    found = {}
+    for name, parameter, effects, theta in _each(system):
+        seen = [t for t in trials if not effects or _shows(system, effects[0], t)]
+        if width := _width(system, theta, name, parameter, effects, seen):
+            found[name] = width
+    return found
+
+
+def _each(system: System) -> Iterator[tuple[str, Parameter, tuple[str, ...], Theta]]:
+    """Every parameter of the base model, and of each effect at its typical size."""
+    start = {p.name: p.value for p in system.parameters}
+    for p in system.parameters:
+        yield p.name, p, (), start
+    for effect in system.effects.values():
+        typical = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
+        for p in effect.parameters:
+            yield effect.full_name(p), p, (effect.name,), start | typical
+
+
+def _shows(system: System, effect: str, trial: Record) -> bool:
+    experiments = system.effects[effect].experiments
+    return not experiments or trial.experiment in experiments
+
+
+def _width(
+    system: System, theta: Theta, name: str, parameter: Parameter, effects: tuple[str, ...], trials: Sequence[Record]
+) -> float:
+    """From one edge to the next, in the first trial in which there are two; 0 where a small step changes something."""
+    small = _SMALL * parameter.step_scale
+    small = small if parameter.value + 2.0**_DOUBLED * small <= parameter.upper else -small
+    for trial in trials:
+        own = {p.name: p.value for p in system.nuisances(trial)}
+
+        def predict(value: float, trial: Record = trial, own: dict[str, float] = own) -> Channels:
+            return system.predict_trials([dict(theta) | own | {name: value}], effects, [trial])[0]
+
+        # An initial value may lie right before an edge, as numbers that are whole in samples do.
+        first, second, third = (predict(parameter.value + k * small) for k in range(3))
+        if _changes(first, second) and _changes(second, third):
+            return 0.0
+        edge = _edge(predict, parameter, parameter.value + small, small)
+        following = edge and _edge(predict, parameter, edge, small)
+        if edge and following and abs(following - edge) > abs(small):
+            return abs(following - edge)
+    return 0.0
+
+
+def _edge(predict: Predict, parameter: Parameter, begin: float, small: float) -> float | None:
+    """The nearest value beyond `begin` at which predictions are others; None where there is none within the bounds."""
+    here, within, step = predict(begin), begin, small
+    for _ in range(_DOUBLED):
+        beyond = begin + step
+        if not parameter.lower <= beyond <= parameter.upper:
+            return None
+        if _changes(here, predict(beyond)):
+            for _ in range(_HALVED):
+                middle = 0.5 * (within + beyond)
+                within, beyond = (within, middle) if _changes(here, predict(middle)) else (middle, beyond)
+            return beyond
+        within, step = beyond, 2.0 * step
+    return None
+
+
+def _changes(one: Channels, other: Channels) -> bool:
+    return any(differ(column, other[name], 0.0) for name, column in one.items())
