@@ -99,7 +99,7 @@ def record_telemetry(
         raise RecordingError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
-    recorder = _Recorder(open_rig, port, parameters, end_s, console)
+    log = _TelemetryLog(open_rig, port, parameters, end_s, console)
     waiting = "recording resumes when that Uno is back" + (
         "; you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
     )
@@ -109,9 +109,9 @@ def record_telemetry(
             while time.monotonic() < end_s:
                 path = next_file(out)
                 try:
-                    recorder.record_until_gone(path)
+                    log.record_until_gone(path)
                 except GONE as error:
-                    if isinstance(error.__cause__, KeyboardInterrupt) or not recorder.has_begun:
+                    if isinstance(error.__cause__, KeyboardInterrupt) or not log.has_begun:
                         raise
                     if path.exists() or not is_told:
                         console.print(f"{error}\nwhat was recorded is in {out}; {waiting}", soft_wrap=True)
@@ -122,7 +122,7 @@ def record_telemetry(
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 
-class _Recorder:
+class _TelemetryLog:
     """Records from one board and no other, which walks by itself only the first time."""
 
     def __init__(
