@@ -55,11 +55,14 @@ def is_due(case: Case) -> bool:
 
 
 def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
-    """`found` with its leading explanations judged on every known record; the case knows them by their originals."""
+    """`found` with its leading explanations, and what they contain, judged on every known record; the case knows them
+    by their originals."""
     least = min(c.cost for c in found.tried)
-    near = (c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least)
-    leading = sorted(near, key=lambda c: c.cost)[:_COMPARED]
-    candidates = [found.base, *leading, *found.freed]
+    near = [c for c in found.tried if c is not found.base and c.cost < case.policy.reach * least]
+    near.sort(key=lambda c: c.cost)
+    leading, others = near[:_COMPARED], near[_COMPARED:]
+    contained = [c for c in others if any(set(c.effects) < set(one.effects) for one in leading)]
+    candidates = [found.base, *leading, *contained, *found.freed]
     folds = _folds(case.split.known)
     known = [case.on_known(candidate) for candidate in candidates]
     jobs = [(fit, fold) for fit in known for fold in folds]

@@ -11,6 +11,8 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.search import Search
 from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Workers
+from lacuna.estimation.fit import fit
+from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
 
 NOISE = 0.2
@@ -71,6 +73,31 @@ def test_each_record_is_predicted_by_the_mean_of_the_others():
 def test_it_is_due_where_nothing_is_repeated():
     assert is_due(case_of(1, 5))
     assert not is_due(case_of(1, 5, condition="same"))
+
+
+def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_with_it():
+    """A library of decoys: pairs of the right effect with each of them may all be a little cheaper than it alone."""
+    decoys = [Effect(f"decoy_{k}", Parameter("per_x", "", 0.5, -5.0, 5.0)) for k in range(12)]
+
+    def with_decoys(record, theta):
+        tilts = sum(theta[f"decoy_{k}.per_x"] * np.sin((k + 1) * record["x"]) for k in range(12))
+        return {"y": simulate(record, theta)["y"] + tilts}
+
+    library = [Effect("bend", Parameter("per_x2", "", 0.5, -5.0, 5.0)), *decoys]
+    told = with_records(
+        lacuna.System(with_decoys, system().parameters, library, sensor_noise={"y": NOISE}), records(3, 7, bend=0.6)
+    )
+    case = Case(told, split_trials(told.trials), POLICY, 0)
+    base = case.judge(case.fit_base(1))
+    floor, known = base.fitted.problem.floor, case.split.fit
+    sets = [(), ("bend",), *(("bend", decoy.name) for decoy in decoys)]
+    tried = [case.judge(fit(Structure(told, effects), known, floor)) for effects in sets]
+    alone, pairs = tried[1], tried[2:]
+    assert sum(pair.fitted.cost < alone.fitted.cost for pair in pairs) == 12
+    for pair in pairs:  # whatever their parameters cost them
+        pair.__dict__["cost"] = min(pair.cost, alone.cost - 1e-3)
+    found = cross_fitted(case, Search(tried[0], floor, tuple(tried), ()), Workers(lambda _: None))
+    assert found.with_effects(("bend",)) is not None
 
 
 def test_the_names_do_not_depend_on_the_order_of_the_records():
