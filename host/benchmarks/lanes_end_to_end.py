@@ -1,33 +1,38 @@
-"""What the lanes buy whoever runs a command: each with them and in numba alone, first run (empty cache) included.
+"""What the lanes buy whoever runs a command, at equal work: each simulation is made in lanes, and again in numba alone.
 
     python -m benchmarks.lanes_end_to_end [--only TASK] [--seed 7]
 
-The data set is a sealed one with a single effect of the library (`python -m virtual_robot.sealed --seed 7`). Processor
-seconds of the command and its workers: what else runs on the machine counts little; wall seconds beside them.
+The search goes by the lanes' results, so that both did the same; left to itself, a fit of a model that is wrong ends
+elsewhere after the least difference. The data set is a sealed one with a single effect of the library (`python -m
+virtual_robot.sealed --seed 7`). Processor seconds of the command and its workers: what else runs on the machine counts
+little.
 """
 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
-TASKS = ("first run", "fit", "robust gait", "diagnosis")  # in this order: the gait is sought on the fitted model
-_WITHOUT = {"BIFA_LANES": "0"}
+from bifa.__main__ import main as bifa
+from bifa.simulate import lanes
 
-
-class Cost(NamedTuple):
-    processor_s: float
-    wall_s: float
-
-    def __str__(self) -> str:
-        return f"{self.processor_s:.1f}, {self.wall_s:.1f}"
+TASKS = ("fit", "robust gait", "diagnosis", "first run")  # in this order: the gait is sought on the fitted model
+_ALONE_M = 1e-6  # of derivatives: robots that do not share their steps need shorter ones
+_FORK = multiprocessing.get_context("fork")
+_COMPILE = "import numpy as np; from bifa import robot, simulate; simulate.walk(robot.nominal(), robot.BASELINE, 1)"
+_COMPILE += "; t = np.arange(3) / 10; simulate.anchor_pull(robot.nominal(), t, 20.0, 8.5)"
+_COMPILE += "; simulate.step_response(robot.nominal(), 'large')"
+_COMPILE += "; simulate.static_loading(robot.nominal(), 'large', t, t, 0.0)"
 
 
 def main() -> int:
@@ -37,41 +42,90 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=7)
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        day = Path(scratch) / "day"
+        day, model = Path(scratch) / "day", str(Path(scratch) / "model.toml")
         command = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(chosen.seed), "--out", str(day)]
         subprocess.run([*command, "--kind", "one"], check=True, stdout=subprocess.DEVNULL)
-        print("| task | lanes: processor, wall, s | numba alone: processor, wall, s | ratio: processor, wall |")
-        print("|---|---|---|---|")
-        for task in TASKS:
-            if chosen.only in (None, task) or (task == "fit" and chosen.only == "robust gait"):
-                lanes, numba = (_measured(task, Path(scratch), day, switch) for switch in ({}, _WITHOUT))
-                ratio = Cost(numba.processor_s / lanes.processor_s, numba.wall_s / lanes.wall_s)
-                print(f"| {task} | {lanes} | {numba} | {ratio} |", flush=True)
+        subprocess.run([sys.executable, "-c", _COMPILE], env=os.environ | {"BIFA_LANES": "0"}, check=True)
+        commands = {
+            "fit": ["fit", str(day), "--out", model],
+            "robust gait": ["optimize", "--model", model, "--out", str(Path(scratch) / "gait.toml")],
+            "diagnosis": ["diagnose", str(day), "--json", str(Path(scratch) / "verdict.json")],
+        }
+        print("| task | with lanes, s | of it simulating | numba alone, s | of it simulating | ratio |")
+        print("|---|---|---|---|---|---|")
+        for task, words in commands.items():
+            if chosen.only in (None, task) or (task == "fit" and chosen.only in ("robust gait", "first run")):
+                used, in_lanes, in_numba = _measured(words)
+                both = used - in_numba, used - in_lanes
+                _print(task, both[0], f"{in_lanes:.1f}", both[1], f"{in_numba:.1f}")
+                if task == "fit":
+                    fitted = both
+        if chosen.only in (None, "first run"):
+            compiled = [_compiling(switch) for switch in ("1", "0")]
+            first = [alone + more for alone, more in zip(fitted, compiled, strict=True)]
+            _print("first run (a fit, and compiling)", first[0], "", first[1], "")
     return 0
 
 
-def _measured(task: str, scratch: Path, day: Path, switch: Mapping[str, str]) -> Cost:
-    """Of a task's command, in a process of its own; all but the first run with what was compiled before."""
-    environment = os.environ | switch
-    command = {
-        "first run": ["fit", str(day), "--out", str(scratch / "first.toml")],
-        "fit": ["fit", str(day), "--out", str(scratch / "model.toml")],
-        "robust gait": ["optimize", "--model", str(scratch / "model.toml"), "--out", str(scratch / "gait.toml")],
-        "diagnosis": ["diagnose", str(day), "--json", str(scratch / "verdict.json")],
-    }[task]
-    with tempfile.TemporaryDirectory() as empty:
-        if task == "first run":
-            environment["BIFA_CACHE_DIR"] = empty
-        begun = time.perf_counter()
-        process = subprocess.Popen(
-            [sys.executable, "-m", "bifa", *command], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-        )
-        said = process.stderr.read().decode() if process.stderr else ""
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"{task}: {said}")
-    return Cost(used.ru_utime + used.ru_stime, time.perf_counter() - begun)
+def _print(task: str, with_lanes: float, simulating: str, alone: float, simulating_alone: str) -> None:
+    ratio = f"{alone / with_lanes:.1f}"
+    print(f"| {task} | {with_lanes:.1f} | {simulating} | {alone:.1f} | {simulating_alone} | {ratio} |", flush=True)
+
+
+def _measured(words: Sequence[str]) -> tuple[float, float, float]:
+    """Processor seconds of a command, all its simulations made twice; and of these in lanes and in numba."""
+    times = _FORK.Array("d", 2)
+    with _used() as used:
+        process = _FORK.Process(target=_command, args=(words, times))
+        process.start()
+        process.join()
+    if process.exitcode:
+        raise RuntimeError(f"bifa {' '.join(words)} ended with status {process.exitcode}")
+    return used[0], times[0], times[1]
+
+
+@contextmanager
+def _used() -> Iterator[list[float]]:
+    """Processor seconds of the processes that end within."""
+    spent: list[float] = []
+    before = os.times()
+    yield spent
+    after = os.times()
+    spent.append(after.children_user + after.children_system - before.children_user - before.children_system)
+
+
+def _command(words: Sequence[str], times: Any) -> None:
+    march, load = lanes.march, lanes.load
+
+    def timed(k: int, function: Callable[..., Any], *given: Any) -> Any:
+        begun = time.thread_time()
+        found = function(*given)
+        with times.get_lock():
+            times[k] += time.thread_time() - begun
+        return found
+
+    def marched_twice(plants: Sequence[Any], what: lanes.Experiment, together: bool) -> Any:
+        alone = replace(what, tolerance_m=min(what.tolerance_m, _ALONE_M)) if together else what
+        timed(1, lambda: [lanes.in_numba(alone, k, plant) for k, plant in enumerate(plants)])
+        return timed(0, march, plants, what, together)
+
+    def loaded_twice(*given: Any) -> Any:
+        timed(1, lanes.load_in_numba, *given)
+        return timed(0, load, *given)
+
+    lanes.march, lanes.load = marched_twice, loaded_twice  # type: ignore[assignment]
+    sys.argv = ["bifa", *words]
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        sys.stdout = nowhere
+        bifa()
+
+
+def _compiling(switch: str) -> float:
+    """Processor seconds that a first simulation of each kind takes with an empty cache."""
+    with tempfile.TemporaryDirectory() as empty, _used() as used:
+        environment = os.environ | {"BIFA_LANES": switch, "BIFA_CACHE_DIR": empty}
+        subprocess.run([sys.executable, "-c", _COMPILE], env=environment, check=True, stderr=subprocess.DEVNULL)
+    return used[0]
 
 
 if __name__ == "__main__":

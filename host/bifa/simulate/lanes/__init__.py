@@ -92,12 +92,18 @@ def load(
     """Rows (2, samples) of each robot's static loading: force in N, reading in psi."""
     found = _kernels_for(plants)
     if found is None:
-        size = layout.state_size()
-        return [
-            entries.static_record(sealed_plant(plant), rig, size, path, sample_s).T
-            for plant, rig, path in zip(plants, rigs, paths_m, strict=True)
-        ]
+        return load_in_numba(plants, rigs, paths_m, sample_s)
     return found[len(plants) < _WORTH_LANES].load(plants, rigs, paths_m, sample_s)
+
+
+def load_in_numba(
+    plants: Sequence[Plant], rigs: Sequence[Mounting], paths_m: Sequence[np.ndarray], sample_s: np.ndarray
+) -> list[np.ndarray]:
+    size = layout.state_size()
+    return [
+        entries.static_record(sealed_plant(plant), rig, size, path, sample_s).T
+        for plant, rig, path in zip(plants, rigs, paths_m, strict=True)
+    ]
 
 
 def sealed_plant(plant: Plant) -> Plant:

@@ -14,14 +14,7 @@ typedef __m512d V;
 typedef __mmask8 Mask;
 typedef __m512i Bits;
 MERGED V splat(double x) { return _mm512_set1_pd(x); }
-#define COMPARISON(name, how) \
-    MERGED Mask name(V a, V b) { return _mm512_cmp_pd_mask(a, b, how); }
-COMPARISON(lt, _CMP_LT_OQ)
-COMPARISON(le, _CMP_LE_OQ)
-COMPARISON(gt, _CMP_GT_OQ)
-COMPARISON(ge, _CMP_GE_OQ)
-COMPARISON(eq, _CMP_EQ_OQ)
-COMPARISON(ne, _CMP_NEQ_UQ)
+#define COMPARED(a, sign, b, predicate) _mm512_cmp_pd_mask(a, b, predicate)
 MERGED Mask and_(Mask a, Mask b) { return (Mask)(a & b); }
 MERGED Mask or_(Mask a, Mask b) { return (Mask)(a | b); }
 MERGED Mask not_(Mask a) { return (Mask)~a; }
@@ -49,14 +42,7 @@ MERGED V v_scaled(V x, V power) { return _mm512_scalef_pd(x, power); }
 typedef __m256d V;
 typedef __m256d Mask;
 MERGED V splat(double x) { return _mm256_set1_pd(x); }
-#define COMPARISON(name, how) \
-    MERGED Mask name(V a, V b) { return _mm256_cmp_pd(a, b, how); }
-COMPARISON(lt, _CMP_LT_OQ)
-COMPARISON(le, _CMP_LE_OQ)
-COMPARISON(gt, _CMP_GT_OQ)
-COMPARISON(ge, _CMP_GE_OQ)
-COMPARISON(eq, _CMP_EQ_OQ)
-COMPARISON(ne, _CMP_NEQ_UQ)
+#define COMPARED(a, sign, b, predicate) _mm256_cmp_pd(a, b, predicate)
 MERGED Mask and_(Mask a, Mask b) { return _mm256_and_pd(a, b); }
 MERGED Mask or_(Mask a, Mask b) { return _mm256_or_pd(a, b); }
 MERGED Mask andnot(Mask a, Mask b) { return _mm256_andnot_pd(a, b); }
@@ -87,14 +73,7 @@ typedef double V;
 typedef int Mask;
 typedef int64_t Bits;
 MERGED V splat(double x) { return x; }
-#define COMPARISON(name, sign) \
-    MERGED Mask name(V a, V b) { return a sign b; }
-COMPARISON(lt, <)
-COMPARISON(le, <=)
-COMPARISON(gt, >)
-COMPARISON(ge, >=)
-COMPARISON(eq, ==)
-COMPARISON(ne, !=)
+#define COMPARED(a, sign, b, predicate) (a sign b)
 MERGED Mask and_(Mask a, Mask b) { return a & b; }
 MERGED Mask or_(Mask a, Mask b) { return a | b; }
 MERGED Mask not_(Mask a) { return !a; }
@@ -122,14 +101,7 @@ typedef double V __attribute__((vector_size(8 * LANES)));
 typedef int64_t Mask __attribute__((vector_size(8 * LANES)));
 typedef Mask Bits;
 MERGED V splat(double x) { return x - (V){0}; }
-#define COMPARISON(name, sign) \
-    MERGED Mask name(V a, V b) { return a sign b; }
-COMPARISON(lt, <)
-COMPARISON(le, <=)
-COMPARISON(gt, >)
-COMPARISON(ge, >=)
-COMPARISON(eq, ==)
-COMPARISON(ne, !=)
+#define COMPARED(a, sign, b, predicate) (a sign b)
 MERGED Mask and_(Mask a, Mask b) { return a & b; }
 MERGED Mask or_(Mask a, Mask b) { return a | b; }
 MERGED Mask not_(Mask a) { return ~a; }
@@ -161,10 +133,19 @@ EACH(v_ceil, ceil)
 EACH(v_nearest, nearbyint)
 MERGED V v_fma(V a, V b, V c) { return a * b + c; }
 MERGED V v_fabs(V x) { return (V)((Mask)x & (all_lanes() ^ (Mask)splat(-0.0))); }
-MERGED V v_max(V a, V b) { return sel(gt(b, a), b, a); }
-MERGED V v_min(V a, V b) { return sel(lt(b, a), b, a); }
+MERGED V v_max(V a, V b) { return sel(b > a, b, a); }
+MERGED V v_min(V a, V b) { return sel(b < a, b, a); }
 #define POWER_BY_BITS
 #endif
+
+#define COMPARISON(name, sign, predicate) \
+    MERGED Mask name(V a, V b) { return COMPARED(a, sign, b, predicate); }
+COMPARISON(lt, <, _CMP_LT_OQ)
+COMPARISON(le, <=, _CMP_LE_OQ)
+COMPARISON(gt, >, _CMP_GT_OQ)
+COMPARISON(ge, >=, _CMP_GE_OQ)
+COMPARISON(eq, ==, _CMP_EQ_OQ)
+COMPARISON(ne, !=, _CMP_NEQ_UQ)
 
 #if LANES == 1
 MERGED double at_lane(V x, int i) { return (void)i, x; }
