@@ -9,8 +9,7 @@ from bifa.link.errors import AbandonedError
 from bifa.link.leaving import uninterrupted
 from bifa.link.terminal import settle, type_line
 from bifa.live.completion import Known
-from bifa.live.latest import Latest
-from bifa.live.pace import Pace
+from bifa.live.rounds import Latest, Pace
 from bifa.rig import Rig
 
 WAIT_S = 0.02

@@ -11,8 +11,7 @@ from rich.text import Text
 
 from bifa.link import Clock, Sample, Uno
 from bifa.link.table import CHAMBERS
-from bifa.live.latest import Latest
-from bifa.live.pace import Pace
+from bifa.live.rounds import Latest, Pace
 from bifa.live.trace import Trace
 from bifa.screen import Console
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from bifa.link import Clock, LinkError, Uno
 from bifa.link.table import CHAMBERS
-from bifa.live.pace import Pace
+from bifa.live.rounds import Pace
 
 LOOK_EVERY_S = 0.5
 

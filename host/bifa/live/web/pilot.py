@@ -15,8 +15,7 @@ from bifa.errors import BifaError
 from bifa.link import Clock, LinkError, Sample, StillMovingError, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.cycle_speed import CycleSpeed
-from bifa.live.latest import Latest
-from bifa.live.pace import Pace
+from bifa.live.rounds import Latest, Pace
 
 REPORT_S = 0.1
 MOST_ASKED = 16

@@ -1,0 +1,44 @@
+"""What a live view asks in each round: is the rig in step with the wall clock, and is the newest sample new?"""
+
+import time
+
+from bifa.link import Clock, Sample
+
+LARGEST_LAG_S = 0.2
+STALE_S = 1.0
+
+
+class Pace:
+    """Keeps a rig in step with the wall clock: a virtual rig waits for it, a real one is in step by itself. Call `wait`
+    once a round."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._lead_s = clock.now() - time.monotonic()
+
+    def wait(self) -> None:
+        """Sleep until the wall clock has caught up; time lost by a slow computer is not made up."""
+        ahead_s = self._clock.now() - time.monotonic() - self._lead_s
+        if ahead_s > 0:
+            time.sleep(ahead_s)
+        elif ahead_s < -LARGEST_LAG_S:
+            self._lead_s += ahead_s
+
+
+class Latest:
+    """The newest sample (None until the first), and how old it is: nothing may look live that is not."""
+
+    def __init__(self) -> None:
+        self.sample: Sample | None = None
+        self._taken_s = time.monotonic()
+
+    def take(self, samples: list[Sample]) -> None:
+        """Keep the last one."""
+        if samples:
+            self.sample, self._taken_s = samples[-1], time.monotonic()
+
+    @property
+    def warning(self) -> str:
+        """A warning if telemetry has stopped; empty while it flows."""
+        silence_s = time.monotonic() - self._taken_s
+        return f"no telemetry for {silence_s:.0f} s" if silence_s > STALE_S else ""
