@@ -135,9 +135,9 @@ def _cautioned(
     whether it is noise. What is advised is tried first: it is no advice where it would take a name away."""
     levels = found.search.floor.channels
     doubted = [
-        f"No explanation comes near the floor of {channel} in {experiment} ({floor:.3g}), so doubt the floor before the"
-        f" model; a repeat would tell. They were compared at a floor of {levels[experiment, channel].sd:.3g}, a"
-        " fraction of the best one's residual."
+        f"No explanation comes near the floor of {channel}{_within(experiment, levels)} ({floor:.3g}), so doubt the"
+        f" floor before the model; a repeat would tell. They were compared at a floor of"
+        f" {levels[experiment, channel].sd:.3g}, a fraction of the best one's residual."
         for (experiment, channel), floor in raised.items()
     ]
     left_s = left_over_s(found) if found.left.matters and not raised else {}
@@ -155,6 +155,10 @@ def _cautioned(
         for channel, seconds in advised.items()
     ]
     return replace(found, warnings=(*doubted, *found.warnings, *said)) if said or doubted else found
+
+
+def _within(experiment: str, levels: Mapping[tuple[str, str], Any]) -> str:
+    return f" in {experiment}" if len({key[0] for key in levels}) > 1 else ""
 
 
 def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:

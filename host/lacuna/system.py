@@ -150,11 +150,11 @@ class Record:
     clock: str = ""
 
     def __getitem__(self, name: str) -> Any:
-        """An input or else a measured channel; KeyError says what there is."""
-        for columns in (self.inputs, self.channels):
-            if name in columns:
-                return columns[name]
-        raise KeyError(f"{name}: record {self.name} has {', '.join([*self.inputs, *self.channels]) or 'none'}")
+        """An input, a measured channel, or `time_s`; KeyError says what there is."""
+        columns = {"time_s": self.time_s, **self.channels, **self.inputs}
+        if name not in columns:
+            raise KeyError(f"{name}: record {self.name} has {', '.join(columns)}")
+        return columns[name]
 
     def __repr__(self) -> str:
         return f"Record({self.name!r}, {len(self.time_s)} samples of {', '.join(self.channels)})"

@@ -13,9 +13,16 @@ from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.cross_fit import CrossFitted, cross_fitted, is_due
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of, weigh
-from lacuna.diagnosis.doubts import but_too_little, doubts, follow_in_words, followed_by_nothing, not_predicted
+from lacuna.diagnosis.doubts import (
+    but_too_little,
+    doubts,
+    follow_in_words,
+    followed_by_nothing,
+    not_predicted,
+    perhaps_absent,
+)
 from lacuna.diagnosis.drift import Drift, find_drift
-from lacuna.diagnosis.eliminate import eliminate
+from lacuna.diagnosis.eliminate import eliminate, may_be_absent
 from lacuna.diagnosis.explain_nuisances import explain_nuisances
 from lacuna.diagnosis.learn import holds, learn_correction
 from lacuna.diagnosis.named import Estimated, Named, Nearest, describe_base, describe_effects, lost_without, nearest
@@ -249,7 +256,9 @@ def _doubts(
         return not_predicted(judged.base, case.split, errors[0], judged.floor, case.policy)
     if not effects:
         return but_too_little(choice, case.split, judged.tested) if choice.candidate.effects else []
-    return doubts(choice, case.split, judged.tested, case.policy)
+    within, library = case.intervals(choice.candidate), case.system.effects
+    absent = [name for name in choice.candidate.effects if may_be_absent(library[name], within)]
+    return [*doubts(choice, case.split, judged.tested, case.policy), *perhaps_absent(absent)]
 
 
 def _reported(

@@ -62,6 +62,15 @@ def doubts(choice: Choice, split: Split, tested: float | None, policy: Policy) -
     return said
 
 
+def perhaps_absent(names: Sequence[str]) -> list[str]:
+    """Of named effects with an interval that says little."""
+    return [
+        f"The interval of {name} holds the size at which it is absent: conditions disagree about how large it is,"
+        " though without it what was not fitted is predicted worse."
+        for name in names
+    ]
+
+
 def follow_in_words(followed: Sequence[Followed]) -> str:
     """Nuisances that follow the condition, as a clause."""
     each = [f"{100 * one.share:.0f} % of the variance of {one.nuisance}" for one in followed]

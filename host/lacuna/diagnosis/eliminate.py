@@ -28,7 +28,7 @@ def eliminate(case: Case, found: Search, choice: Choice) -> tuple[Search, Choice
 
 def _without_absent(case: Case, found: Search, choice: Choice, effect: str) -> Candidate | None:
     """The choice without an effect whose interval holds the value at which it is absent, if that explains no less."""
-    if not _may_be_absent(case.system.effects[effect], case.intervals(choice.candidate)):
+    if not may_be_absent(case.system.effects[effect], case.intervals(choice.candidate)):
         return None
     rest = _others(choice, effect)
     refitted = refitted_without(choice.candidate, rest, case.split)
@@ -58,5 +58,6 @@ def _others(choice: Choice, effect: str) -> tuple[str, ...]:
     return tuple(e for e in choice.candidate.effects if e != effect)
 
 
-def _may_be_absent(effect: Effect, within: dict[str, tuple[float, float]]) -> bool:
+def may_be_absent(effect: Effect, within: dict[str, tuple[float, float]]) -> bool:
+    """Whether the intervals hold the sizes at which an effect is absent."""
     return all(within[name][0] <= effect.absent <= within[name][1] for name in effect.size_names)

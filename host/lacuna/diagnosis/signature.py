@@ -58,7 +58,7 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
         experiments,
         tuple(depends_on),
         tuple(dependences),
-        _sentence(places, remainder, dependences, drifts, unshared, repeated=_repeated(fitted)),
+        _sentence(places, remainder, dependences, drifts, unshared, fitted),
     )
 
 
@@ -145,11 +145,16 @@ def _cells(
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
-def _cannot_tell(remainder: Remainder) -> str:
+def _within(experiment: str, fitted: Fit) -> str:
+    """Where something is, unless all is there."""
+    return f" in {experiment}" if len({t.experiment for t in fitted.problem.trials}) > 1 else ""
+
+
+def _cannot_tell(remainder: Remainder, fitted: Fit) -> str:
     """Where that nothing was found does not say that nothing is missing."""
     if not (most := remainder.cannot_tell):
         return ""
-    each = ", ".join(f"{size:.1f} x the floor in {experiment}" for experiment, size in list(most.items())[:3])
+    each = ", ".join(f"{size:.1f} x the floor{_within(e, fitted)}" for e, size in list(most.items())[:3])
     return (
         f" That does not say that nothing is missing: as much as {each} could not be told from chance."
         " More repeats would tell."
@@ -162,24 +167,22 @@ def _sentence(
     dependences: Sequence[Dependence],
     drifts: Sequence[Drift],
     unshared: str,
-    *,
-    repeated: bool,
+    fitted: Fit,
 ) -> str:
+    repeated = _repeated(fitted)
     if not places and not drifts and not unshared:
         known = "the differences between repeats" if repeated else "the noise"
-        return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder)}"
+        return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder, fitted)}"
     parts = []
     if places:
-        listed = ", ".join(
-            f"{channel} in {experiment} ({np.sqrt(max(remainder.shared[experiment, channel], 0)):.1f} x the floor)"
-            for experiment, channel in places[:4]
-        )
+        times = {place: np.sqrt(max(remainder.shared[place], 0)) for place in places[:4]}
+        listed = ", ".join(f"{c}{_within(e, fitted)} ({size:.1f} x the floor)" for (e, c), size in times.items())
         left = "Repeats share a residual" if repeated else "A residual is left"
         parts.append(f"{left} that the model does not explain: {listed}.")
     for d in dependences[:2]:
         parts.append(
-            f"In {d.experiment}, {' and '.join(d.quantities)} explain{'s' if len(d.quantities) == 1 else ''} "
-            f"{100 * d.share:.0f} % of the residual variance of {d.channel}."
+            f"{100 * d.share:.0f} % of the residual variance of {d.channel}{_within(d.experiment, fitted)} follows"
+            f" {' and '.join(d.quantities)}."
         )
     if places and not dependences:
         parts.append("No single quantity of the model explains it.")

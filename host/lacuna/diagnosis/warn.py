@@ -9,7 +9,7 @@ from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.structure import is_learnt
-from lacuna.estimation.uncertainty import uncertainty
+from lacuna.estimation.uncertainty import Estimate, uncertainty
 from lacuna.system import Parameter
 
 _NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably absorbs model error
@@ -38,7 +38,8 @@ def _parameters(fitted: Fit) -> list[str]:
     known = uncertainty(fitted)
     told = fitted.structure.system.told
     found = [
-        f"{e.name} is at its bound ({_quantity(told(e.name, e.value), e.unit)}): widen it if it is no physical limit."
+        f"{e.name} is at its bound ({_quantity(told(e.name, _bound(fitted, e)), e.unit)}): widen it if it is no"
+        " physical limit."
         for e in known.estimates
         if e.at_bound
     ]
@@ -91,6 +92,14 @@ class _Run(NamedTuple):
     def away(self) -> float:
         """From what is expected, in standard deviations."""
         return (self.value - self.nuisance.value) / self.nuisance.step_scale
+
+
+def _bound(fitted: Fit, at: Estimate) -> float:
+    """The bound that stopped it; where that is another parameter, the value."""
+    parameter = fitted.structure.parameters[fitted.structure.names.index(at.name)]
+    if parameter.at_least:
+        return at.value
+    return min((parameter.lower, parameter.upper), key=lambda bound: abs(at.value - bound))
 
 
 def _combined(names: list[str]) -> str:

@@ -82,7 +82,7 @@ def test_the_completed_model_knows_every_record(verdict):
 
 
 def test_a_record_that_lacks_an_input_is_refused_by_the_completed_model(verdict):
-    with pytest.raises(lacuna.LacunaError, match="finds no power_W: record record 1 has none"):
+    with pytest.raises(lacuna.LacunaError, match="finds no power_W: record record 1 has time_s"):
         verdict.model({"time_s": heater.TIME_S})
 
 
