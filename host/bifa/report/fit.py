@@ -7,7 +7,6 @@ from bifa.printable import counted
 from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
-from bifa.report.identification_remarks import AS_NOISE, remarks
 from bifa.report.page import ChartedSection, Page, Table
 from bifa.report.words import (
     channel_words,
@@ -19,6 +18,8 @@ from bifa.report.words import (
     unit_of,
 )
 
+_CORRELATED = 0.9
+AS_NOISE = 1.1  # an error of so many times the noise is noise
 _OF_REPEATS = (
     "Here it holds all that differs from run to run, also what an effect would explain (a ripple, its phase another in "
     "every run); a diagnosis takes that out of it, so that its ratios are larger."
@@ -53,6 +54,35 @@ def parameters_and_remarks(found: Identification) -> list[ChartedSection]:
         ChartedSection("Parameters", tables=[_parameters(found)]),
         ChartedSection("Notes", [spoken(line) for line in remarks(found)]),
     ]
+
+
+def remarks(found: Identification) -> list[str]:
+    """Sentences on the curves, correlations, and what the data do not determine."""
+    lines = []
+    for actuator, static in found.statics.items():
+        curve = static.stiffness
+        lines.append(
+            f"Stiffness of the {actuator} actuator: unstable point at {curve.unstable_m() * 1e3:.2f} mm, hysteresis "
+            f"+-{abs(static.hysteresis_N):.2f} N, static residual {curve.residual_N:.2f} N RMS."
+        )
+    named = set(found.system.fitted)
+    for first, second, r in found.uncertainty.correlations(_CORRELATED):
+        if first in named and second in named:
+            lines.append(f"{first} and {second} are strongly correlated ({r:+.2f}).")
+    needs: dict[str, list[str]] = {}
+    for missing in found.open:
+        needs.setdefault(missing.needs, []).append(missing.name)
+    for experiment, names in needs.items():
+        lines.append(f"Not determined by this data: {', '.join(names)}. What would determine it: {experiment}.")
+    (experiment, channel), worst = max(found.error.items(), key=lambda item: item[1])
+    if worst > AS_NOISE:
+        lines.append(
+            f"The model does not describe this data: its error is {worst:.1f} times the noise in {channel} of "
+            f"{experiment}. The intervals do not allow for that; `bifa diagnose` looks for what the model lacks."
+        )
+    if not found.fit.solution.converged:
+        lines.append("The joint fit did not converge: treat the intervals with caution.")
+    return lines
 
 
 def _parameters(found: Identification) -> Table:

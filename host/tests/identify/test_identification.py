@@ -13,9 +13,8 @@ from bifa.data import Dataset
 from bifa.identify.estimate import IntervalEstimate
 from bifa.identify.identification import identify
 from bifa.problem.unmeasured import PRIOR_SD
-from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
+from bifa.report.fit import errors_table, fit_page, parameters_and_remarks, remarks
 from bifa.report.identification import draw
-from bifa.report.identification_remarks import remarks
 from bifa.report.page import render
 from bifa.report.terminal import print_sections, print_table
 from bifa.robot import load_model, save_model
