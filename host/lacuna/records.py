@@ -30,7 +30,7 @@ class RecordError(LacunaError):
 
 
 @dataclass(frozen=True)
-class RawRecord:
+class Table:
     """One record before it is known which of its columns are outputs. `labels`: of `_LABELS` those that it has.
     `clock`: the column that the times came from."""
 
@@ -57,7 +57,7 @@ class RawRecord:
         )
 
 
-def read(data: Any) -> list[Record | RawRecord]:
+def read(data: Any) -> list[Record | Table]:
     """Records from any of
 
     - one record or a sequence of them, or a mapping from names to them, each a mapping from columns to arrays, a pandas
@@ -74,7 +74,7 @@ def read(data: Any) -> list[Record | RawRecord]:
     """
     if isinstance(data, str | Path):
         return _folder(Path(data))
-    if isinstance(data, Record | RawRecord):
+    if isinstance(data, Record | Table):
         return [data]
     if _is_table(data):
         return [_table(part, name) for name, part in _parts(data)]
@@ -90,8 +90,8 @@ def read(data: Any) -> list[Record | RawRecord]:
     raise RecordError(f"records cannot be read from {type(data).__name__}: give arrays, tables or a folder of CSV.")
 
 
-def _one_of_many(one: Any, place: int) -> list[Record | RawRecord]:
-    if isinstance(one, Record | RawRecord):
+def _one_of_many(one: Any, place: int) -> list[Record | Table]:
+    if isinstance(one, Record | Table):
         return [one]
     return [_table(one, f"record {place + 1}")]
 
@@ -128,11 +128,11 @@ def _parts(data: Any) -> list[tuple[str, Any]]:
     return [("record 1", data)]
 
 
-def _table(data: Any, name: str) -> Record | RawRecord:
+def _table(data: Any, name: str) -> Record | Table:
     return data if isinstance(data, Record) else _of_columns(data, name)
 
 
-def _of_columns(data: Any, name: str) -> RawRecord:
+def _of_columns(data: Any, name: str) -> Table:
     columns, labels, time_s = _columns(data, name)
     for label in _LABELS:
         if label in columns:
@@ -144,7 +144,7 @@ def _of_columns(data: Any, name: str) -> RawRecord:
         raise RecordError(f"record {name} has no times: give a column time_s, in seconds. It has {_listed(columns)}.")
     name = str(labels.get("name", name))
     inputs = {n: _own(c, name, n) for n, c in columns.items()}
-    return RawRecord(name, _seconds(time_s, name) / _TIMES.get(clock, 1), inputs, labels, clock)
+    return Table(name, _seconds(time_s, name) / _TIMES.get(clock, 1), inputs, labels, clock)
 
 
 def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
@@ -258,7 +258,7 @@ def _whole(order: Any, record: str) -> int | None:
         ) from None
 
 
-def _folder(folder: Path) -> list[Record | RawRecord]:
+def _folder(folder: Path) -> list[Record | Table]:
     if folder.is_file():
         return [_csv(folder)]
     if not folder.exists():
@@ -282,7 +282,7 @@ def _stem(stem: str) -> tuple[str, int | None]:
     return (found[1] or stem, int(found[2])) if found else (stem, None)
 
 
-def _refuse_settings(tables: Mapping[str, RawRecord]) -> None:
+def _refuse_settings(tables: Mapping[str, Table]) -> None:
     """Names that differ by a number are taken for repeats; a number that does not count them may well be a setting,
     whose effect would pass for noise. Raises RecordError."""
     numbers: dict[str, list[int]] = {}
@@ -301,7 +301,7 @@ def _refuse_settings(tables: Mapping[str, RawRecord]) -> None:
             )
 
 
-def _csv(file: Path) -> RawRecord:
+def _csv(file: Path) -> Table:
     columns = numbers_alone(file) or cell_by_cell(file)
     return _of_columns({"condition": _stem(file.stem)[0]} | columns, file.stem)
 
@@ -442,7 +442,7 @@ class Stretch:
 
 def windows(
     data: Any, seconds: float, *, every: float | None = None, period: float | None = None, skip: float = 0.0
-) -> list[RawRecord]:
+) -> list[Table]:
     """One long record cut into windows of `seconds`, each a record with times from 0, and so with its own initial
     state: let `simulate` take it from the window's first samples or from nuisances.
 
@@ -472,11 +472,11 @@ def windows(
         name = _part(table, f"window {place + 1}")
         labels = {**table.labels, "condition": f"from {phase:g} s" if period else name, "order": place}
         columns = {n: c[at] if np.shape(c) == time.shape else c for n, c in table.columns.items()}
-        found.append(RawRecord(name, time[at] - time[at][0], columns, labels))
+        found.append(Table(name, time[at] - time[at][0], columns, labels))
     return found
 
 
-def segments(data: Any, count: int = 10) -> list[RawRecord]:
+def segments(data: Any, count: int = 10) -> list[Table]:
     """One long record as `count` stretches of one free run: each is simulated from the run's beginning to its own end
     and compared on its own samples. For records whose initial state is known only at the start; costs about half of
     `count` times a simulation of the whole. Raises RecordError."""
@@ -492,7 +492,7 @@ def segments(data: Any, count: int = 10) -> list[RawRecord]:
         name = _part(table, f"segment {place + 1}")
         labels = {**table.labels, "condition": name, "order": place, "stretch": (table, first, last)}
         columns = {n: c[first:last] if _along(c, table) else c for n, c in table.columns.items()}
-        found.append(RawRecord(name, table.time_s[first:last], columns, labels))
+        found.append(Table(name, table.time_s[first:last], columns, labels))
     return found
 
 
@@ -505,18 +505,18 @@ def falling(time_s: np.ndarray) -> str:
     return f"time does not increase from sample {at[0]} ({before:g} s) to the next ({after:g} s)"
 
 
-def _increases(table: RawRecord) -> None:
+def _increases(table: Table) -> None:
     """Windows and segments are cut by time. Raises RecordError."""
     if said := falling(table.time_s):
         raise RecordError(f"record {table.name}: {said}: sort it by time, or give its parts one by one.")
 
 
-def _part(table: RawRecord, name: str) -> str:
+def _part(table: Table, name: str) -> str:
     """The name of a part of a record: with the record's own, if it has one, so that parts of several go together."""
     return f"{table.labels['name']}, {name}" if "name" in table.labels else name
 
 
-def stretched(table: RawRecord, record: Record, outputs: Sequence[str]) -> Record:
+def stretched(table: Table, record: Record, outputs: Sequence[str]) -> Record:
     """`record` with the run that it is a stretch of, where it is one."""
     if "stretch" not in table.labels:
         return record
@@ -526,12 +526,12 @@ def stretched(table: RawRecord, record: Record, outputs: Sequence[str]) -> Recor
     return replace(record, payload=Stretch(run, int(first)))
 
 
-def _along(column: Any, table: RawRecord) -> bool:
+def _along(column: Any, table: Table) -> bool:
     return np.shape(column) == table.time_s.shape
 
 
-def _tables(data: Any) -> list[RawRecord]:
-    found = [one for one in read(data) if isinstance(one, RawRecord)]
+def _tables(data: Any) -> list[Table]:
+    found = [one for one in read(data) if isinstance(one, Table)]
     if len(found) != 1:
         raise RecordError("give one long record to be cut.")
     return found

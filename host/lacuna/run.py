@@ -23,7 +23,7 @@ from lacuna.function_system import FunctionSystem
 from lacuna.misfit import compared_at_misfit
 from lacuna.noise_time import left_over_s
 from lacuna.progress import Progress
-from lacuna.records import RawRecord, read, stretched
+from lacuna.records import Table, read, stretched
 from lacuna.system import Record, System
 from lacuna.verdict import Verdict
 
@@ -172,13 +172,13 @@ def with_records(system: System, records: Any) -> FunctionSystem:
     if not isinstance(system, FunctionSystem):
         raise MisuseError(f"{type(system).__name__} already has trials: call diagnose(system) without records.")
     given = read(records)
-    tables = [one for one in given if isinstance(one, RawRecord)]
+    tables = [one for one in given if isinstance(one, Table)]
     outputs = system.outputs or (_outputs(system, tables[0]) if tables else ())
     trials = [one if isinstance(one, Record) else stretched(one, one.record(outputs), outputs) for one in given]
     return system.with_trials(trials)
 
 
-def _outputs(system: FunctionSystem, table: RawRecord) -> Sequence[str]:
+def _outputs(system: FunctionSystem, table: Table) -> Sequence[str]:
     """The names that `simulate` gives its outputs, tried on one record. Raises MisuseError."""
     record = stretched(table, table.record(()), ())
     run = record.payload.run if record.payload else record

@@ -26,7 +26,7 @@ from bifa.report.diagnosis import (
     verdict_sentence,
 )
 from bifa.report.evidence import BASE, COMPLETED, errors_chart
-from bifa.report.page import ChartedSection, Motion, Page, Table
+from bifa.report.page import ChartedSection, Motion, Page, PageTable
 from bifa.report.residuals import residual_charts
 from bifa.report.robustness import STANDING_MM_S, robustness_chart, standing_share
 from bifa.report.walks import MEASURED, Walk, walks_chart
@@ -213,7 +213,7 @@ def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSect
         ]
         for name, speeds in summary["robustness"].items()
     ]
-    table = Table(
+    table = PageTable(
         ["gait", "median, mm/s", "nine in ten reach, mm/s", "do not walk"],
         rows,
         f"Each gait on {robots} variants of the completed model, every parameter with 2 % relative spread (one "
@@ -255,7 +255,7 @@ def rounds_section(rounds: Sequence[Mapping[str, Any]]) -> ChartedSection:
         *(f"Round {number}: {_round_words(one)}." for number, one in enumerate(rounds, 1)),
         f"It ended after round {len(rounds)}: {_ENDED[rounds[-1]['ended']]}.",
     ]
-    return ChartedSection("Gaits that no fit has seen", said, [Table(columns, rows, caption)])
+    return ChartedSection("Gaits that no fit has seen", said, [PageTable(columns, rows, caption)])
 
 
 def _round_words(one: Mapping[str, Any]) -> str:
@@ -263,7 +263,7 @@ def _round_words(one: Mapping[str, Any]) -> str:
     return f"the model has {added} added to it, its gait is {gait_words(one['gait'])}"
 
 
-def speed_table(gaits: Sequence[Mapping[str, Any]]) -> Table:
+def speed_table(gaits: Sequence[Mapping[str, Any]]) -> PageTable:
     """Predicted and measured speeds of the gaits."""
     rows = [
         [
@@ -276,7 +276,7 @@ def speed_table(gaits: Sequence[Mapping[str, Any]]) -> Table:
         for gait in gaits
     ]
     columns = ["gait, speed in mm/s", "base model predicts", "completed model predicts", "measured", "in the paper"]
-    return Table(columns, rows, strong_row=len(rows) - 1)
+    return PageTable(columns, rows, strong_row=len(rows) - 1)
 
 
 def _interval(prediction: Mapping[str, Any]) -> str:
@@ -284,7 +284,7 @@ def _interval(prediction: Mapping[str, Any]) -> str:
     return f"({low:.2f} to {high:.2f}; {prediction['walks_probability']:.2f})"
 
 
-def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = None) -> Table:
+def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = None) -> PageTable:
     """Errors before and after in the units of the instruments, against the floor; `only`: "fitted" or "held-out"."""
     rows = []
     for error in errors:
@@ -294,4 +294,4 @@ def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = Non
             values = (f"{plain(error[side])}{NBSP}{unit}" for side in ("before", "after", "noise_floor"))
             rows.append([f"{channel_words(error['quantity'])}{which}", *values])
     what = f"RMS error, {only} trials" if only else "RMS error"
-    return Table([what, "base model", "completed model", "noise floor"], rows)
+    return PageTable([what, "base model", "completed model", "noise floor"], rows)

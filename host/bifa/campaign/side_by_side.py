@@ -15,7 +15,7 @@ from bifa.errors import BifaError
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
 from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, RMS, verdict_sentence
 from bifa.report.evidence import before_and_after
-from bifa.report.page import ChartedSection, Page, Table
+from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.words import (
     NBSP,
     channel_words,
@@ -128,22 +128,22 @@ def _speed(run: Campaign, gait: str) -> float:
     return next(g["measured"] for g in run.summary["gaits"] if g["gait"] == gait)
 
 
-def verdict_table(runs: Sequence[Campaign]) -> Table:
+def verdict_table(runs: Sequence[Campaign]) -> PageTable:
     """What each found."""
     rows = []
     for run in runs:
         named = "; ".join(effect_words(e["name"], e["parameters"]) for e in run.summary["effects"])
         rows.append([run.name, run.summary["verdict"], named or "none"])
-    return Table(["run", "verdict", "effects"], rows, words=True)
+    return PageTable(["run", "verdict", "effects"], rows, words=True)
 
 
-def speed_table(runs: Sequence[Campaign]) -> Table:
+def speed_table(runs: Sequence[Campaign]) -> PageTable:
     """Measured speeds of the gaits."""
     rows = [[run.name, *(f"{_speed(run, gait):.2f}" for gait in GAIT_NAMES)] for run in runs]
-    return Table(["measured speed, mm/s", *GAIT_NAMES.values()], rows)
+    return PageTable(["measured speed, mm/s", *GAIT_NAMES.values()], rows)
 
 
-def error_table(runs: Sequence[Campaign]) -> Table:
+def error_table(runs: Sequence[Campaign]) -> PageTable:
     """Errors on held-out trials, before and after, in the units of the instruments."""
     rows = []
     for run in runs:
@@ -152,10 +152,10 @@ def error_table(runs: Sequence[Campaign]) -> Table:
                 unit = unit_of(error["quantity"])
                 values = (f"{plain(error[side])}{NBSP}{unit}" for side in ("before", "after", "noise_floor"))
                 rows.append([f"{run.name}: {channel_words(error['quantity'])}", *values])
-    return Table(["RMS error, held-out trials", "base model", "completed model", "noise floor"], rows)
+    return PageTable(["RMS error, held-out trials", "base model", "completed model", "noise floor"], rows)
 
 
-def parameter_table(runs: Sequence[Campaign]) -> Table:
+def parameter_table(runs: Sequence[Campaign]) -> PageTable:
     """The completed models' parameters; those that differ by more than their uncertainties are marked."""
     models = [run.models["completed"] for run in runs]
     rows = []
@@ -171,7 +171,7 @@ def parameter_table(runs: Sequence[Campaign]) -> Table:
             values = (model.effects.get(effect, {}).get(key) for model in models)
             label = f"{effect_words(effect)}: {meaning}"
             rows.append([label, *("" if v is None else quantity(v, unit, 3) for v in values)])
-    return Table(["parameter", *(run.name for run in runs)], rows)
+    return PageTable(["parameter", *(run.name for run in runs)], rows)
 
 
 def _differ(parameters: Sequence[ModelParameter]) -> bool:
@@ -181,11 +181,11 @@ def _differ(parameters: Sequence[ModelParameter]) -> bool:
     )
 
 
-def gait_table(runs: Sequence[Campaign], which: str) -> Table:
+def gait_table(runs: Sequence[Campaign], which: str) -> PageTable:
     """The parameters of the gaits found with the "base" or the "completed" model."""
     gaits = [run.gaits[which].as_dict() for run in runs]
     rows = [[gait_parameter_words(name), *(plain(gait[name], 3) for gait in gaits)] for name in gaits[0]]
-    return Table([f"gait {GAIT_NAMES[which]}", *(run.name for run in runs)], rows)
+    return PageTable([f"gait {GAIT_NAMES[which]}", *(run.name for run in runs)], rows)
 
 
 def _errors(runs: Sequence[Campaign]) -> Chart:

@@ -76,7 +76,7 @@ def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
 
 def _print_contents(console: "Console", dataset: "Dataset") -> None:
     from bifa.printable import counted
-    from bifa.report.page import Table
+    from bifa.report.page import PageTable
     from bifa.report.terminal import print_lines, print_table
     from bifa.report.words import parameter_words, quantity
     from bifa.robot import nominal
@@ -89,7 +89,7 @@ def _print_contents(console: "Console", dataset: "Dataset") -> None:
         repeats = ", ".join(str(trial.repeat) for trial in group)
         rows.append([group[0].label, repeats, f"{sum(samples)}", f"{sum(rates) / len(rates):.1f}", f"{seconds:.1f}"])
     columns = ["experiment and settings", "repeats", "samples", "rate, Hz", "duration, s"]
-    print_table(console, Table(columns, rows, f"{dataset.name}: {counted(len(dataset.trials), 'trial')}"))
+    print_table(console, PageTable(columns, rows, f"{dataset.name}: {counted(len(dataset.trials), 'trial')}"))
     units = {name: parameter.unit for name, parameter in nominal().parameters.items()}
     known = [f"{parameter_words(name)} {quantity(v, units.get(name, ''), 3)}" for name, v in dataset.known.items()]
     print_lines(console, [f"known beforehand: {', '.join(known) or 'nothing'}"])

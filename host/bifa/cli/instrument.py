@@ -76,7 +76,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
 
     from bifa.data.errors import DatasetError
     from bifa.measure.text_plot import panel
-    from bifa.report.page import Table
+    from bifa.report.page import PageTable
     from bifa.report.terminal import print_table
 
     plain = not console.encoding.lower().startswith("utf")
@@ -86,7 +86,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
         console.print(f"As a {role}'s it is read by the preset {name}.", markup=False)
     labels, units = seen.sheet.labels(), seen.sheet.units
     rows = [[label, unit, *row] for label, unit, row in zip(labels, units, zip(*seen.rows(), strict=True), strict=True)]
-    print_table(console, Table(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
+    print_table(console, PageTable(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
     for place, label in list(enumerate(labels))[:_MOST_PLOTS]:
         try:
             values = seen.sheet.numbers(place, label)

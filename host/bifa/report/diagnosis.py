@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bifa.report.evidence import errors_chart, learnt_chart
-from bifa.report.page import ChartedSection, Page, Table
+from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.words import (
     effect_parameter,
     effect_words,
@@ -111,7 +111,7 @@ def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[Cha
     return sections
 
 
-def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> Table:
+def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> PageTable:
     """Every number of every effect with its interval; `truth`: what the seal held, beside it."""
     rows = []
     names = dict.fromkeys([*(effect["name"] for effect in effects), *(truth or {})])
@@ -124,17 +124,17 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
             row = [f"{effect_words(name)}: {meaning}", value, ends]
             rows.append(row + ([quantity(true[key], unit, 3) if key in true else "absent"] if truth else []))
     columns = ["", "found", "90 % interval", *(["sealed value"] if truth is not None else [])]
-    return Table(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
+    return PageTable(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
 
 
-def base_table(record: Mapping[str, Any]) -> Table | None:
+def base_table(record: Mapping[str, Any]) -> PageTable | None:
     """The base model's parameters, fitted together with the named effects; none where the data remain unexplained."""
     rows = []
     for name, one in record["base_parameters"].items():
         if name in BASE_PARAMETERS:  # not the coefficients of a curve's shape
             ends = "" if None in one["interval_90"] else " to ".join(plain(end, 4) for end in one["interval_90"])
             rows.append((parameter_words(name), plain(one["value"], 4), ends, BASE_PARAMETERS[name].unit))
-    return Table(("", "value", "90 % interval", "unit"), rows) if rows else None
+    return PageTable(("", "value", "90 % interval", "unit"), rows) if rows else None
 
 
 def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
@@ -143,20 +143,20 @@ def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
     return quantity(value, unit, 3), ends
 
 
-def nearest_table(record: Mapping[str, Any]) -> Table | None:
+def nearest_table(record: Mapping[str, Any]) -> PageTable | None:
     """Explanations that were not chosen, and what each would close."""
     rows = [
         (" and ".join(effect_words(name) for name in near["effects"]), _percent(near["share_of_gap"]))
         for near in sorted(record["nearest"], key=lambda near: -(near["share_of_gap"] or 0.0))
     ]
-    return Table(("explanation", "of the gap that it alone would close"), rows) if rows else None
+    return PageTable(("explanation", "of the gap that it alone would close"), rows) if rows else None
 
 
 def _percent(share: float | None) -> str:
     return "" if share is None else f"{100 * min(share, 1.0):.0f} %" if share >= 0.005 else "under 1 %"
 
 
-def noise_table(error: Mapping[str, Any]) -> Table:
+def noise_table(error: Mapping[str, Any]) -> PageTable:
     """Errors before and after, of fitted and held-out trials and by experiment, against the floor."""
     labels = {"fitted": "fitted", "held_out": "held-out", "held_out_conditions": "held-out, new conditions"}
     sides = ("before", "after", "noise_floor")
@@ -168,7 +168,7 @@ def noise_table(error: Mapping[str, Any]) -> Table:
     for name in error["before"]["by_experiment"]:
         rows.append([experiment_words(name), *(_noise(error[s]["by_experiment"].get(name)) for s in sides[:2]), "1.00"])
     columns = ["RMS error, in units of the noise floor", "base model", "completed model", "noise floor"]
-    return Table(columns, rows, strong_row=1)
+    return PageTable(columns, rows, strong_row=1)
 
 
 def _noise(value: float | None) -> str:

@@ -7,7 +7,7 @@ from bifa.printable import counted
 from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
-from bifa.report.page import ChartedSection, Page, Table
+from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.words import (
     channel_words,
     experiment_words,
@@ -85,7 +85,7 @@ def remarks(found: Identification) -> list[str]:
     return lines
 
 
-def _parameters(found: Identification) -> Table:
+def _parameters(found: Identification) -> PageTable:
     estimates = {estimate.name: estimate for estimate in found.uncertainty.estimates}
     rows = []
     for name, parameter in found.model.parameters.items():
@@ -100,10 +100,10 @@ def _parameters(found: Identification) -> Table:
                 said.append(f"expected {low} to {high}")
         ends = "" if interval is None else " to ".join(plain(e, 4) for e in (interval.lower, interval.upper))
         rows.append([parameter_words(name), f"{plain(parameter.value, 4)}", ends, parameter.unit, ", ".join(said)])
-    return Table(["", "value", "90 % interval", "unit", "remark"], rows, words=True)
+    return PageTable(["", "value", "90 % interval", "unit", "remark"], rows, words=True)
 
 
-def errors_table(found: Identification) -> Table:
+def errors_table(found: Identification) -> PageTable:
     """The error of each channel in its unit, and against the noise floor."""
     rows = []
     for (experiment, channel), error in found.error.items():
@@ -117,4 +117,4 @@ def errors_table(found: Identification) -> Table:
                 f"{error:.2f}",
             ]
         )
-    return Table(["RMS error", BASE, "noise floor", "ratio"], rows)
+    return PageTable(["RMS error", BASE, "noise floor", "ratio"], rows)

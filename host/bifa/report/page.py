@@ -17,9 +17,9 @@ from bifa.report.chart import Chart
 from bifa.report.plot import as_plot, library_script
 from bifa.report.style import DARK, LIGHT
 from lacuna.report import page as engine
-from lacuna.report.page import Page, Table
+from lacuna.report.page import Page, PageTable
 
-__all__ = ["ChartedSection", "Motion", "Page", "Table", "page_style", "render", "write_page"]
+__all__ = ["ChartedSection", "Motion", "Page", "PageTable", "page_style", "render", "write_page"]
 
 
 @dataclass(frozen=True)

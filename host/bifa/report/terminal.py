@@ -8,7 +8,7 @@ import rich.box
 import rich.table
 from rich.text import Text
 
-from bifa.report.page import ChartedSection, Table
+from bifa.report.page import ChartedSection, PageTable
 from bifa.report.words import NBSP
 from bifa.screen import Console
 
@@ -16,7 +16,7 @@ _BETWEEN = 3  # spaces between columns
 _NARROWEST = 8  # characters of a column of figures, where its heading needs more than that
 
 
-def print_table(console: Console, content: Table) -> None:
+def print_table(console: Console, content: PageTable) -> None:
     """A table; figures are set to the right as on a page."""
     table = rich.table.Table(
         title=content.caption or None, title_justify="left", box=rich.box.SIMPLE_HEAD, show_edge=False, pad_edge=False

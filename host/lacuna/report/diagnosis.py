@@ -9,7 +9,7 @@ from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.report.evidence import draw_errors, draw_learnt, draw_weights
 from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.overview import draw_held_out, draw_tried
-from lacuna.report.page import Page, Section, Table, both_palettes
+from lacuna.report.page import Page, PageTable, Section, both_palettes
 from lacuna.report.sentence import number_in_words, own_form, share_in_words, verdict_sentence
 
 
@@ -49,7 +49,7 @@ def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
         (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), share_in_words(e["share_of_gap"]))
         for e in effects
     ]
-    table = Table(("effect", "parameters, with 90 % intervals", "closes"), rows)
+    table = PageTable(("effect", "parameters, with 90 % intervals", "closes"), rows)
     return [Section("Evidence", tables=(table,), figures=(figure,))]
 
 
@@ -74,7 +74,7 @@ def _rejected(record: Mapping[str, Any]) -> list[Section]:
     if not record["nearest"]:
         return []
     rows = [(_words(" + ".join(r["effects"])), share_in_words(r["share_of_gap"])) for r in record["nearest"]]
-    table = Table(("explanation", "would close"), rows)
+    table = PageTable(("explanation", "would close"), rows)
     tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
     why = (
         "An explanation is rejected if it predicts conditions that were never fitted no better than a smaller one,"
@@ -99,7 +99,7 @@ def _open(record: Mapping[str, Any]) -> list[Section]:
     if hidden := record["not_detectable_here"]:
         sections.append(Section("Not detectable in this data", (", ".join(hidden),)))
     if indistinct := [(e["name"], ", ".join(e["confusable_with"])) for e in record["effects"] if e["confusable_with"]]:
-        sections.append(Section("What this data cannot tell", tables=(Table(("named", "could be"), indistinct),)))
+        sections.append(Section("What this data cannot tell", tables=(PageTable(("named", "could be"), indistinct),)))
     return sections
 
 
@@ -117,7 +117,7 @@ def _words(name: str) -> str:
 
 def _measured(found: Diagnosis) -> Section:
     columns = ("channel", "records in conditions", "floor (standard deviation)", "samples per observation", "from")
-    return Section("What was measured", (floor_sentence(found),), (Table(columns, measured_rows(found)),))
+    return Section("What was measured", (floor_sentence(found),), (PageTable(columns, measured_rows(found)),))
 
 
 def _sized(effect: Mapping[str, Any]) -> str:

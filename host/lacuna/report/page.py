@@ -35,7 +35,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """Rows of text under column heads; columns after the first are figures and set to the right.
 
     words: the last column is text, and set to the left.
@@ -54,7 +54,7 @@ class Section:
 
     title: str
     paragraphs: Sequence[str] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[PageTable] = ()
     figures: Sequence[Figure] = field(default=(), kw_only=True)
     links: Sequence[tuple[str, str]] = field(default=(), kw_only=True)
 
@@ -76,7 +76,7 @@ class Page:
     lead: str
     sections: Sequence[Section]
     words: Sequence[str] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[PageTable] = ()
     about: Sequence[tuple[str, str]] = ()
     links: Sequence[tuple[str, str]] = ()
     facts: Sequence[tuple[str, str]] = field(default=(), kw_only=True)

@@ -12,7 +12,7 @@ from lacuna.errors import MisuseError
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
-from lacuna.records import RawRecord, segments, stretched
+from lacuna.records import Table, segments, stretched
 from lacuna.run import with_records
 
 FAR = 1.3  # a gain from which the model fails
@@ -81,7 +81,7 @@ def test_the_completed_model_of_a_segment_gives_its_own_samples():
     system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -10.0, 10.0)], [bend])
     time = np.linspace(0.0, 4.0, 400)
     noise = 0.01 * np.random.default_rng(0).standard_normal(400)
-    pieces = segments(RawRecord("long", time, {"y": 2.0 * time + 0.3 * time**2 + noise}, {}), 10)
+    pieces = segments(Table("long", time, {"y": 2.0 * time + 0.3 * time**2 + noise}, {}), 10)
     verdict = lacuna.diagnose(system, pieces, progress=False)
     trial = stretched(pieces[5], pieces[5].record(["y"]), ["y"])
     for asked in (pieces[5], trial):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lacuna.decimals import decimal
-from lacuna.records import RawRecord, RecordError, cell_by_cell, numbers_alone, read, segments, windows
+from lacuna.records import RecordError, Table, cell_by_cell, numbers_alone, read, segments, windows
 
 ROWS = "\n".join(f"{k},{k * k}" for k in range(10))
 
@@ -90,7 +90,7 @@ def test_refuses_what_is_no_text(tmp_path):
 def test_one_file_is_one_record_and_so_is_a_segment(tmp_path):
     (one,) = read(write(tmp_path, "a.csv", f"time_s,y\n{ROWS}\n") / "a.csv")
     assert one.name == "a"
-    long = RawRecord("long", np.arange(100.0), {"y": np.arange(100.0)}, {})
+    long = Table("long", np.arange(100.0), {"y": np.arange(100.0)}, {})
     piece = segments(long, 10)[5]
     assert read(piece) == [piece]
 

@@ -40,7 +40,7 @@ def engines_own():
     """A page of the engine with all that it can show."""
     error = sample.DIAGNOSIS["error"]
     figure = engine_page.both_palettes(lambda stream, dark: draw_errors(error, stream, dark), "errors")
-    table = engine_page.Table(("effect", "size", "why"), [("delay", "10 ms", "it says so")], "Named", 0, True)
+    table = engine_page.PageTable(("effect", "size", "why"), [("delay", "10 ms", "it says so")], "Named", 0, True)
     sections = [
         engine_page.Section(title, ("One effect.",), (table,), figures=(figure,)) for title in ("Found", "Left", "Next")
     ]

@@ -13,7 +13,7 @@ from bifa.effects import library
 from bifa.files import TargetError
 from bifa.report.animation import FRAMES_PER_S, animate_walks
 from bifa.report.diagnosis import diagnosis_page, settings_words, verdict_sentence
-from bifa.report.page import ChartedSection, Page, Table, render, write_page
+from bifa.report.page import ChartedSection, Page, PageTable, render, write_page
 from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLORS, DARK, LIGHT
 from bifa.report.terminal import print_table
@@ -44,7 +44,7 @@ def test_the_page_fetches_nothing(html):
 
 
 def test_text_is_escaped():
-    page = Page("Bench <today>", "a & b", [ChartedSection("S", tables=[Table(["gait"], [["<b>baseline</b>"]])])])
+    page = Page("Bench <today>", "a & b", [ChartedSection("S", tables=[PageTable(["gait"], [["<b>baseline</b>"]])])])
     html = render(page)
     assert "Bench &lt;today&gt;" in html
     assert "&lt;b&gt;baseline" in html
