@@ -1,5 +1,6 @@
 """Folders of CSV as people have them: labels in words, marks of spreadsheets, and cells that are no numbers."""
 
+import importlib
 import tempfile
 from pathlib import Path
 
@@ -282,3 +283,12 @@ def test_plain_numbers_are_read_at_once_as_they_are_cell_by_cell(rows, end):
 def test_anything_else_is_gone_through_cell_by_cell(tmp_path, text):
     (tmp_path / "a.csv").write_text(text)
     assert numbers_alone(tmp_path / "a.csv") is None
+
+
+@pytest.mark.parametrize(
+    "name", ["records.Table", "records.read", "records.segments", "values.Values", "errors.MisuseError"]
+)
+def test_what_scripts_outside_import_keeps_its_name(name):
+    """Written as text, so that whoever renames it in all files meets it here."""
+    module, own = name.split(".")
+    assert hasattr(importlib.import_module(f"lacuna.{module}"), own)
