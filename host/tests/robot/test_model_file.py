@@ -74,5 +74,5 @@ def test_a_missing_file_is_told(tmp_path):
 def test_values_out_of_bounds_are_refused_with_the_range():
     with pytest.raises(ModelParameterError, match=r"mu_s = 5.0 is outside its range 0.02 to 2"):
         nominal().with_values({"mu_s": 5.0})
-    with pytest.raises(ModelParameterError, match="no parameter"):
+    with pytest.raises(ModelParameterError, match="not a parameter"):
         nominal().with_values({"mass": 5.0})
