@@ -122,7 +122,7 @@ def test_effects_add_up_in_one_compilation():
 @pytest.mark.parametrize(
     ("chosen", "told"),
     [
-        ({"magic": {}}, "no effect"),
+        ({"magic": {}}, "'magic' is not an effect of the library"),
         ({"hysteresis": {"force": 1.0}}, "no parameter force"),
         ({"hysteresis": {"force_N": -1.0}}, r"force_N = -1.0 is outside its range 0 to 20 N"),
         ({"leak": {"rate_per_s": float("nan")}}, "rate_per_s"),
