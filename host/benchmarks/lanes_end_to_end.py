@@ -48,7 +48,16 @@ def main() -> int:
         subprocess.run([sys.executable, "-c", _COMPILE], env=os.environ | {"BIFA_LANES": "0"}, check=True)
         commands = {
             "fit": ["fit", str(day), "--out", model],
-            "robust gait": ["optimize", "--model", model, "--out", str(Path(scratch) / "gait.toml")],
+            # By what is known of this model, which lacks an effect, no gait walks.
+            "robust gait": [
+                "optimize",
+                "--model",
+                model,
+                "--spread",
+                "0.02",
+                "--out",
+                str(Path(scratch) / "gait.toml"),
+            ],
             "diagnosis": ["diagnose", str(day), "--json", str(Path(scratch) / "verdict.json")],
         }
         print("| task | with lanes, s | of it simulating | numba alone, s | of it simulating | ratio |")
