@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.check.grains import grains_of
-from lacuna.check.numbers import listed
+from lacuna.check.numbers import listed, within
 from lacuna.cores import usable_cores
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
@@ -135,8 +135,8 @@ def _cautioned(
     whether it is noise. What is advised is tried first: it is no advice where it would take a name away."""
     levels = found.search.floor.channels
     doubted = [
-        f"No explanation comes near the floor of {channel}{_within(experiment, levels)} ({floor:.3g}), so doubt the"
-        f" floor before the model; a repeat would tell. They were compared at a floor of"
+        f"No explanation comes near the floor of {channel}{within(experiment, (e for e, _ in levels))} ({floor:.3g}),"
+        f" so doubt the floor before the model; a repeat would tell. They were compared at a floor of"
         f" {levels[experiment, channel].sd:.3g}, a fraction of the best one's residual."
         for (experiment, channel), floor in raised.items()
     ]
@@ -155,10 +155,6 @@ def _cautioned(
         for channel, seconds in advised.items()
     ]
     return replace(found, warnings=(*doubted, *found.warnings, *said)) if said or doubted else found
-
-
-def _within(experiment: str, levels: Mapping[tuple[str, str], Any]) -> str:
-    return f" in {experiment}" if len({key[0] for key in levels}) > 1 else ""
 
 
 def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:

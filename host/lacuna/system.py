@@ -122,6 +122,10 @@ class Effect:
     def full_name(self, parameter: Parameter) -> str:
         return f"{self.name}.{parameter.name}"
 
+    def shows_in(self, trial: Record) -> bool:
+        """Whether it can be visible in a trial, by its experiment."""
+        return not self.experiments or trial.experiment in self.experiments
+
     @property
     def size_names(self) -> tuple[str, ...]:
         """The full names of the parameters that size the effect."""

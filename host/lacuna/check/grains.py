@@ -18,7 +18,7 @@ def grains_of(system: System, trials: Sequence[Record]) -> dict[str, float]:
     of a trial for each of the other parameters."""
     found = {}
     for name, parameter, effects, theta in _each(system):
-        seen = [t for t in trials if not effects or _shows(system, effects[0], t)]
+        seen = [t for t in trials if all(system.effects[effect].shows_in(t) for effect in effects)]
         if width := _width(system, theta, name, parameter, effects, seen):
             found[name] = width
     return found
@@ -33,11 +33,6 @@ def _each(system: System) -> Iterator[tuple[str, Parameter, tuple[str, ...], The
         typical = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
         for p in effect.parameters:
             yield effect.full_name(p), p, (effect.name,), start | typical
-
-
-def _shows(system: System, effect: str, trial: Record) -> bool:
-    experiments = system.effects[effect].experiments
-    return not experiments or trial.experiment in experiments
 
 
 def _width(

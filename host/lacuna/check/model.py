@@ -97,7 +97,7 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
         )
         off |= {effect.full_name(p): p.value for p in effect.own}
         for trial in firsts.values():
-            if effect.experiments and trial.experiment not in effect.experiments:
+            if not effect.shows_in(trial):
                 continue
             found = predicted(system, dict(start) | off, (name,), trial)
             for channel in trial.channels:
@@ -138,7 +138,7 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
             }
             for by in (1.0, *effect.start_factors)
         ]
-        seen = (t for t in trials if not effect.experiments or t.experiment in effect.experiments)
+        seen = (t for t in trials if effect.shows_in(t))
         if not any(
             differ(column, predictions[t.name][c], 0.0)
             for t in seen

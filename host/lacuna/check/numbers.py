@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -25,6 +25,11 @@ def differ(a: np.ndarray, b: np.ndarray, limit: float) -> bool:
 def first(true: np.ndarray) -> int:
     """Index of the first that is true."""
     return int(np.flatnonzero(true)[0])
+
+
+def within(experiment: str, experiments: Iterable[str]) -> str:
+    """Where something is, unless there is only one place."""
+    return f" in {experiment}" if len(set(experiments)) > 1 else ""
 
 
 def listed(names: Sequence[str], most: int = 4) -> str:

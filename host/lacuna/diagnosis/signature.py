@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lacuna.check.numbers import within
 from lacuna.diagnosis.drift import Drift
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.estimation.fit import Fit
@@ -145,16 +146,11 @@ def _cells(
     return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
-def _within(experiment: str, fitted: Fit) -> str:
-    """Where something is, unless all is there."""
-    return f" in {experiment}" if len({t.experiment for t in fitted.problem.trials}) > 1 else ""
-
-
-def _cannot_tell(remainder: Remainder, fitted: Fit) -> str:
+def _cannot_tell(remainder: Remainder, experiments: Sequence[str]) -> str:
     """Where that nothing was found does not say that nothing is missing."""
     if not (most := remainder.cannot_tell):
         return ""
-    each = ", ".join(f"{size:.1f} x the floor{_within(e, fitted)}" for e, size in list(most.items())[:3])
+    each = ", ".join(f"{size:.1f} x the floor{within(e, experiments)}" for e, size in list(most.items())[:3])
     return (
         f" That does not say that nothing is missing: as much as {each} could not be told from chance."
         " More repeats would tell."
@@ -169,19 +165,19 @@ def _sentence(
     unshared: str,
     fitted: Fit,
 ) -> str:
-    repeated = _repeated(fitted)
+    repeated, experiments = _repeated(fitted), [t.experiment for t in fitted.problem.trials]
     if not places and not drifts and not unshared:
         known = "the differences between repeats" if repeated else "the noise"
-        return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder, fitted)}"
+        return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder, experiments)}"
     parts = []
     if places:
         times = {place: np.sqrt(max(remainder.shared[place], 0)) for place in places[:4]}
-        listed = ", ".join(f"{c}{_within(e, fitted)} ({size:.1f} x the floor)" for (e, c), size in times.items())
+        listed = ", ".join(f"{c}{within(e, experiments)} ({size:.1f} x the floor)" for (e, c), size in times.items())
         left = "Repeats share a residual" if repeated else "A residual is left"
         parts.append(f"{left} that the model does not explain: {listed}.")
     for d in dependences[:2]:
         parts.append(
-            f"{100 * d.share:.0f} % of the residual variance of {d.channel}{_within(d.experiment, fitted)} follows"
+            f"{100 * d.share:.0f} % of the residual variance of {d.channel}{within(d.experiment, experiments)} follows"
             f" {' and '.join(d.quantities)}."
         )
     if places and not dependences:

@@ -47,7 +47,7 @@ class Structure:
         return tuple(
             replace(p, name=effect.full_name(p))
             for effect in (self.system.effects[name] for name in self.effects)
-            if not effect.experiments or trial.experiment in effect.experiments
+            if effect.shows_in(trial)
             for p in effect.own
         )
 
