@@ -86,7 +86,7 @@ def _diagnosed(folder: Path) -> _Stages:
     stages.begin("fitting the stiffness curves")
     system = prepare(measured)
     words = _LIBRARY_WORDS | set(system.effects) | set(system.correction_sites)
-    diagnose(system, progress=lambda what: stages.begin(_without(what, words)))
+    diagnose(system, on_progress=lambda what: stages.begin(_without(what, words)))
     stages.begin("")
     return stages
 

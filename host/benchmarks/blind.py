@@ -115,7 +115,7 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int)
     simulations = SimulationCount()
     simulations.of_trials(system)
     began = time.monotonic()
-    found = diagnose(system, progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
+    found = diagnose(system, on_progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
     spent = os.times()
     processor = spent.user + spent.system + spent.children_user + spent.children_system
     tried = searched(found, simulations.count)

@@ -41,7 +41,7 @@ def diagnose(
     n_jobs: int | None = None,
     executor: Executor | None = None,
     policy: Policy = POLICY,
-    progress: Callable[[str], None] | bool = True,
+    on_progress: Callable[[str], None] | bool = True,
 ) -> Verdict:
     """What the model of `system` lacks, judged by `records`.
 
@@ -51,7 +51,7 @@ def diagnose(
     by default some of each condition. `starts`: number of initial points of the base model's fit. `n_jobs`: number of
     processes that try explanations, -1 for one per core; by default one process with a thread per core, which suits a
     `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any from `concurrent.futures`,
-    or dask's. `progress`: a function called with a description of each step, or False for silence; the steps are
+    or dask's. `on_progress`: a function called with a description of each step, or False for silence; the steps are
     logged, too (`logging`, "lacuna").
 
     Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
@@ -63,14 +63,14 @@ def diagnose(
         system = _tested_on(system, names)
     if random_state is not None:
         seed = random_state if isinstance(random_state, int) else int(random_state.integers(2**32))
-    told = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
+    shown = Progress(len(system.effects)) if on_progress is True else on_progress or (lambda _: None)
 
-    def say(what: str) -> None:
+    def reported(what: str) -> None:
         _log.info("%s: %s", system.name, what)
-        told(what)
+        shown(what)
 
     system, in_steps = _in_steps(system)
-    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "progress": say}
+    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "on_progress": reported}
     try:
         with _workers(n_jobs, executor) as workers:
 
@@ -87,8 +87,8 @@ def diagnose(
             found = _cautioned(found, system, raised, answer)
             found = replace(found, warnings=(*found.warnings, *in_steps))
     finally:
-        if isinstance(told, Progress):
-            told.end()
+        if isinstance(shown, Progress):
+            shown.end()
     verdict = Verdict(system, found)
     _log.info("%s: %r", system.name, verdict)
     return verdict

@@ -175,7 +175,7 @@ def _walk(
 
 
 def _diagnosed(dataset: Dataset, setup: Setup, on_progress: OnProgress) -> Diagnosis:
-    return diagnose(prepare(dataset), seed=setup.seed, progress=lambda what: on_progress(spoken(what), 0.0))
+    return diagnose(prepare(dataset), seed=setup.seed, on_progress=lambda what: on_progress(spoken(what), 0.0))
 
 
 def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:

@@ -128,7 +128,7 @@ def _found(
         def diagnosed(trials: Dataset) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
-            return diagnose(system, seed=seed, progress=said, executor=executor)
+            return diagnose(system, seed=seed, on_progress=said, executor=executor)
 
         with workers as (executor, _):
             found = diagnosed(measured)

@@ -39,7 +39,7 @@ from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Found, Stoppable
 from lacuna.diagnosis.warn import warnings_of
-from lacuna.diagnosis.workers import Progress, Workers
+from lacuna.diagnosis.workers import OnProgress, Workers
 from lacuna.errors import TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.estimation.solve import one_thread
@@ -108,7 +108,7 @@ def diagnose(
     seed: int = 0,
     starts: int = 1,
     policy: Policy = POLICY,
-    progress: Progress = lambda _: None,
+    on_progress: OnProgress = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Explanations are tried
@@ -121,10 +121,10 @@ def diagnose(
         raise TooLittleDataError(
             "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."
         )
-    case, hand = Case(system, split, policy, seed), Stoppable(Workers(progress, executor, forks=system.forks))
-    hand.say("fitting the base model")
+    case, hand = Case(system, split, policy, seed), Stoppable(Workers(on_progress, executor, forks=system.forks))
+    hand.on_progress("fitting the base model")
     found = explanations(case, case.fit_base(starts), hand)
-    hand.say("deciding what is supported")
+    hand.on_progress("deciding what is supported")
     found, choice, judged = decided(case, found, hand)
     final = judged.explained
     if judged.verdict != "none" and judged.left.matters:
@@ -133,7 +133,7 @@ def diagnose(
             lambda: _corrected(case, found, choice, judged, None),
             "no curve is learnt",
         )
-    hand.say("estimating how well the parameters are known")
+    hand.on_progress("estimating how well the parameters are known")
     shown = choice.explanation if judged.verdict == "identified" else found.base
     followed = followed_by_nothing(case.followed(shown))
     told = _told(case, judged, shown, final)
@@ -312,7 +312,7 @@ def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
     """Everything tried. Nothing is where the base model leaves nothing that matters."""
     first = case.judge(base)
     if case.may_be_lost(first):
-        hand.say("fitting the base model from elsewhere, too")
+        hand.on_progress("fitting the base model from elsewhere, too")
         first = from_elsewhere(first, case.split, case.seed, hand.workers)
     first = case.sharply(first)
     if case.suffices(first):

@@ -25,7 +25,7 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, workers: Worker
     if not parent.fitted.solution.sensitivities:
         parent = reweighed(parent, case.split, found.floor)
     fresh = [name for name in case.system.effects if name not in parent.effects]
-    workers.say(f"asking what {followed[0].nuisance} follows")
+    workers.on_progress(f"asking what {followed[0].nuisance} follows")
     near = continued(parent.fitted, fresh, workers)
     grown = sorted((judge(fitted, case.split, policy, near=parent.checked) for fitted in near), key=lambda c: c.cost)
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]

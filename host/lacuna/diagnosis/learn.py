@@ -134,7 +134,7 @@ def _refined(coarse: Fit) -> Fit:
 
 def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers: Workers) -> list[_Promise]:
     """The curve of each of `sites`, regressed on what `candidate` leaves and its own parameters cannot take up."""
-    workers.say("asking where a curve would help")
+    workers.on_progress("asking where a curve would help")
     parent = candidate.fitted
     basis, remaining = remaining_after(parent)
     found = []

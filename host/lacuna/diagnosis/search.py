@@ -76,7 +76,7 @@ def search(
     freed: list[Candidate] = []
     found = raced(first, _singles(scores))
     if better := led_out(first, found, split):
-        workers.say("the base model was in a wrong minimum: from the better one")
+        workers.on_progress("the base model was in a wrong minimum: from the better one")
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
         scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), workers), better
@@ -89,7 +89,7 @@ def search(
             break
         lower = sharpened_floor(ranked[0], split, floor)
         if lower.share_of(floor) < LOWER:
-            workers.say("weighing again against a lower floor")
+            workers.on_progress("weighing again against a lower floor")
             floor = lower
             tried = _against(tried, size, split, lower, case.policy.reach)
             freed = [reweighed(c, split, lower) for c in freed]

@@ -23,10 +23,10 @@ class Stoppable:
     def __init__(self, workers: Workers) -> None:
         self.workers, self.stopped = workers, False
 
-    def say(self, what: str) -> None:
+    def on_progress(self, what: str) -> None:
         """Once stopped, nothing: what was said of that stays to be read."""
         if not self.stopped:
-            self.workers.say(what)
+            self.workers.on_progress(what)
 
     def ask(self, full: Callable[[], Answer], short: Callable[[], Answer], said: str) -> Answer:
         """The full answer; where it is stopped, `said` is shown, and the answer is short."""
@@ -34,7 +34,7 @@ class Stoppable:
             try:
                 return full()
             except KeyboardInterrupt:
-                self.workers.say(f"stopped: {said} (Ctrl-C again gives up)")
+                self.workers.on_progress(f"stopped: {said} (Ctrl-C again gives up)")
                 self.stopped = True
         return short()
 

@@ -15,7 +15,7 @@ from lacuna.estimation.problem import cores, use_threads
 
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
-Progress = Callable[[str], None]
+OnProgress = Callable[[str], None]
 Jobs = Sequence[tuple[Any, ...]]
 
 
@@ -24,8 +24,8 @@ class Workers:
     `Problem`, and so its system: threads, processes, dask. Without one, jobs go to forked children if these are allowed
     (`System.forks`), there is more than one job and more than one core, and this is Linux."""
 
-    def __init__(self, progress: Progress, executor: Executor | None = None, *, forks: bool = False):
-        self.say, self._executor = progress, executor
+    def __init__(self, on_progress: OnProgress, executor: Executor | None = None, *, forks: bool = False):
+        self.on_progress, self._executor = on_progress, executor
         self._forks = forks and sys.platform == "linux" and not current_process().daemon
 
     def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable[..., Any], jobs: Jobs) -> list[Any]:
@@ -33,7 +33,7 @@ class Workers:
         found = []
         with self._working(function, jobs) as results:
             for effects in names:
-                self.say(f"{doing} {' + '.join(effects)}")
+                self.on_progress(f"{doing} {' + '.join(effects)}")
                 found.append(next(results))
         return found
 

@@ -78,7 +78,7 @@ REFUSED_PREDICTIONS = {
 def test_refuses_a_prediction_of(name):
     found, said = REFUSED_PREDICTIONS[name]
     with pytest.raises(MisuseError, match=said):
-        diagnose(predicting(found), progress=pytest.fail)  # before the search begins
+        diagnose(predicting(found), on_progress=pytest.fail)  # before the search begins
 
 
 Y = Line().trials[0].channels["y"]
@@ -102,13 +102,13 @@ REFUSED_RECORDS = {
 def test_refuses_a_record_with(name):
     changes, said = REFUSED_RECORDS[name]
     with pytest.raises(MisuseError, match=said):
-        diagnose(changed(Line(), **changes), progress=pytest.fail)
+        diagnose(changed(Line(), **changes), on_progress=pytest.fail)
 
 
 def test_refuses_a_channel_that_is_constant_in_every_trial():
     trials = tuple(replace(t, channels={"y": np.full(101, 2.0)}) for t in Line().trials)
     with pytest.raises(MisuseError, match="run 0, channel y: constant, as in every trial of pull"):
-        diagnose(Line(trials=trials), progress=pytest.fail)
+        diagnose(Line(trials=trials), on_progress=pytest.fail)
 
 
 def test_takes_a_channel_that_rests_in_one_trial_only():
@@ -119,7 +119,7 @@ def test_takes_a_channel_that_rests_in_one_trial_only():
 def test_refuses_an_effect_under_another_key():
     effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0))
     with pytest.raises(MisuseError, match="effect bend is listed under the key curve"):
-        diagnose(Line(effects={"curve": effect}), progress=pytest.fail)
+        diagnose(Line(effects={"curve": effect}), on_progress=pytest.fail)
     with pytest.raises(DeclarationError, match="effect bend is listed under the key curve"):
         lacuna.System(heater.simulate, heater.PARAMETERS, {"curve": effect})
 
@@ -127,28 +127,28 @@ def test_refuses_an_effect_under_another_key():
 def test_refuses_an_effect_freed_where_there_is_no_curve():
     effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0), freed_at=("nowhere",))
     with pytest.raises(MisuseError, match="effect bend is freed at nowhere, which is no correction site"):
-        diagnose(Line(effects={"bend": effect}), progress=pytest.fail)
+        diagnose(Line(effects={"bend": effect}), on_progress=pytest.fail)
 
 
 def test_refuses_an_effect_that_needs_apart_what_is_not_next_to_anything():
     effect = Effect("bend", Parameter("by", "1/s^2", 0.5, -5.0, 5.0), apart=("slope",))
     with pytest.raises(MisuseError, match="effect bend needs slope apart, which lacks"):
-        diagnose(Line(effects={"bend": effect}), progress=pytest.fail)
+        diagnose(Line(effects={"bend": effect}), on_progress=pytest.fail)
 
 
 @pytest.mark.parametrize("count", [0, 2])
 def test_refuses_fewer_trials_than_needed(count):
     with pytest.raises(TooLittleDataError, match=f"{count} trials given: a diagnosis needs at least 3"):
-        diagnose(Line(trials=Line().trials[:count]), progress=pytest.fail)
+        diagnose(Line(trials=Line().trials[:count]), on_progress=pytest.fail)
 
 
 def test_refuses_names_that_are_used_twice():
     with pytest.raises(MisuseError, match="parameter slope: more than one"):
-        diagnose(Line(parameters=(*Line().parameters, *Line().parameters)), progress=pytest.fail)
+        diagnose(Line(parameters=(*Line().parameters, *Line().parameters)), on_progress=pytest.fail)
     system = Line()
     system.nuisances = lambda trial: (Parameter("slope", "", 1.0, 0.0, 2.0),)
     with pytest.raises(MisuseError, match="run 0: its nuisance slope"):
-        diagnose(system, progress=pytest.fail)
+        diagnose(system, on_progress=pytest.fail)
     with pytest.raises(DeclarationError, match="parameter gain_K_W is declared 2 times"):
         lacuna.System(heater.simulate, (*heater.PARAMETERS, heater.PARAMETERS[0]))
 
@@ -157,7 +157,7 @@ def test_refuses_repeats_of_different_inputs():
     records = heater.records(repeats=2)
     records["steps_4W_2"]["power_W"] = -records["steps_4W_2"]["power_W"]
     with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are declared as repeats.*power_W differs"):
-        lacuna.diagnose(heater.system(), records, progress=pytest.fail)
+        lacuna.diagnose(heater.system(), records, on_progress=pytest.fail)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_refuses_a_record_without_a_column(column, said):
     records = heater.records(repeats=2)
     del records["sweep_4W_1"][column]
     with pytest.raises(RecordError, match=f"record sweep_4W_1 {said}"):
-        lacuna.diagnose(heater.system(), records, progress=pytest.fail)
+        lacuna.diagnose(heater.system(), records, on_progress=pytest.fail)
 
 
 def test_refuses_to_guess_which_column_is_predicted():
@@ -303,7 +303,7 @@ def test_refuses_words_among_the_inputs():
 def test_refuses_a_csv_that_is_no_table(tmp_path):
     (tmp_path / "a_1.csv").write_text("time_s,y\n0,1\n1\n")
     with pytest.raises(RecordError, match=r"a_1\.csv"):
-        lacuna.diagnose(heater.system(), tmp_path, progress=pytest.fail)
+        lacuna.diagnose(heater.system(), tmp_path, on_progress=pytest.fail)
     with pytest.raises(RecordError, match="no such folder"):
         lacuna.diagnose(heater.system(), tmp_path / "elsewhere")
 
@@ -312,7 +312,7 @@ def test_refuses_a_csv_that_is_no_table(tmp_path):
 
 
 def warned(system, records):
-    return " ".join(lacuna.diagnose(system, records, progress=False).warnings)
+    return " ".join(lacuna.diagnose(system, records, on_progress=False).warnings)
 
 
 def test_warns_of_trials_that_the_model_cannot_predict():
@@ -476,6 +476,6 @@ def test_a_model_may_return_one_array_again_and_again():
     found = []
     for one in (heater.simulate, thrifty):
         system = lacuna.System(one, heater.PARAMETERS, _all(), outputs="temperature_K")
-        found.append(lacuna.diagnose(system, given, progress=False))
+        found.append(lacuna.diagnose(system, given, on_progress=False))
     assert found[0].record["verdict"] == found[1].record["verdict"] == "identified"
     assert found[0].theta == found[1].theta
