@@ -69,6 +69,11 @@ class Metric:
         """For searches over many draws: six cycles, longer steps. What it lets through is judged again."""
         return replace(self, cycles=6, judged=2, periodic=5e-3, tolerance_m=3e-5)
 
+    def of_draws(self) -> "Metric":
+        """For robots that the model may be: they may slip. Their friction is not well known, and a speed that is
+        measured counts however a robot comes by it."""
+        return replace(self, slip_m=np.inf)
+
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""
         last = progress.advance_m[:, -self.judged :]
@@ -102,6 +107,10 @@ class Passage:
     def quicker(self) -> "Passage":
         """As many cycles, since the tunnel has to be passed; longer steps."""
         return replace(self, tolerance_m=3e-5)
+
+    def of_draws(self) -> "Passage":
+        """For robots that the model may be: the same."""
+        return self
 
     def judge(self, progress: Advance) -> Judged:
         """Time until the whole robot is behind the tunnel, from simulated cycles of shape (n, cycles)."""

@@ -28,7 +28,8 @@ class NominalSpeed:
 
 
 class RobustSpeed:
-    """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws.
+    """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws; 0 where the
+    metric's rules are broken on the model itself.
 
     Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so
     the r-th smallest met so far bounds it from above: a gait whose bound is below `abandon` of the best value
@@ -45,8 +46,8 @@ class RobustSpeed:
         share: float = QUANTILE,
         abandon: float = 0.9,
     ):
-        self._runs, self._space, self._metric = runs, space, metric
-        self._plants = [nominal, *draws]
+        self._runs, self._space, self._draws = runs, space, draws
+        self._metric, self._own = metric.of_draws(), NominalSpeed(runs, nominal, space, metric)
         self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
         self._abandon, self._best = abandon, 0.0
@@ -54,16 +55,16 @@ class RobustSpeed:
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """(n,) of points (n, dimensions) of the unit cube, in mm/s."""
         rows = gait_rows(self._space.gaits(points))
-        draws = len(self._plants) - 1
+        draws = len(self._draws)
         order = np.argsort(-self._failures, kind="stable")
         met = np.full((len(rows), draws), np.inf)
-        bound = self._speeds(rows, np.zeros(len(rows), dtype=np.int64))
+        bound = self._own(points)
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
         while alive.size and done < draws:
             batch = order[done : done + size]
             gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
-            met[gaits, which] = self._speeds(rows[gaits], which + 1)
+            met[gaits, which] = self._speeds(rows[gaits], which)
             done, size = done + len(batch), 2 * size
             bound[alive] = np.minimum(bound[alive], np.partition(met[alive], self._rank - 1)[:, self._rank - 1])
             low = met[np.ix_(alive, batch)] < self._abandon * np.maximum(bound[alive], self._best)[:, None]
@@ -74,7 +75,7 @@ class RobustSpeed:
         return bound
 
     def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:
-        return self._runs.judged(self._plants, which, rows, self._metric).counted_mm_s
+        return self._runs.judged(self._draws, which, rows, self._metric).counted_mm_s
 
 
 def distribution(runs: Simulations, draws: Sequence[Plant], gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:
