@@ -119,7 +119,7 @@ def _walk_base(folder: Path, name: str, naive: bool, setup: Setup, effort: Effor
         return
     model = load_model(folder / "model-base.toml")
     try:
-        gait = found_gait(model, setup.seed, None, lambda *_: None, naive).gait
+        gait = found_gait(model, setup.seed, None, lambda *_: None, naive=naive).gait
     except SearchError:
         gait = BASELINE
     save_gait(folder / f"gait-{name}.toml", gait, {"made_by": "benchmarks.loop"})

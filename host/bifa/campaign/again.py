@@ -96,10 +96,11 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 @dataclass(frozen=True)
 class Trades:
     """What a round is made of: a diagnosis of all data gives the completed model and what it names, an optimiser its
-    gait, and the robot walks it into a data set; walk(number, model, gait, folder) numbers the rounds from 2 on."""
+    gait, beginning from those walked before, and the robot walks it into a data set; walk(number, model, gait, folder)
+    numbers the rounds from 2 on."""
 
     complete: Callable[[Dataset], tuple[Model, tuple[str, ...]]]
-    optimize: Callable[[Model], Gait]
+    optimize: Callable[[Model, tuple[Gait, ...]], Gait]
     walk: Callable[[int, Model, Gait, Path], Dataset]
 
 
@@ -152,7 +153,9 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     """
     model, gait = load_model(inputs / "model-completed.toml"), load_gait(inputs / "gait-completed.toml")
     walks = read_dataset(inputs / "walks-completed")
-    dataset = joined(dataset, _without_baseline(read_dataset(inputs / "walks-base")), "walks-1/")
+    before = _without_baseline(read_dataset(inputs / "walks-base"))
+    dataset = joined(dataset, before, "walks-1/")
+    began = tuple({Gait(**trial.walked): None for trial in before.trials})
     (outputs / "rounds").mkdir(exist_ok=True)
     rounds = [judged(model, effects, walks)]
     found = [gait]
@@ -160,7 +163,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         model, effects = trades.complete(dataset)
-        found.append(trades.optimize(model))
+        found.append(trades.optimize(model, (*began, *found)))
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)
         rounds.append(judged(model, effects, walks, at_edge=True))

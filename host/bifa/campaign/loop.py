@@ -47,10 +47,10 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
     stages = [
         *_characterize(setup, effort, on_progress),
         _fit(setup, on_progress),
-        _optimize("base", setup, on_progress),
+        _optimize("base", (), setup, on_progress),
         _walk("base", {"baseline": None, "base": "gait-base.toml"}, 1, setup, effort, on_progress),
         _diagnose(setup, on_progress),
-        _optimize("completed", setup, on_progress),
+        _optimize("completed", ("gait-base.toml",), setup, on_progress),
         _walk("completed", {"completed": "gait-completed.toml"}, 2, setup, effort, on_progress),
         _again(setup, effort, on_progress),
     ]
@@ -122,35 +122,44 @@ def _fit(setup: Setup, on_progress: OnProgress) -> Stage:
     return Stage("fit", "fit the base model", ("bench",), ("model-base.toml",), run)
 
 
-def _optimize(which: str, setup: Setup, on_progress: OnProgress) -> Stage:
-    """The gait of the base or of the completed model."""
+def _optimize(which: str, walked: tuple[str, ...], setup: Setup, on_progress: OnProgress) -> Stage:
+    """The gait of the base or of the completed model; the search begins from the gaits `walked` before, too."""
     model, gait = f"model-{which}.toml", f"gait-{which}.toml"
 
     def run(inputs: Path, outputs: Path) -> None:
-        save_gait(outputs / gait, *_gait_of(load_model(inputs / model), setup, on_progress))
+        begin = tuple(load_gait(inputs / file) for file in walked)
+        save_gait(outputs / gait, *_gait_of(load_model(inputs / model), setup, on_progress, begin))
 
     settings = {"seed": setup.seed, "spread": SPREAD}
-    return Stage(f"optimise-{which}", f"gait from the {which} model", (model,), (gait,), run, settings)
+    return Stage(f"optimise-{which}", f"gait from the {which} model", (model, *walked), (gait,), run, settings)
 
 
 def _gait_of(
-    robot: Model, setup: Setup, on_progress: OnProgress, spread: float | None = SPREAD
+    robot: Model, setup: Setup, on_progress: OnProgress, walked: tuple[Gait, ...], spread: float | None = SPREAD
 ) -> tuple[Gait, dict[str, Any]]:
     """The gait found with a model, robust against `spread` or, None, against what is known, and where it comes from. A
     base model that lacks much may have none that walks, and neither may a robot whose bench shakes it: that ends no
     campaign, and the baseline stands in."""
     try:
-        best = found_gait(robot, setup.seed, spread, on_progress)
+        best = found_gait(robot, setup.seed, spread, on_progress, walked)
     except SearchError as error:
         return BASELINE, {"made_by": "bifa campaign", "instead_of": f"a gait of {robot.name}: {error}"}
     return best.gait, provenance(best, robot.name, "bifa campaign")
 
 
-def found_gait(robot: Model, seed: int, spread: float | None, on_progress: OnProgress, naive: bool = False) -> Optimum:
-    """The gait that 19 of 20 robots of what is known walk with (`spread` None), or nine of ten of a spread."""
+def found_gait(
+    robot: Model,
+    seed: int,
+    spread: float | None,
+    on_progress: OnProgress,
+    walked: tuple[Gait, ...] = (),
+    naive: bool = False,
+) -> Optimum:
+    """The gait that 19 of 20 robots of what is known walk with (`spread` None), or nine of ten of a spread. The search
+    begins from the baseline and from the other gaits `walked`, too."""
     share = QUANTILE if spread is not None else _AT_EDGE
     with simulations() as runs:
-        settings = Settings(seed=seed, spread=spread, naive=naive, share=share)
+        settings = Settings(seed=seed, spread=spread, naive=naive, share=share, begin=(BASELINE, *walked))
         return optimize(robot, runs, settings, lambda what, share, _: on_progress(what, share))
 
 
@@ -220,7 +229,7 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
         for folder in sorted((inputs / "separating").iterdir()):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
         named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
-        trades = Trades(complete, lambda robot: _gait_of(robot, setup, on_progress, None)[0], walk)
+        trades = Trades(complete, lambda robot, walked: _gait_of(robot, setup, on_progress, walked, None)[0], walk)
         again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
 
     walked = ("walks-base", "walks-completed")

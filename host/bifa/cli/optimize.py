@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 EPILOG = examples(
     "bifa optimize --model MODEL.toml --out GAIT.toml",
     "bifa optimize --out fast.toml --nominal --method de",
+    "bifa optimize --model MODEL.toml --begin slow.toml --out GAIT.toml",
     "bifa optimize --out paper.toml --nominal --method bo --evaluations 200",
     "bifa optimize --out GAIT.toml --dask tcp://scheduler:8786",
 )
@@ -58,6 +59,9 @@ def optimize(
             help="Relative sd of every parameter; by default what the model's fit knows, else a guess of 0.02."
         ),
     ] = None,
+    begin: Annotated[
+        list[Path] | None, file_option("Gait known to walk, from which the search begins as well; repeatable.")
+    ] = None,
     period: Annotated[tuple[float, float], typer.Option(help="Range of the period in s.")] = (2.0, 4.0),
     dask: Annotated[str | None, typer.Option(help=cluster.HELP)] = None,
     dask_ca: Annotated[Path | None, typer.Option(help=cluster.CA_HELP)] = None,
@@ -74,7 +78,7 @@ def optimize(
     from bifa.files import check_targets
 
     folder = pictures or pictures_beside(out)
-    check_targets(out, folders=() if no_pictures else (folder,), inputs=(model,))
+    check_targets(out, folders=() if no_pictures else (folder,), inputs=(model, *(begin or ())))
 
     from bifa.screen import Console
 
@@ -83,12 +87,13 @@ def optimize(
         with console.status("starting"):
             from bifa.gait import Settings, optimize, paper_space, simulations
             from bifa.gait.library.scenarios import provenance
-            from bifa.robot import load_model, nominal, save_gait
+            from bifa.robot import load_gait, load_model, nominal, save_gait
 
             robot = load_model(model) if model else nominal()
             space = paper_space(period_s=period)
+            known = tuple(load_gait(file) for file in begin or ())
             settings = [
-                Settings(method, robust, seed + run, evaluations, spread, space, refine=method != "bo")
+                Settings(method, robust, seed + run, evaluations, spread, space, refine=method != "bo", begin=known)
                 for run in range(runs or (3 if method == "bo" else 1))
             ]
             tls = cluster.Tls(dask_ca, dask_cert, dask_key)
@@ -177,7 +182,7 @@ def _summary(optimum: "Optimum") -> "Table":
     for share in (5, 10, 50, 90):
         table.add_row(f"{share}th percentile of {speeds.size} robots", f"{np.percentile(speeds, share):.2f} mm/s")
     lost = float(np.mean(speeds < 0.5 * optimum.nominal_mm_s))
-    table.add_row("robots that lose over half the speed, or slip", f"{100 * lost:.1f} %")
+    table.add_row("robots that lose over half the speed", f"{100 * lost:.1f} %")
     table.add_row("predicted, 90 %", optimum.prediction.text)
     table.add_row("uncertainty", optimum.spread.text)
     return table

@@ -51,15 +51,15 @@ EXPLORE = RobustRound(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    RobustRound(64, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 350, 0.05),
-    RobustRound(192, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 150, 0.015),
+    RobustRound(64, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 200, 0.05),
+    RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 90, 0.015),
 )
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
 # on others. Slower by these parts if need be.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 768, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
-_BASINS, _STARTS = 24, 12  # of the explored gaits, compared on the first and the second round's robots
+_BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
 _FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
 
 
@@ -72,6 +72,7 @@ class Settings:
     """How to search. `evaluations` None: a number that suits the method. `spread` None: what is known of the model, or
     2 % where nothing was fitted; `naive`: of that the covariance alone. `share`: of the robots, how many may be slower
     than what is maximised. `refine`: follow the method with small CMA-ES runs from its best points (the paper did not).
+    `begin`: gaits that are known to walk, from which the search begins as well.
     """
 
     method: str = "cma"
@@ -84,6 +85,7 @@ class Settings:
     refine: bool = True
     naive: bool = False
     share: float = QUANTILE
+    begin: tuple[Gait, ...] = ()
 
     def knowledge(self, model: Model) -> Knowledge:
         """From which the robots are drawn."""
@@ -156,7 +158,7 @@ def optimize(
         refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
     fresh = spread.plants(model, VERIFYING_DRAWS, settings.seed + 2_000_003)
-    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M))[0]
+    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M).of_draws())[0]
     on_progress("verify", 1.0, nominal)
     return Optimum(
         gait,
@@ -182,27 +184,30 @@ def _predicted(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, s
 
 def _explore(objective: Objective, settings: Settings, on_progress: OnProgress) -> Evaluated:
     budget = _budget(settings)
-    return METHODS[settings.method](
+    explored = METHODS[settings.method](
         objective,
         settings.space.wraps,
         budget,
         settings.seed,
         lambda count, best: on_progress("search", min(count / budget, 1.0), best),
     )
+    begun = settings.space.nearest(settings.begin)
+    return explored.joined(Evaluated(begun, objective(begun))) if len(begun) else explored
 
 
 def explore_on_robots(
     model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> Evaluated:
-    """CMA-ES on a few robots from the basins of the model's own speed: from slower copies too, since there the fastest
-    are beyond the cliff of most robots, whose objective is 0."""
+    """CMA-ES on a few robots from the basins of the model's own speed, and from the gaits to begin with: from slower
+    copies too, since the fastest are beyond the cliff of most robots, whose objective is 0."""
     objective, budget = on_robots(model, runs, spread, settings, EXPLORE, 0), _scaled(EXPLORE.evaluations, settings)
     recorder = RecordedObjective(
         objective,
         settings.space.wraps,
         lambda count, best: on_progress("search on robots", min(count / budget, 1.0), best),
     )
-    recorder(np.concatenate(_at_periods(EXPLORE, settings.space, basins(explored, settings.space.wraps, _BASINS))))
+    starts = np.vstack([settings.space.nearest(settings.begin), basins(explored, settings.space.wraps, _BASINS)])
+    recorder(np.concatenate(_at_periods(EXPLORE, settings.space, starts)))
     if not settings.refine:
         return recorder.found()
     return climb_basins(recorder, settings.space.wraps, budget, settings.seed, _POPULATION, EXPLORE.step)
@@ -291,7 +296,7 @@ def best_of_finalists(
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)
-    metric = replace(settings.metric, tolerance_m=FINE_M)
+    metric = replace(settings.metric, tolerance_m=FINE_M).of_draws()
     # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
     least = max(0.5 * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])

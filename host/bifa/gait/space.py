@@ -1,5 +1,6 @@
 """Where gaits are looked for: the paper's box (section V.B), and the map between it and the unit cube."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,15 +69,24 @@ class SearchSpace:
     def point(self, gait: Gait) -> np.ndarray:
         """(dimensions,) of a gait; SpaceError where the gait lies outside or breaks an axis's equality."""
         values = gait.as_dict()
-        point = []
         for axis in self.axes:
             first, *others = (values[name] for name in axis.sets)
             if any(abs(other - first) > 1e-9 for other in others):
                 raise SpaceError(f"{axis.name}: {' and '.join(axis.sets)} are searched as one axis and must be equal")
             if not axis.lower <= first <= axis.upper:
                 raise SpaceError(f"{axis.name} = {first:g} is outside {axis.lower:g} to {axis.upper:g} {axis.unit}")
-            point.append((first - axis.lower) / (axis.upper - axis.lower))
-        return np.array(point)
+        return self._unfolded(gait)
+
+    def nearest(self, gaits: Sequence[Gait]) -> np.ndarray:
+        """(n, dimensions) of gaits, or of what the space has nearest to them."""
+        return self.fold(np.array([self._unfolded(gait) for gait in gaits]).reshape(-1, len(self.axes)))
+
+    def _unfolded(self, gait: Gait) -> np.ndarray:
+        values = gait.as_dict()
+        means = np.array([np.mean([values[name] for name in axis.sets]) for axis in self.axes])
+        lower = np.array([axis.lower for axis in self.axes])
+        upper = np.array([axis.upper for axis in self.axes])
+        return (means - lower) / (upper - lower)
 
 
 def paper_space(

@@ -58,7 +58,7 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
     """again() with a completed model `first` and diagnoses that answer `later` in turn; rounds and data they saw."""
     inputs, outputs = folders
     save_model(inputs / "model-completed.toml", first)
-    seen, answers, gaits = [], iter(later), iter(gaits)
+    seen, answers, left, begun = [], iter(later), iter(gaits), []
 
     def complete(dataset):
         seen.append([trial.file for trial in dataset.trials])
@@ -68,8 +68,12 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
         write_dataset(folder, walked({f"round-{number}": gait}, number))
         return read_dataset(folder)
 
-    trades = Trades(complete, lambda model: next(gaits), walk_into)
-    again(inputs, outputs, Dataset(None, "day", {}, ()), (), trades)
+    def search(model, walked):
+        begun.append(walked)
+        return next(left)
+
+    again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, search, walk_into))
+    assert begun == [(FASTER, FAST, *gaits[:number]) for number in range(len(begun))], "from all that were walked"
     return json.loads((outputs / "rounds.json").read_text()), seen
 
 
@@ -122,7 +126,7 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
         write_dataset(folder, stood(gait, number))
         return read_dataset(folder)
 
-    again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, lambda model: FASTER, fall))
+    again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, lambda model, walked: FASTER, fall))
     rounds = json.loads((outputs / "rounds.json").read_text())
     assert len(rounds) == ROUNDS
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]

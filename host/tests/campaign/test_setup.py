@@ -16,7 +16,7 @@ from bifa.gait import SearchError
 from bifa.measure.bench_file import ASKED, BenchFileError, known_on, read_bench, read_exports
 from bifa.measure.plan import BRISK, PlannedTrial
 from bifa.robot import nominal, save_model
-from bifa.robot.gait import BASELINE, load_gait
+from bifa.robot.gait import BASELINE, load_gait, save_gait
 
 
 class Answering:
@@ -155,6 +155,7 @@ def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
     monkeypatch.setattr(loop, "found_gait", nothing_walks)
     stages = {stage.name: stage for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)}
     save_model(tmp_path / f"model-{model}.toml", nominal())
+    save_gait(tmp_path / "gait-base.toml", BASELINE)
     stages[f"optimise-{model}"].run(tmp_path, tmp_path)
     assert load_gait(tmp_path / f"gait-{model}.toml") == BASELINE
     assert "none walks" in (tmp_path / f"gait-{model}.toml").read_text()

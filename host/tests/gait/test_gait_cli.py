@@ -38,6 +38,7 @@ def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
         (["--spread", "0.9"], "spread = 0.9 must be above 0"),
         (["--period", "0.1", "4"], "period_s: 0.1 to 4 must be a range within 0.5 to 60 s"),
         (["--period", "4", "2"], "must be a range"),
+        (["--begin", __file__], "test_gait_cli.py"),
     ],
 )
 def test_bad_input_names_the_range(tmp_path, arguments, words):

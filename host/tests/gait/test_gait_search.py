@@ -75,6 +75,17 @@ def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs
     assert found.best_value > 20.0
 
 
+@pytest.mark.parametrize("robust", [False, True])
+def test_a_search_ends_no_slower_than_the_gaits_that_it_begins_from(runs, robust):
+    known = library.load("robust").gait
+    settings = Settings(robust=robust, evaluations=24, seed=5, begin=(BASELINE, known))
+    found = optimize(nominal(), runs, settings)
+    robots = found.spread.plants(nominal(), 256, 9) if robust else [plant(nominal())]
+    speeds = distribution(runs, robots, gait_rows([known, found.gait]), Metric().finer())
+    before, after = np.quantile(speeds, settings.share, axis=1)
+    assert after >= 0.995 * before > 20.0
+
+
 @pytest.mark.slow
 def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     """With a spread of 1 % a search on few robots ended at gaits that fail one robot in ten: 10th percentile 0."""

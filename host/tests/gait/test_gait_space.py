@@ -1,10 +1,12 @@
 """The box that is searched, and the map to the unit cube."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bifa.gait.space import SearchAxis, SpaceError, paper_space
-from bifa.robot.gait import Gait
+from bifa.robot.gait import BASELINE, Gait
 
 
 def test_the_paper_box_at_its_corners():
@@ -23,6 +25,12 @@ def test_point_is_the_inverse_of_gaits():
     points = np.random.default_rng(0).random((20, 5))
     for point, gait in zip(points, paper_space().gaits(points), strict=True):
         np.testing.assert_allclose(paper_space().point(gait), point, atol=1e-12)
+
+
+def test_of_a_gait_outside_the_nearest_is_taken():
+    inside, outside = paper_space().gaits(paper_space().nearest([Gait(3.0, 0, 90, 0.5, 0.4, 0.6), BASELINE]))
+    assert inside == Gait(3.0, 0.0, 90.0, 0.5, 0.5, 0.5)
+    assert outside == replace(BASELINE, period_s=4.0)
 
 
 def test_errors_name_the_axis_and_the_range():
