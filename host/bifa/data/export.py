@@ -79,19 +79,22 @@ OWN_NAMES = Export("", SheetForm(), {})
 
 
 def read_export(
-    path: Path, export: Export, wanted: Iterable[str], optional: Iterable[str] = (), file: str | None = None
+    path: Path, export: Export, wanted: Iterable[str], optional: Iterable[str] = ()
 ) -> tuple[dict[str, np.ndarray], Sheet, np.ndarray]:
-    """Columns of a file by the data set's names and in its units, NaN where a cell is empty; the sheet, and which of
-    its rows these are. Raises DatasetError naming file, line, column and cell."""
-    sheet = Sheet(path, export.form, file)
-    rows = _rows(sheet, export)
-    columns = {}
-    for name in wanted:
-        columns[name] = _column(sheet, export, name)[rows]
-    for name in optional:
-        if name in export.columns or _has(sheet, name):
-            columns[name] = _column(sheet, export, name)[rows]
+    """As `read_columns`, from the file at `path`, and the sheet that it holds."""
+    sheet = Sheet(path, export.form)
+    columns, rows = read_columns(sheet, export, wanted, optional)
     return columns, sheet, rows
+
+
+def read_columns(
+    sheet: Sheet, export: Export, wanted: Iterable[str], optional: Iterable[str] = ()
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Columns by the data set's names and in its units, NaN where a cell is empty; and which of the sheet's rows these
+    are. Raises DatasetError naming file, line, column and cell."""
+    rows = _rows(sheet, export)
+    there = [name for name in optional if name in export.columns or name in sheet.labels()]
+    return {name: _column(sheet, export, name)[rows] for name in (*wanted, *there)}, rows
 
 
 def sync_edges(export: Export, columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarray) -> np.ndarray:
@@ -132,10 +135,6 @@ def _same(cell: str, value: Any) -> bool:
         return float(cell) == value if not isinstance(value, str) else cell.strip() == value
     except ValueError:
         return False
-
-
-def _has(sheet: Sheet, name: str) -> bool:
-    return name in sheet.labels()
 
 
 def _column(sheet: Sheet, export: Export, name: str) -> np.ndarray:

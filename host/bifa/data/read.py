@@ -16,7 +16,7 @@ from bifa.toml import parse_toml
 
 from .dataset import Dataset, Trial
 from .errors import DatasetError
-from .export import ROLES, Export, parse_exports, read_export
+from .export import OWN_NAMES, ROLES, Export, parse_exports, read_columns
 from .fields import Fields, Source
 from .layout import (
     ACTUATORS,
@@ -32,7 +32,8 @@ from .layout import (
     TABLE_FILE,
     is_command,
 )
-from .table import check_values, read_table
+from .sheet import Sheet
+from .table import check_header, check_values
 
 _CHAMBERS = tuple(c.removeprefix("command_") for c in EXPERIMENTS["locomotion"].columns if is_command(c))
 _CLOCK_S = 0.1  # by which a time may be outside its trial: of the order of a command's age
@@ -80,17 +81,12 @@ def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> di
     """The columns of a file in the data set's own form, or in the form declared for the instrument of its
     experiment."""
     layout = EXPERIMENTS[head["experiment"]]
-    export = exports.get(ROLES[head["experiment"]])
-    if export is None:
-        return read_table(path, head["file"], layout)
-    columns, sheet, rows = read_export(path, export, layout.columns, layout.optional_columns, head["file"])
-    for name, values in columns.items():
-        if not np.isfinite(values).all():
-            row = rows[np.flatnonzero(~np.isfinite(values))[0]]
-            raise sheet.error("the value is missing", row, export.columns.get(name, name))
-    if len(rows) < 2:
-        raise sheet.error(f"{len(rows)} rows of data; at least two are needed")
-    check_values(columns, head["file"], [sheet.line(row) for row in rows])
+    export = exports.get(ROLES[head["experiment"]], OWN_NAMES)
+    sheet = Sheet(path, export.form, head["file"])
+    if export is OWN_NAMES:
+        check_header(sheet, layout)
+    columns, rows = read_columns(sheet, export, layout.columns, layout.optional_columns)
+    check_values(columns, sheet, rows, export.columns)
     return columns
 
 

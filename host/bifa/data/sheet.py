@@ -9,11 +9,11 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +26,6 @@ SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _NAMES_OF = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "blanks"}
 _HEAD = 1 << 18  # bytes in which a header has to be found
 _MOST_NAMED = 8
-NUMERIC_BYTES = b"0123456789+-.eE, \t\r\n"
 
 
 @dataclass(frozen=True)
@@ -47,32 +46,6 @@ class SheetForm:
 
 
 OWN = SheetForm()
-
-
-def fast_numbers(path: Path, skip: int, width: int) -> np.ndarray | None:
-    """Numbers of shape (rows, width) below the first `skip` bytes of a file in the data set's own form, or None where
-    pandas cannot have read every cell."""
-    import pandas
-
-    with path.open("rb") as file:
-        file.seek(skip)
-        for block in iter(lambda: file.read(1 << 20), b""):
-            if block.translate(None, NUMERIC_BYTES):
-                return None
-        file.seek(skip)
-        try:
-            frame = pandas.read_csv(
-                file,
-                header=None,
-                skip_blank_lines=False,
-                keep_default_na=False,
-                dtype=float,
-                **_exact(),
-            )
-        except (ValueError, pandas.errors.ParserError, OverflowError):
-            return None
-    values = frame.to_numpy()
-    return values if values.shape[1] == width and np.isfinite(values).all() else None
 
 
 class Sheet:
@@ -109,7 +82,9 @@ class Sheet:
         begin = self._first_head([line.decode(self._encoding, "replace") for line in lines])
         count = self._form.header_rows + self._form.units_rows
         self.first = begin + count + 1
-        heads = [self._cells(self._decoded(line)) for line in lines[begin : begin + count]]
+        heads = [
+            self._cells(self._decoded(line), at + 1) for at, line in enumerate(lines[begin : begin + count], begin)
+        ]
         offset = sum(len(line) + 1 for line in lines[: begin + count])
         return heads, raw[offset:]
 
@@ -137,13 +112,13 @@ class Sheet:
                 return place - form.header_rows + 1
         raise self._error(f"no line begins with {form.header!r}, where the names of the columns should stand")
 
-    def _cells(self, line: str) -> list[str]:
+    def _cells(self, line: str, number: int | None = None) -> list[str]:
         if self._form.separator == " ":
             return line.split()
         try:
             return next(csv.reader([line.rstrip("\r")], delimiter=self._form.separator, skipinitialspace=True), [])
         except csv.Error as error:
-            raise self._error(f"cannot be read as a CSV: {error}") from None
+            raise self._error(f"cannot be read as a CSV: {error}", number) from None
 
     def _workbook(self) -> tuple[list[list[str]], Any]:
         frame, rows = workbook(self._path, self._form.sheet, self.file)
@@ -185,21 +160,21 @@ class Sheet:
             )
         except (ValueError, OverflowError, pandas.errors.ParserError):
             frame = None
-        lines = self._rows.count(b"\n") + bool(self._rows.rpartition(b"\n")[2].strip(b"\r"))
-        if frame is not None and len(frame) == lines:
+        if frame is not None and len(frame) == len(self._lines):
             return frame
-        width = max([len(self.names), *map(len, self._written)])
-        rows = [[cell or None for cell in row] + [None] * (width - len(row)) for row in self._written]
+        written = [self._written(row) for row in range(len(self._lines))]
+        width = max([len(self.names), *map(len, written)])
+        rows = [[cell or None for cell in row] + [None] * (width - len(row)) for row in written]
         return pandas.DataFrame(rows, columns=range(width), dtype=object)
 
     @cached_property
-    def _written(self) -> Sequence[Sequence[str]]:
-        """The cells of each line, parted when they are asked for."""
+    def _lines(self) -> list[bytes]:
         lines = self._rows.split(b"\n")
-        return _Parted(lines if lines[-1].strip(b"\r") else lines[:-1], self._parts_of)
+        return lines if lines[-1].strip(b"\r") else lines[:-1]
 
-    def _parts_of(self, raw: bytes) -> list[str]:
-        return self._cells(self._decoded(raw))
+    def _written(self, row: int) -> list[str]:
+        """The cells of a line, parted when they are asked for: of a file of many megabytes few ever are."""
+        return self._cells(self._decoded(self._lines[row]), self.line(row))
 
     # -- names -----------------------------------------------------------------------------------------------------
 
@@ -210,7 +185,8 @@ class Sheet:
                 if mark in self.names[0][0]:
                     raise self._error(
                         f"its columns are separated by {_NAMES_OF[mark]}; save it with commas between columns, points "
-                        "in numbers, or declare how it is written (bifa instrument)"
+                        "in numbers, or declare how it is written (bifa instrument)",
+                        self.first - 1,
                     )
 
     def labels(self) -> list[str]:
@@ -264,7 +240,8 @@ class Sheet:
             return [""] * len(self)
         if self._form.format == "xlsx":
             return ["" if cell != cell or cell is None else str(cell) for cell in self._frame.iloc[:, place]]
-        return [row[place] if place < len(row) else "" for row in self._written[: len(self)]]
+        written = map(self._written, range(len(self)))
+        return [row[place] if place < len(row) else "" for row in written]
 
     def is_text(self, place: int) -> bool:
         """Whether no cell of a column is a number."""
@@ -291,32 +268,13 @@ class Sheet:
 
     def _refuse_beyond(self, row: int) -> None:
         width = len(self.names)
-        cells = self._written[row] if self._form.format == "csv" else []
+        cells = self._written(row) if self._form.format == "csv" else []
         raise self.error(
             f"{max(len(cells), width + 1)} fields, but {width} columns; are there commas in the numbers, or lines "
             "above the names of the columns? Save it with decimal points and without them, or declare how it is "
             "written (bifa instrument)",
             row,
         )
-
-
-class _Parted(Sequence[Sequence[str]]):
-    """Lines that are split into cells on demand: of a file of many megabytes few are ever needed."""
-
-    def __init__(self, lines: Sequence[bytes], parts_of: Callable[[bytes], list[str]]) -> None:
-        self._lines, self._parts_of = lines, parts_of
-
-    def __len__(self) -> int:
-        return len(self._lines)
-
-    @overload
-    def __getitem__(self, place: int) -> Sequence[str]: ...
-    @overload
-    def __getitem__(self, place: slice) -> Sequence[Sequence[str]]: ...
-    def __getitem__(self, place: int | slice) -> Any:
-        if isinstance(place, slice):
-            return _Parted(self._lines[place], self._parts_of)
-        return self._parts_of(self._lines[place])
 
 
 def _exact() -> dict[str, str]:

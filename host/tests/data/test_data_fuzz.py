@@ -33,11 +33,16 @@ def damage(raw: bytes, rng: random.Random) -> bytes:
 def assert_read_exactly(dataset) -> None:
     """Compare with Python's own csv and float, field by field."""
     for trial in dataset.trials:
-        with (dataset.path / trial.file).open(newline="", encoding="utf-8") as file:
-            header, *rows = csv.reader(file, quoting=csv.QUOTE_NONE)
-        assert [name.strip() for name in header] == list(trial.columns)
-        expected = np.array([[float(field) for field in row] for row in rows])
-        np.testing.assert_array_equal(np.column_stack(list(trial.columns.values())), expected)
+        with (dataset.path / trial.file).open(newline="", encoding="utf-8-sig") as file:
+            lines = file.read().replace("\ufeff", "").replace("\r\n", "\n").split("\n")
+        header, *rows = (next(csv.reader([line], skipinitialspace=True), []) for line in lines)  # none goes on below
+        while not "".join(rows[-1]).strip():  # blank lines at the end
+            rows.pop()
+        assert sorted(name.strip() for name in header) == sorted(trial.columns)
+        assert not any("".join(row[len(header) :]) for row in rows)
+        expected = np.array([[float(field) for field in row[: len(header)]] for row in rows])
+        read = np.column_stack([trial.columns[name.strip()] for name in header])
+        np.testing.assert_array_equal(read, expected)
         assert np.isfinite(expected).all()
         assert (np.diff(trial.time_s) > 0).all()
 

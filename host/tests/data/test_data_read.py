@@ -105,40 +105,38 @@ MALFORMED_CSV = {
     "column twice": (edit_row(1, 5, "time_s"), 1, "time_s", "twice"),
     "no header": (lambda folder: edit_lines(lambda lines: lines.pop(0))(folder), 1, "0", "unknown column"),
     "empty name": (edit_row(1, 5, ""), 1, "(no name)", "unknown column ''"),
-    "NaN": (edit_row(7, 4, "nan"), 7, "displacement_head_mm", "nan is not a measurement"),
-    "infinity": (edit_row(7, 4, "-inf"), 7, "displacement_head_mm", "finite"),
-    "too large": (edit_row(7, 4, "1e999"), 7, "displacement_head_mm", "too large"),
-    "word": (edit_row(9, 5, "abc"), 9, "pressure_body_psi", "'abc' is not a decimal number"),
+    "NaN": (edit_row(7, 4, "nan"), 7, "displacement_head_mm", "the value is missing"),
+    "infinity": (edit_row(7, 4, "-inf"), 7, "displacement_head_mm", "-inf is beyond any measurement"),
+    "too large": (edit_row(7, 4, "1e999"), 7, "displacement_head_mm", "beyond any measurement"),
+    "word": (edit_row(9, 5, "abc"), 9, "pressure_body_psi", "'abc' is not a number"),
     "hexadecimal": (edit_row(9, 5, "0x10"), 9, "pressure_body_psi", "'0x10'"),
     "underscore": (edit_row(9, 5, "1_0"), 9, "pressure_body_psi", "'1_0'"),
-    "decimal comma": (edit_row(9, 5, "1,5"), 9, "9", "9 fields where the header has 8"),
-    "quotes": (edit_row(9, 5, '"1"'), 9, "pressure_body_psi", "not a decimal"),
-    "foreign digits": (edit_row(9, 5, "١٢"), 9, "pressure_body_psi", "not a decimal"),
+    "decimal comma": (edit_row(9, 5, "1,5"), 9, None, "9 fields, but 8 columns"),
+    "open quote": (edit_row(9, 5, '"1'), 9, "pressure_body_psi", "is not a number"),
+    "foreign digits": (edit_row(9, 5, "١٢"), 9, "pressure_body_psi", "not a number"),
     "empty field": (edit_row(9, 7, ""), 9, "pressure_tail_psi", "missing"),
-    "short row": (edit_lines(lambda lines: lines.__setitem__(4, "0.03,0,0")), 5, "command_tail", "3 fields"),
-    "long row": (edit_lines(lambda lines: lines.__setitem__(4, lines[4] + ",1")), 5, "9", "9 fields"),
-    "blank line": (edit_lines(lambda lines: lines.insert(3, "")), 4, None, "blank line"),
-    "blank at the end": (edit_lines(lambda lines: lines.append("")), 42, None, "blank line"),
-    "comment": (edit_lines(lambda lines: lines.insert(3, "# pause")), 4, "command_body", "1 fields"),
+    "short row": (edit_lines(lambda lines: lines.__setitem__(4, "0.03,0,0")), 5, "command_tail", "missing"),
+    "long row": (edit_lines(lambda lines: lines.__setitem__(4, lines[4] + ",1")), 5, None, "9 fields"),
+    "blank line": (edit_lines(lambda lines: lines.insert(3, "")), 4, "time_s", "missing"),
+    "comment": (edit_lines(lambda lines: lines.insert(3, "# pause")), 4, "time_s", "'# pause' is not a number"),
     "time backwards": (edit_row(8, 0, "0.01"), 8, "time_s", "goes backwards: 0.01 after 0.05"),
     "time stands": (edit_row(8, 0, "0.05"), 8, "time_s", "stands still"),
     "half a command": (edit_row(6, 2, "0.5"), 6, "command_head", "0.5 is neither"),
-    "empty file": (write_walk(b""), 1, None, "is empty"),
+    "empty file": (write_walk(b""), 1, "time_s", "missing from the header"),
     "header only": (write_walk(HEADER), 1, None, "0 rows"),
     "one row": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n"), 2, None, "1 rows"),
     "UTF-16": (lambda f: (f / WALK).write_text((f / WALK).read_text(), "utf-16"), 1, None, "not UTF-8"),
-    "byte order mark": (
-        lambda f: (f / WALK).write_text((f / WALK).read_text(), "utf-8-sig"),
-        1,
-        None,
-        "byte order",
-    ),
     "header as a remark": (write_walk(b"# " + HEADER + b"0,0,0,0,0,0,0,0\n"), 1, "# time_s", 'comments=""'),
     "Latin 1": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\xb5,0,0,0\n"), 3, None, "0xb5 is not UTF-8"),
     "NUL": (write_walk(HEADER + b"0,0,0,0,0,0,0,0\n0.01,0,0,0,\0,0,0,0\n"), 3, "displacement_head_mm", "not a"),
-    "semicolons": (write_walk(HEADER.replace(b",", b";")), 1, None, "separated by semicolons, not by commas"),
-    "tabs": (write_walk(HEADER.replace(b",", b"\t")), 1, None, "separated by tabs, not by commas"),
-    "decimal commas": (write_walk(HEADER + b"0,00,0,0,0,0,1,5,0\n0,01,0,0,0,0,1,5,0\n"), 2, "9", "with a point"),
+    "semicolons": (write_walk(HEADER.replace(b",", b";")), 1, None, "separated by semicolons"),
+    "tabs": (write_walk(HEADER.replace(b",", b"\t")), 1, None, "separated by tabs"),
+    "decimal commas": (
+        write_walk(HEADER + b"0,00,0,0,0,0,1,5,0\n0,01,0,0,0,0,1,5,0\n"),
+        2,
+        None,
+        "commas in the numbers",
+    ),
 }
 
 
@@ -154,6 +152,14 @@ def test_malformed_csv_is_refused_with_its_place(folder, kind):
         assert error.column == column
         assert f"column {column}" in str(error)
     assert str(error).startswith(f"{WALK}, line {line}")
+
+
+def test_marks_quotes_and_blank_lines_of_spreadsheets_are_read(folder):
+    path = folder / WALK
+    head, *rows = path.read_text().split("\n")
+    quoted = [",".join(f'"{cell}"' for cell in row.split(",")) for row in rows if row]
+    path.write_text("\n".join([head, *quoted, "", ""]), "utf-8-sig")
+    assert_same(read_dataset(folder), make_dataset())
 
 
 def replace(old, new, count=1):

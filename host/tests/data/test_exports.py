@@ -336,7 +336,7 @@ def test_a_data_set_reads_exports_as_they_came(tmp_path):
     with pytest.raises(DatasetError, match=r"raw/one\.TRA, line 4, column Standardkraft: the value is missing"):
         read_dataset(tmp_path)
     path.write_text("\r\n".join([*lines, "0,01;1;1;1"]), encoding="cp1252")
-    with pytest.raises(DatasetError, match=r"raw/one\.TRA, line 5, column time_s: time goes backwards"):
+    with pytest.raises(DatasetError, match=r"raw/one\.TRA, line 5, column Prüfzeit: time goes backwards"):
         read_dataset(tmp_path)
 
 
