@@ -20,7 +20,7 @@ class Console(rich.console.Console):
     Colored text is given as a `Text`."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(**{"markup": False, "emoji": False} | options)
+        super().__init__(**{"markup": False, "emoji": False, "highlight": False} | options)
 
     def render(self, *args: Any, **kwargs: Any) -> Iterable[Segment]:
         """See rich.console.Console: text is made printable, rich's own control codes stay."""
@@ -50,7 +50,7 @@ class Countdown:
             self._status = self._console.status(text)
             self._status.start()
         elif what != self._what:
-            self._console.print(text, highlight=False)
+            self._console.print(text)
         self._what = what
 
     def close(self) -> None:

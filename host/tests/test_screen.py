@@ -15,7 +15,7 @@ NAMES = ["[/x]", "[link=https://evil.example]here[/link]", "[red]", "[bold]x[/bo
 
 def printed(*things, **options) -> str:
     out = io.StringIO()
-    Console(file=out, width=200, force_terminal=True, **options).print(*things, highlight=False)
+    Console(file=out, width=200, force_terminal=True, **options).print(*things)
     return out.getvalue()
 
 

@@ -28,7 +28,7 @@ class StageProgress:
         """A stage begins."""
         self._title = stage.title
         if stage.by_hand:
-            self._console.print(stage.title, highlight=False)
+            self._console.print(stage.title)
         else:
             self._begin()
 
@@ -54,7 +54,7 @@ class StageProgress:
         """A stage is done; ran: it was not up to date already."""
         said = "done" if ran else "up to date"
         if self._bars is None:
-            self._console.print(f"{stage.title}: {said}", highlight=False)
+            self._console.print(f"{stage.title}: {said}")
             return
         self._bars.update(self._task, total=1.0, completed=1.0, what=said)
         self.close()

@@ -1,4 +1,4 @@
-"""The command `bifa`: one file per command; each file has `register(app)`.
+"""The command `bifa`: one file per command, with a function of the file's name and the `EXAMPLES` of its help.
 
 Heavy imports (numba, matplotlib, SciPy) belong inside the command's function, so that `bifa --help` is instant.
 """
@@ -60,7 +60,8 @@ def _commands(
 
 
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__) if module.name[0] != "_"):
-    importlib.import_module(f"{__name__}.{_module}").register(app)
+    _file = importlib.import_module(f"{__name__}.{_module}")
+    app.command(epilog="\n\n".join(("Examples:", *_file.EXAMPLES)))(getattr(_file, _module))
 for _command in app.registered_commands:  # a paragraph fills the terminal, however the docstring is broken
     _command.help = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(_command.callback) or "")
     _command.short_help = re.split(r"(?<=\.)\s", _command.help)[0]  # its first sentence, not 45 characters of it

@@ -3,9 +3,12 @@
 import pkgutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Literal
 
 import typer
+
+from bifa.printable import counted
 
 Profile = Literal["ideal", "realistic", "worn"]
 Method = Literal["cma", "de", "bo"]  # bifa.gait.methods.METHODS, which would be seconds to import
@@ -78,9 +81,12 @@ PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
 
 
-def examples(*commands: str) -> str:
-    """The examples at the end of a command's help, one per line."""
-    return "\n\n".join(("Examples:", *commands))
+def kept(out: Path, what: str) -> str:
+    """What an interrupted recording has on disk, in words; `what`: one of its files."""
+    from bifa.data.write import partial_of
+
+    partial = partial_of(out)
+    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), what)}"
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, examples, port_option, stoppable
+from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option, stoppable
 from bifa.computer import EXAMPLE_PORT
 from bifa.printable import counted
 
@@ -17,18 +17,13 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa campaign --port virtual --seed 3",
     "bifa campaign --quick",
     "bifa campaign --rerun diagnose",
     f"bifa campaign --port {EXAMPLE_PORT} --watch records --out out/monday",
     f"bifa campaign --port {EXAMPLE_PORT} --known head_mass_kg=0.182 --out out/monday",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(campaign)
 
 
 def campaign(
@@ -113,7 +108,7 @@ def run_campaign(
     summary = json.loads((out / "summary.json").read_text())
     effects = "; ".join(effect_words(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
     verdict = Text.assemble("verdict: ", (summary["verdict"], "bold"), f", {plain_spaces(effects)}")
-    console.print(verdict, highlight=False)
+    console.print(verdict)
     if summary["truth"] is not None:
         inside = "; ".join(effect_words(name, values) for name, values in summary["truth"].items())
         print_lines(console, [f"the seal opened: {inside or 'nothing'}"])
@@ -125,10 +120,9 @@ def run_campaign(
             f"round {number}, a gait that was not fitted{', at the edge' if one['at_edge'] else ''}: "
             f"{one['predicted_mm_s']:.2f} mm/s predicted ({one['interval_90_mm_s'][0]:.2f} to "
             f"{one['interval_90_mm_s'][1]:.2f}, walks with probability {one['walks_probability']:.2f}), "
-            f"{one['measured_mm_s']:.2f} ± {one['spread_mm_s']:.2f} measured",
-            highlight=False,
+            f"{one['measured_mm_s']:.2f} ± {one['spread_mm_s']:.2f} measured"
         )
-    console.print(f"report: {out / 'report.html'}", highlight=False, soft_wrap=True)
+    console.print(f"report: {out / 'report.html'}", soft_wrap=True)
 
 
 def _check(out: Path, port: str) -> None:
@@ -165,7 +159,7 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
     if watch is not None and not watch.is_dir():
         raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
     plain = not console.encoding.lower().startswith("utf")
-    desk = Desk(lambda text: console.print(text, highlight=False), watch, Countdown(console))
+    desk = Desk(lambda text: console.print(text), watch, Countdown(console))
     exports = partial(read_exports, bench_file) if bench_file else dict
     exports()  # what is wrong is said before anything moves
     return desk, ByHand(desk, watch, plain, exports, console.width)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import DATASET, PICTURES, examples
+from bifa.cli._options import DATASET, PICTURES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,45 +15,44 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-def register(app: typer.Typer) -> None:
-    """Offer the command `check`."""
+EXAMPLES = ("bifa check bench-2026-11-21", "bifa check bench-2026-11-21 --pictures out/pictures")
 
-    @app.command(epilog=examples("bifa check bench-2026-11-21", "bifa check bench-2026-11-21 --pictures out/pictures"))
-    def check(
-        dataset: Annotated[Path, DATASET],
-        pictures: Annotated[Path | None, PICTURES] = None,
-        strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 if anything is found.")] = False,
-    ) -> None:
-        """List what is in a data set, warn of what looks wrong, and plot it with --pictures.
 
-        A malformed data set gives status 2 and an error with file, line and column. Data that are well-formed but
-        doubtful (a clipped sensor, a clock that jumps, missing repeats) are listed as warnings, status 0; so are what
-        seem to be mistakes (a sign turned, tubes exchanged, a gait of another walk, a mass in grams).
-        """
-        from bifa.files import check_targets, written_into
+def check(
+    dataset: Annotated[Path, DATASET],
+    pictures: Annotated[Path | None, PICTURES] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with status 1 if anything is found.")] = False,
+) -> None:
+    """List what is in a data set, warn of what looks wrong, and plot it with --pictures.
 
-        check_targets(folders=(pictures,))
+    A malformed data set gives status 2 and an error with file, line and column. Data that are well-formed but
+    doubtful (a clipped sensor, a clock that jumps, missing repeats) are listed as warnings, status 0; so are what
+    seem to be mistakes (a sign turned, tubes exchanged, a gait of another walk, a mass in grams).
+    """
+    from bifa.files import check_targets, written_into
 
-        from bifa.check import check_dataset
-        from bifa.data import read_dataset
-        from bifa.screen import Console
+    check_targets(folders=(pictures,))
 
-        console = Console()
-        with console.status("reading"):
-            content = read_dataset(dataset)
-            findings = check_dataset(content)
-        _print_contents(console, content)
-        _print_findings(console, findings)
-        if not findings:
-            console.print("Nothing looks wrong.")
-        if pictures is not None:
-            from bifa.report.datasets import plot_dataset
+    from bifa.check import check_dataset
+    from bifa.data import read_dataset
+    from bifa.screen import Console
 
-            with console.status("drawing"), written_into(pictures) as aside:
-                written = plot_dataset(content, aside)
-            console.print(f"{len(written)} pictures in {pictures}", highlight=False)
-        if strict and findings:
-            raise typer.Exit(1)
+    console = Console()
+    with console.status("reading"):
+        content = read_dataset(dataset)
+        findings = check_dataset(content)
+    _print_contents(console, content)
+    _print_findings(console, findings)
+    if not findings:
+        console.print("Nothing looks wrong.")
+    if pictures is not None:
+        from bifa.report.datasets import plot_dataset
+
+        with console.status("drawing"), written_into(pictures) as aside:
+            written = plot_dataset(content, aside)
+        console.print(f"{len(written)} pictures in {pictures}")
+    if strict and findings:
+        raise typer.Exit(1)
 
 
 def warn_of_units(console: "Console", dataset: "Dataset") -> None:
@@ -69,9 +68,9 @@ def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
     from bifa.check.alike import gathered
 
     for found in gathered(findings):
-        console.print(Text.assemble(("warning", "yellow"), f" [{found.kind}] {found.text}"), highlight=False)
+        console.print(Text.assemble(("warning", "yellow"), f" [{found.kind}] {found.text}"))
         if found.places:
-            console.print(Text(f"  {'; '.join(found.places)}"), highlight=False)
+            console.print(Text(f"  {'; '.join(found.places)}"))
 
 
 def _print_contents(console: "Console", dataset: "Dataset") -> None:

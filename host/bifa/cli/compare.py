@@ -5,14 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import examples
-
-EPILOG = examples("bifa compare out/monday out/tuesday", "bifa compare out/* --report compare.html")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(compare)
+EXAMPLES = ("bifa compare out/monday out/tuesday", "bifa compare out/* --report compare.html")
 
 
 def compare(
@@ -51,4 +44,4 @@ def compare(
         from bifa.report.page import write_page
 
         write_page(compare_page(found), report)
-        console.print(f"report: {report}", highlight=False, soft_wrap=True)
+        console.print(f"report: {report}", soft_wrap=True)

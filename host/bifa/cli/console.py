@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import PORT, examples
+from bifa.cli._options import PORT
 from bifa.computer import EXAMPLE_PORT
 
 if TYPE_CHECKING:
@@ -14,14 +14,9 @@ if TYPE_CHECKING:
     from bifa.rig import Rig
 
 
-EPILOG = examples("bifa console", "bifa console --port virtual", f"echo show | bifa console --port {EXAMPLE_PORT}")
+EXAMPLES = ("bifa console", "bifa console --port virtual", f"echo show | bifa console --port {EXAMPLE_PORT}")
 
 _LOOK_S = 0.2
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(console)
 
 
 def console(

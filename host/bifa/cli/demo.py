@@ -5,14 +5,9 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PROFILE, RERUN, Profile, examples
+from bifa.cli._options import PROFILE, RERUN, Profile
 
-EPILOG = examples("bifa demo", "bifa demo --seed 3 --out out/three", "bifa demo --quick", "bifa demo --rerun diagnose")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(demo)
+EXAMPLES = ("bifa demo", "bifa demo --seed 3 --out out/three", "bifa demo --quick", "bifa demo --rerun diagnose")
 
 
 def demo(

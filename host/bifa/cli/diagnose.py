@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bifa import cluster
-from bifa.cli._options import DATASET, WATCH, examples, file_option, port_option
+from bifa.cli._options import DATASET, WATCH, file_option, port_option
 from bifa.cli.check import warn_of_units
 
 if TYPE_CHECKING:
@@ -25,17 +25,13 @@ if TYPE_CHECKING:
     from lacuna.diagnosis.diagnose import Diagnosis
 
 
-def register(app: typer.Typer) -> None:
-    """Offer the command `diagnose`."""
-    app.command(
-        epilog=examples(
-            "bifa diagnose out/bench --json verdict.json",
-            "bifa diagnose out/bench --out model.toml --report report.html",
-            "bifa diagnose out/bench --matters displacement_mm=0.5",
-            "bifa diagnose out/bench --port virtual --resolve",
-            "bifa diagnose out/bench --dask tcp://scheduler:8786",
-        )
-    )(diagnose)
+EXAMPLES = (
+    "bifa diagnose out/bench --json verdict.json",
+    "bifa diagnose out/bench --out model.toml --report report.html",
+    "bifa diagnose out/bench --matters displacement_mm=0.5",
+    "bifa diagnose out/bench --port virtual --resolve",
+    "bifa diagnose out/bench --dask tcp://scheduler:8786",
+)
 
 
 def diagnose(
@@ -163,12 +159,12 @@ def _report(
     print_diagnosis(console, record, labels)
     if model is not None:
         save_model(model, completed_model(found.final, date.today().isoformat()))
-        console.print(f"model: {model}. Next: bifa optimize --model {model} --out gait.toml", highlight=False)
+        console.print(f"model: {model}. Next: bifa optimize --model {model} --out gait.toml")
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:
         write_page(diagnosis_page(measured.name, record, labels, _curves(found, labels)), page)
-        console.print(f"report: {page}", highlight=False)
+        console.print(f"report: {page}")
 
 
 def _curves(found: Diagnosis, labels: dict[str, str]) -> Any:

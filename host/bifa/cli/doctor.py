@@ -4,15 +4,10 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import examples, port_option
+from bifa.cli._options import port_option
 from bifa.computer import EXAMPLE_PORT
 
-EXAMPLES = examples("bifa doctor", f"bifa doctor --port {EXAMPLE_PORT}", "bifa doctor --port virtual")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EXAMPLES)(doctor)
+EXAMPLES = ("bifa doctor", f"bifa doctor --port {EXAMPLE_PORT}", "bifa doctor --port virtual")
 
 
 def doctor(
@@ -28,7 +23,7 @@ def doctor(
     from bifa.toolchain.checks import MISSING, run_checks
 
     colors = {"ok": "green", "missing": "red", "optional": "yellow"}
-    console = Console(highlight=False)
+    console = Console()
     missing = False
     with console.status("checking"):
         for finding in run_checks(port):

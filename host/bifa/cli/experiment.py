@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, examples, file_option, stoppable
+from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, file_option, kept, stoppable
 from bifa.computer import EXAMPLE_PORT
 from bifa.printable import counted
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa experiment all --port virtual --out out/bench",
     "bifa experiment static_loading --actuator large --pressure 0 --pressure 8 --port virtual --out out/static",
     "bifa experiment locomotion --inclination 10 --port virtual --out out/uphill",
@@ -62,11 +62,6 @@ class ActuatorName(StrEnum):
 
     LARGE = "large"
     SMALL = "small"
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(experiment)
 
 
 def experiment(
@@ -151,7 +146,7 @@ def experiment(
         _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add, bench)
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
-    with stoppable(lambda: f"valves off; {_kept(out)}; run the same command to resume"):
+    with stoppable(lambda: f"valves off; {kept(out, 'finished trial')}; run the same command to resume"):
         _run(console, port, options, out, trials, name, parse_known(known), watch, bench)
 
 
@@ -159,14 +154,6 @@ def _check_within(option: str, value: float, low: float, high: float, unit: str)
     """Not left to typer, whose ranges accept NaN."""
     if not low <= value <= high:
         raise typer.BadParameter(f"{option} must be {low:g} to {high:g} {unit}, not {value:g}")
-
-
-def _kept(out: Path) -> str:
-    """What an interrupted session has on disk, in words."""
-    from bifa.data.write import partial_of
-
-    partial = partial_of(out)
-    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), 'finished trial')}"
 
 
 def _load(path: Path) -> "Gait":
@@ -217,7 +204,7 @@ def _run(
             if event.trial is not None:
                 errors.append(event.trial.extra["clock_error_s"])
             if event.misfit and hands is None:
-                console.print(warning(event.misfit), highlight=False)
+                console.print(warning(event.misfit))
 
         with nullcontext() if hands else bars:  # a bar would redraw itself over questions and answers
             dataset = run_session(

@@ -5,18 +5,13 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import DATASET, PICTURES, examples, file_option
+from bifa.cli._options import DATASET, PICTURES, file_option
 from bifa.cli.check import warn_of_units
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa fit out/bench --out model.toml",
     "bifa fit out/bench --out model.toml --report fit.html --pictures out/pictures",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(fit)
 
 
 def fit(
@@ -70,13 +65,13 @@ def fit(
         from bifa.report.page import write_page
 
         write_page(fit_page(found), report)
-        console.print(f"report: {report}", highlight=False)
+        console.print(f"report: {report}")
     if pictures is not None:
         from bifa.report.identification import draw
 
         with written_into(pictures) as aside:
             draw(found, aside)
-        console.print(f"pictures: {pictures}", highlight=False)
+        console.print(f"pictures: {pictures}")
     console.print(
         f"{out}: fitted to {counted(len(measured.trials), 'trial')} in {time.perf_counter() - begun:.1f} s. "
         f"Next: bifa simulate --model {out} --gait GAIT.toml, or bifa optimize --model {out} --out gait.toml"

@@ -6,15 +6,10 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import examples, port_option
+from bifa.cli._options import port_option
 from bifa.computer import EXAMPLE_PORT
 
-EXAMPLES = examples("bifa flash", f"bifa flash --port {EXAMPLE_PORT}", "bifa flash --build-only")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EXAMPLES)(flash)
+EXAMPLES = ("bifa flash", f"bifa flash --port {EXAMPLE_PORT}", "bifa flash --build-only")
 
 
 def flash(
@@ -40,7 +35,7 @@ def flash(
     if project is not None:
         with console.status("building"):
             image = build_image(project, on_line)
-        console.print(f"built {image.relative_to(project)}", highlight=False)
+        console.print(f"built {image.relative_to(project)}")
     if chosen is None:
         return
     with console.status(f"writing to {chosen}"):
@@ -51,7 +46,7 @@ def flash(
             raise
     with console.status("waiting for the firmware"), open_rig(chosen) as rig, Uno(rig.transport, rig.clock) as uno:
         hello = uno.connect()
-    console.print(f"firmware {hello.firmware} answers on {chosen}", highlight=False)
+    console.print(f"firmware {hello.firmware} answers on {chosen}")
 
 
 def _write(project: Path | None, port: str, on_line: Callable[[str], None]) -> None:

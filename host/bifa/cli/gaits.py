@@ -5,18 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import examples, file_option, gait_names, stoppable
+from bifa.cli._options import file_option, gait_names, stoppable
 
 if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = examples("bifa gaits", "bifa gaits --make", "bifa gaits --make --model mine.toml --out my-gaits")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(gaits)
+EXAMPLES = ("bifa gaits", "bifa gaits --make", "bifa gaits --make --model mine.toml --out my-gaits")
 
 
 def gaits(
@@ -66,8 +61,8 @@ def gaits(
         )
     console.print(table)
     for name in names:
-        console.print(f"{name}: {library.load(name).purpose}", highlight=False)
-    console.print(f"files: {library.FOLDER / 'NAME.toml'}", highlight=False, soft_wrap=True)
+        console.print(f"{name}: {library.load(name).purpose}")
+    console.print(f"files: {library.FOLDER / 'NAME.toml'}", soft_wrap=True)
 
 
 def _make(console: "Console", model_path: Path | None, folder: Path, names: list[str], seed: int) -> None:
@@ -87,6 +82,5 @@ def _make(console: "Console", model_path: Path | None, folder: Path, names: list
             path = scenarios.save(folder, scenario, optimum, model.name)
             console.print(
                 f"{scenario.name}: {optimum.nominal_mm_s:.2f} mm/s, 10th percentile {optimum.quantile_mm_s:.2f} "
-                f"({optimum.simulations} simulations): {path.name}",
-                highlight=False,
+                f"({optimum.simulations} simulations): {path.name}"
             )

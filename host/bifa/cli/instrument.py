@@ -5,14 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bifa.cli._options import examples
-
 if TYPE_CHECKING:
     from bifa.data.export import Export
     from bifa.measure.propose import Look
     from bifa.screen import Console
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa instrument export.csv",
     "bifa instrument trial.TRA --role machine",
     "bifa instrument take.csv --role camera --bench monday.toml",
@@ -20,11 +18,6 @@ EPILOG = examples(
 )
 _ROLES = {"machine": "the testing machine (static loadings, pulls)", "camera": "the camera (steps, walks)"}
 _MOST_PLOTS = 8
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(instrument)
 
 
 def instrument(
@@ -48,7 +41,7 @@ def instrument(
     console = Console()
     if presets:
         for name, preset in known().items():
-            console.print(f"{name:16} {preset['program']}", markup=False, highlight=False)
+            console.print(f"{name:16} {preset['program']}")
         return
     if file is None:
         raise typer.BadParameter("give a file that your instrument exported, or use --presets")
@@ -64,10 +57,10 @@ def instrument(
     table = _asked(console, seen, role)
     _prove(console, file, role, table)
     text = declaration(role, table)
-    console.print(f"\n{text}", markup=False, highlight=False)
+    console.print(f"\n{text}")
     if typer.confirm(f"Write this into {bench}?", default=False):
         _append(bench, text)
-        console.print(f"written: {bench}", highlight=False)
+        console.print(f"written: {bench}")
 
 
 def _show(console: "Console", file: Path, seen: "Look") -> None:
@@ -81,9 +74,9 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
 
     plain = not console.encoding.lower().startswith("utf")
     how = ", ".join(f"{key} {value!r}" for key, value in seen.how.items()) or "commas, points, names in the first line"
-    console.print(f"{file}: {how}; {len(seen.sheet)} rows from line {seen.sheet.line(0)} on", markup=False)
+    console.print(f"{file}: {how}; {len(seen.sheet)} rows from line {seen.sheet.line(0)} on")
     for role, name in seen.presets.items():
-        console.print(f"As a {role}'s it is read by the preset {name}.", markup=False)
+        console.print(f"As a {role}'s it is read by the preset {name}.")
     labels, units = seen.sheet.labels(), seen.sheet.units
     rows = [[label, unit, *row] for label, unit, row in zip(labels, units, zip(*seen.rows(), strict=True), strict=True)]
     print_table(console, PageTable(["column", "units row", *["row"] * len(seen.rows())], rows, ""))
@@ -91,12 +84,12 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
         try:
             values = seen.sheet.numbers(place, label)
         except DatasetError as error:
-            console.print(f"{label}: {error}", markup=False, highlight=False)
+            console.print(f"{label}: {error}")
             continue
         known = np.flatnonzero(np.isfinite(values))
         if len(known) > 1:
             for line in panel(known.astype(float), values[known], "row", label, plain, console.width):
-                console.print(line, markup=False, highlight=False)
+                console.print(line)
 
 
 def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
@@ -153,7 +146,7 @@ def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -
                 seen.sheet.find(part)
             return column
         except DatasetError as error:
-            console.print(str(error), markup=False, highlight=False)
+            console.print(str(error))
 
 
 def _unit(name: str, column: str, proposed: str | None) -> str:
@@ -207,12 +200,12 @@ def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> 
     named = table.get("columns", export.columns)
     columns, _, rows = read_export(file, export, [n for n in wanted(role) if n in named])
     step_s = float(np.median(np.diff(columns["time_s"]))) if len(rows) > 1 else np.nan
-    console.print(f"\nRead as declared: {len(rows)} rows, one every {1e3 * step_s:.3g} ms.", highlight=False)
+    console.print(f"\nRead as declared: {len(rows)} rows, one every {1e3 * step_s:.3g} ms.")
     for name, values in columns.items():
         known = values[np.isfinite(values)]
         gaps = len(values) - len(known)
         told = f"{known.min():.6g} to {known.max():.6g}" if len(known) else "nothing"
-        console.print(f"  {name}: {told}{f', {gaps} empty' if gaps else ''}", highlight=False)
+        console.print(f"  {name}: {told}{f', {gaps} empty' if gaps else ''}")
 
 
 def _refuse_declared(bench: Path, role: str) -> None:

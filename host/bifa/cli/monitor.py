@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import PORT, examples, file_option
+from bifa.cli._options import PORT, file_option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,17 +18,12 @@ if TYPE_CHECKING:
 
 _WEB_PORT = 8765
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa monitor",
     "bifa monitor --run",
     "bifa monitor --port virtual --run --seconds 20",
     "bifa monitor --web --model out/demo/model-completed.toml",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(monitor)
 
 
 def monitor(
@@ -108,7 +103,7 @@ def _fly(
     pilot.is_watched = page.is_watched
 
     def say(text: str) -> None:
-        console.print(text, highlight=False, soft_wrap=True)
+        console.print(text, soft_wrap=True)
 
     with served(page, port) as address:
         say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")

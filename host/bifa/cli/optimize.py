@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bifa import cluster
-from bifa.cli._options import NO_PICTURES, PICTURES, Method, examples, file_option
+from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
 from bifa.files import named
 
 if TYPE_CHECKING:
@@ -22,18 +22,13 @@ if TYPE_CHECKING:
     from bifa.screen import Console
 
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa optimize --model MODEL.toml --out GAIT.toml",
     "bifa optimize --out fast.toml --nominal --method de",
     "bifa optimize --model MODEL.toml --begin slow.toml --out GAIT.toml",
     "bifa optimize --out paper.toml --nominal --method bo --evaluations 200",
     "bifa optimize --out GAIT.toml --dask tcp://scheduler:8786",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(optimize)
 
 
 def optimize(
@@ -101,7 +96,7 @@ def optimize(
         best = _best(console, partial(optimize, robot, pool), settings)
         save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
         console.print(_summary(best))
-        console.print(f"gait: {out}", highlight=False)
+        console.print(f"gait: {out}")
         if not no_pictures:
             _explain(console, robot, pool, best, folder)
 
@@ -122,9 +117,9 @@ def _best(console: "Console", search: "Callable[..., Optimum]", settings: "list[
     for one in settings:
         with search_progress(console) as progress:
             optima.append(search(one, progress(f"seed {one.seed}")))
-        console.print(_line(optima[-1]), highlight=False)
+        console.print(_line(optima[-1]))
         if optima[-1].doubt:
-            console.print(warning(str(optima[-1].doubt)), highlight=False)
+            console.print(warning(str(optima[-1].doubt)))
     return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
 
 
@@ -136,8 +131,8 @@ def _explain(console: "Console", robot: "Model", pool: "Simulations", best: "Opt
     with console.status(what), written_into(folder) as aside:
         reasons = _pictures(robot, pool, best, aside)
     for sentence in reasons:
-        console.print(f"- {sentence}", highlight=False)
-    console.print(f"pictures: {folder}", highlight=False)
+        console.print(f"- {sentence}")
+    console.print(f"pictures: {folder}")
 
 
 @contextmanager

@@ -5,17 +5,12 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT, examples, file_option, stoppable
+from bifa.cli._options import PORT, file_option, kept, stoppable
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa record --out out/walks --port virtual --gait gait.toml --cycles 10",
     "bifa record --out out/telemetry --seconds 60",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(record)
 
 
 def record(
@@ -56,18 +51,9 @@ def record(
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None
         if has_instruments:
-            console.print(f"gait: {gait or 'the baseline'}, {steps}", highlight=False)
-            with stoppable(lambda: f"valves off; {_kept(out)}; the same command resumes"):
+            console.print(f"gait: {gait or 'the baseline'}, {steps}")
+            with stoppable(lambda: f"valves off; {kept(out, 'finished walk')}; the same command resumes"):
                 record_walks(rig, port, out, gait, cycles, repeats, console)
     if not has_instruments:
-        console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking", highlight=False)
+        console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking")
         record_telemetry(open_rig, port, out, gait, seconds, console)
-
-
-def _kept(out: Path) -> str:
-    """What an interrupted recording has on disk, in words."""
-    from bifa.data.write import partial_of
-    from bifa.printable import counted
-
-    partial = partial_of(out)
-    return f"{partial} keeps {counted(len(list(partial.glob('*.csv'))), 'finished walk')}"

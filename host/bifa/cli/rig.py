@@ -6,10 +6,10 @@ from typing import Annotated, Any
 
 import typer
 
-from bifa.cli._options import PROFILE, Profile, effects, examples
+from bifa.cli._options import PROFILE, Profile, effects
 from bifa.errors import BifaError
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa rig",
     "bifa rig --link /tmp/uno",
     "bifa console --port /tmp/uno (in another terminal; or picocom -b 250000 /tmp/uno)",
@@ -21,61 +21,57 @@ class RigOptionError(BifaError):
     """An option of `bifa rig` cannot be understood."""
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
+def rig(
+    profile: Annotated[Profile, PROFILE] = "ideal",
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; repeatable.", autocompletion=effects),
+    ] = None,
+    sealed: Annotated[
+        int | None, typer.Option(min=0, help="Seed that draws a robot with an undisclosed effect.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of noise, clocks and run-to-run variation.")] = 0,
+    firmware: Annotated[
+        Path | None, typer.Option(help="Firmware image (ELF or HEX); the built one if left out.")
+    ] = None,
+    eeprom: Annotated[
+        Path | None, typer.Option(help="File that keeps the EEPROM between runs.", dir_okay=False)
+    ] = None,
+    link: Annotated[Path | None, typer.Option(help="Symbolic link to the pty while it is served.")] = None,
+) -> None:
+    """Offer the virtual robot, with the real firmware, as a serial port in real time.
 
-    @app.command(epilog=EPILOG)
-    def rig(
-        profile: Annotated[Profile, PROFILE] = "ideal",
-        effect: Annotated[
-            list[str] | None,
-            typer.Option(help="NAME or NAME:PARAMETER=VALUE,...; repeatable.", autocompletion=effects),
-        ] = None,
-        sealed: Annotated[
-            int | None, typer.Option(min=0, help="Seed that draws a robot with an undisclosed effect.")
-        ] = None,
-        seed: Annotated[int, typer.Option(min=0, help="Seed of noise, clocks and run-to-run variation.")] = 0,
-        firmware: Annotated[
-            Path | None, typer.Option(help="Firmware image (ELF or HEX); the built one if left out.")
-        ] = None,
-        eeprom: Annotated[
-            Path | None, typer.Option(help="File that keeps the EEPROM between runs.", dir_okay=False)
-        ] = None,
-        link: Annotated[Path | None, typer.Option(help="Symbolic link to the pty while it is served.")] = None,
-    ) -> None:
-        """Offer the virtual robot, with the real firmware, as a serial port in real time.
+    Opening the port resets the board, as with a real Uno. 250000 baud; any serial program will do.
+    """
+    import os
+    import signal
 
-        Opening the port resets the board, as with a real Uno. 250000 baud; any serial program will do.
-        """
-        import os
-        import signal
+    from bifa.files import check_targets
+    from bifa.rig import open_rig
+    from bifa.screen import Console
 
-        from bifa.files import check_targets
-        from bifa.rig import open_rig
-        from bifa.screen import Console
+    if not hasattr(os, "openpty"):
+        raise RigOptionError("bifa rig serves a pseudo-terminal, which needs Linux or macOS (on Windows: WSL)")
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C
+    check_targets(eeprom)
+    console = Console()
+    effects = dict(_effect(text) for text in effect or [])
+    options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}
+    with console.status("starting"):
+        virtual: Any = open_rig("virtual", **options, firmware=firmware, eeprom=eeprom, keep_events=False)
+    with (
+        virtual as bench,
+        console.status("starting", spinner="dots") as status,
+    ):
 
-        if not hasattr(os, "openpty"):
-            raise RigOptionError("bifa rig serves a pseudo-terminal, which needs Linux or macOS (on Windows: WSL)")
-        for ending in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C
-        check_targets(eeprom)
-        console = Console()
-        effects = dict(_effect(text) for text in effect or [])
-        options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}
-        with console.status("starting"):
-            virtual: Any = open_rig("virtual", **options, firmware=firmware, eeprom=eeprom, keep_events=False)
-        with (
-            virtual as bench,
-            console.status("starting", spinner="dots") as status,
-        ):
+        def ready(path: str) -> None:
+            console.print(f"{link or path}  250000 baud; Ctrl-C ends", soft_wrap=True)
 
-            def ready(path: str) -> None:
-                console.print(f"{link or path}  250000 baud; Ctrl-C ends", highlight=False, soft_wrap=True)
-
-            try:
-                bench.serve_pty(ready, lambda now: status.update(_line(now)), link=link)
-            except KeyboardInterrupt:
-                console.print("stopped")
+        try:
+            bench.serve_pty(ready, lambda now: status.update(_line(now)), link=link)
+        except KeyboardInterrupt:
+            console.print("stopped")
 
 
 def _effect(text: str) -> tuple[str, dict[str, float]]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bifa.cli._options import PICTURES, Obstacle, examples, file_option
+from bifa.cli._options import PICTURES, Obstacle, file_option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,18 +21,13 @@ if TYPE_CHECKING:
 _CYCLES, _BUCKLING_N = 10, 27.0
 
 _RED = ("red", "red")
-EPILOG = examples(
+EXAMPLES = (
     "bifa simulate",
     "bifa simulate --model fitted.toml --gait fast.toml --pictures out/walk",
     "bifa simulate --inclination 90 --payload 0.1",
     "bifa simulate --obstacle tunnel --gait fast.toml",
     "bifa simulate --paper",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(simulate)
 
 
 def simulate(
@@ -88,14 +83,14 @@ def simulate(
         _print_prediction(console, chosen, file.gait)
     if out:
         _write_csv(out, record.columns)
-        console.print(f"channels: {out}", highlight=False)
+        console.print(f"channels: {out}")
     if pictures:
         from bifa.report.walks import SIMULATED, Walk, draw_walks
 
         title = f"{chosen.name}, {speed_mm_s:.1f} mm/s"
         with written_into(pictures) as aside:
             draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
-        console.print(f"picture: {pictures / 'walk.png'}", highlight=False)
+        console.print(f"picture: {pictures / 'walk.png'}")
 
 
 def _walks_otherwise(*asked: object) -> bool:
@@ -136,17 +131,14 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Adv
     for k, (advance, slip) in enumerate(zip(progress.advance_m[0], progress.slip_m[0], strict=True)):
         table.add_row(str(k + 1), f"{1e3 * advance:.2f}", f"{1e3 * slip:.3f}", f"{1e3 * advance / gait.period_s:.2f}")
     console.print(table)
-    console.print(f"speed of the last cycle: {progress.speed_mm_s[0]:.2f} mm/s", highlight=False)
+    console.print(f"speed of the last cycle: {progress.speed_mm_s[0]:.2f} mm/s")
     from bifa.gait.settling import LEAST, settling
 
     found = settling(1e3 * progress.advance_m[0])
     if found.is_settled:
-        console.print(f"settled from cycle {found.begins + 1} on", highlight=False)
+        console.print(f"settled from cycle {found.begins + 1} on")
     elif len(progress.advance_m[0]) >= LEAST:
-        console.print(
-            f"not settled: its last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles",
-            highlight=False,
-        )
+        console.print(f"not settled: its last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles")
 
 
 def _print_prediction(console: "Console", model: "Model", gait: "Gait") -> None:
@@ -156,8 +148,8 @@ def _print_prediction(console: "Console", model: "Model", gait: "Gait") -> None:
     known = spread_of(model)
     with console.status("predicting"):
         prediction = predict_speed(model, known, gait)
-    console.print(f"predicted, 90 %: {prediction.text}", highlight=False)
-    console.print(f"what is known: {known.text}", highlight=False)
+    console.print(f"predicted, 90 %: {prediction.text}")
+    console.print(f"what is known: {known.text}")
 
 
 def _print_passing(
@@ -172,12 +164,11 @@ def _print_passing(
 
     outcome = passing(model, gait, ahead, supports, inclination)
     said = f"through after {outcome.seconds:.0f} s" if outcome.through else f"not through in {LONGEST_S:.0f} s"
-    console.print(said, highlight=False)
+    console.print(said)
     for name, end, stroke in (("extension", "head", outcome.extension), ("contraction", "tail", outcome.contraction)):
         console.print(
             f"{name}: the body's pressure builds up {stroke.built_up_N:.0f} N before the next command; the spring's "
-            f"peak and the {end}'s supports need {stroke.needed_N:.0f} N{'' if stroke.enough else ': not enough'}",
-            highlight=False,
+            f"peak and the {end}'s supports need {stroke.needed_N:.0f} N{'' if stroke.enough else ': not enough'}"
         )
 
 

@@ -5,19 +5,14 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT, examples
+from bifa.cli._options import PORT
 from bifa.computer import EXAMPLE_PORT
 
-EPILOG = examples(
+EXAMPLES = (
     "bifa upload gait.toml",
     "bifa upload gait.toml --save fast --run",
     f"bifa upload gait.toml --run --seconds 60 --port {EXAMPLE_PORT}",
 )
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog=EPILOG)(upload)
 
 
 def upload(

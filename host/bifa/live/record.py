@@ -61,14 +61,14 @@ def record_walks(
             done = event.number - 1 + event.share
             progress.update(task, description=f"walk {event.number} of {repeats}", total=repeats, completed=done)
             if event.misfit:
-                progress.console.print(warning(event.misfit), highlight=False)
+                progress.console.print(warning(event.misfit))
             if event.link is not None:
                 progress.console.print(f"walk {event.number}: {event.link.text()}")
             if event.trial is not None and cycles >= LEAST:
                 columns = event.trial.columns
                 speed = measured_speed(columns["time_s"], columns["displacement_head_mm"], gait.gait.period_s)
                 more = f"; walk it with --cycles {2 * cycles}" if speed.walking is Walking.UNSETTLED else ""
-                progress.console.print(f"walk {event.number}: {speed.text}{more}", highlight=False)
+                progress.console.print(f"walk {event.number}: {speed.text}{more}")
 
         dataset = run_session(
             rig,
@@ -136,7 +136,7 @@ class _TelemetryLog:
         self._board, self._parameters, self._end_s = SameBoard(port, open_rig), parameters, end_s
         self._console = console
         self._nonce: int | None = None  # of the start that was seen last; None before the first
-        self._desk = Desk(lambda text: console.print(text, highlight=False))
+        self._desk = Desk(lambda text: console.print(text))
 
     @property
     def has_begun(self) -> bool:

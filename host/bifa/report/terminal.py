@@ -39,14 +39,14 @@ def print_table(console: Console, content: PageTable) -> None:
 def print_lines(console: Console, lines: Iterable[str]) -> None:
     """Sentences, one below the other, wrapped at the terminal's width."""
     for line in lines:
-        console.print(plain_spaces(line), highlight=False)
+        console.print(plain_spaces(line))
 
 
 def print_sections(console: Console, sections: Iterable[ChartedSection]) -> None:
     """Titles, sentences and tables of sections; what is drawn there is for pages."""
     for section in sections:
         if section.paragraphs or section.tables:
-            console.print(Text(f"\n{section.title}", "bold"), highlight=False)
+            console.print(Text(f"\n{section.title}", "bold"))
         print_lines(console, section.paragraphs)
         for table in section.tables:
             print_table(console, table)
