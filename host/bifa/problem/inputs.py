@@ -110,9 +110,9 @@ class StaticInputs:
     def _is_sample(self) -> np.ndarray:
         return np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
 
-    def sampled(self, columns: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-        """The columns without the turns."""
-        return {name: column[self._is_sample] for name, column in columns.items()}
+    def sampled(self, record: SimulatedTrial) -> Mapping[str, np.ndarray]:
+        """The channels without the turns."""
+        return {name: record[name][self._is_sample] for name in self.channels}
 
     @staticmethod
     def simulate(
@@ -126,7 +126,7 @@ class StaticInputs:
             [(case.inputs.path_m - case.zero_m) * _MM for case in cases],
             [case.inputs.pressure_psi for case in cases],
         )
-        return [first.sampled(record.columns) for record in records]
+        return [first.sampled(record) for record in records]
 
 
 @dataclass(frozen=True)

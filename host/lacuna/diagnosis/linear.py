@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from lacuna.estimation.fit import Fit
+from lacuna.estimation.sensitivity import Sensitivity
 
 
-def stacked(jacobians: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def stacked(sensitivities: Sequence[Sensitivity]) -> tuple[np.ndarray, np.ndarray]:
     """Of all trials' residuals, n in all: derivatives by the structure, (n, p), and by the trials' nuisances, each in
     its own rows, (n, all of them)."""
+    jacobians = [s.dense() for s in sensitivities]
     rows = sum(j.shape[0] for j, _ in jacobians)
     own = sum(k.shape[1] for _, k in jacobians)
     blocks = np.zeros((rows, own))
@@ -27,8 +29,8 @@ def remaining_after(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
     residuals, (n,), less that."""
     problem, point = fitted.problem, fitted.solution.point
     every = range(len(fitted.structure.names))
-    jacobians = fitted.solution.jacobians or problem.jacobians(point, every, problem.first_steps())
-    basis = _orthonormal(np.hstack(stacked(jacobians)))
+    taken = fitted.solution.sensitivities or problem.jacobians(point, every, problem.first_steps())
+    basis = _orthonormal(np.hstack(stacked(taken)))
     residual = np.concatenate(problem.residuals(point))
     return basis, residual - basis @ (basis.T @ residual)
 

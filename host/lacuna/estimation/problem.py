@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from lacuna.cores import usable_cores
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.sampling import even_grid
+from lacuna.estimation.sensitivity import Sensitivity
 from lacuna.estimation.structure import Structure
 from lacuna.system import Channels, Parameter, Record
 
@@ -111,7 +112,7 @@ class Problem:
         self.trials = tuple(trials)
         self.floor = floor
         self.nuisances = tuple(structure.nuisances(t) for t in trials)
-        self._weighing = [_weighing(t, floor) for t in trials]
+        self._weighing = [_Weighing.of(t, floor) for t in trials]
         self._spans = [{c: _span(v, floor.sd(t, c)) for c, v in t.channels.items()} for t in trials]
         self._grids = [[even_grid(t.time_s[np.isfinite(v)]) for v in t.channels.values()] for t in trials]
         self._prior = structure.prior_precision()
@@ -119,7 +120,7 @@ class Problem:
         self._recent: dict[
             tuple[Any, ...], list[np.ndarray]
         ] = {}  # residuals: a search begins where the one before ended
-        self.sizes = [len(keep) for *_, keep in self._weighing]  # samples of all channels of each trial
+        self.sizes = [len(w.keep) for w in self._weighing]  # samples of all channels of each trial
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -233,14 +234,12 @@ class Problem:
         )
         return Steps(structure, nuisances)
 
-    def jacobians(
-        self, point: Point, free: Sequence[int], steps: Steps, then: Callable[..., Any] = lambda *blocks: blocks
-    ) -> list[Any]:
-        """For each trial the derivatives of its residuals, shapes (n, len(free)) and (n, q), by absolute steps; or what
-        `then` makes of the two."""
+    def jacobians(self, point: Point, free: Sequence[int], steps: Steps) -> list[Sensitivity]:
+        """For each trial the derivatives of its residuals by the parameters `free` and by its nuisances, by absolute
+        steps."""
 
-        def blocks(i: int) -> tuple[np.ndarray, np.ndarray]:
-            values, nuisances = point.values, point.nuisances[i]
+        def of_trial(i: int) -> Sensitivity:
+            values, nuisances, p = point.values, point.nuisances[i], len(free)
             moving = [k for k, j in enumerate(free) if self.structure.moves(j, self.trials[i])]
             factors = self._factors(i, [free[k] for k in moving])
             stepping = [k for k in range(len(nuisances)) if k not in factors]
@@ -250,14 +249,16 @@ class Problem:
             by_nuisance = [_stepped(nuisances, k, self.nuisances[i][k], steps.nuisances[i][k]) for k in stepping]
             moved = [*((v, nuisances) for v, _ in by_structure), *((values, n) for n, _ in by_nuisance)]
             changes = self.changes(i, (values, nuisances), moved, coarse=True)
-            changes /= np.array([step for _, step in (*by_structure, *by_nuisance)])
-            structure, own = np.zeros((len(free), len(changes))), np.zeros((len(nuisances), len(changes)))
-            structure[moving], own[stepping] = changes[:, : len(moving)].T, changes[:, len(moving) :].T
-            for k, of in factors.items():
-                own[k] = sum(self._by_factor(j, values[j]) * structure[free.index(j)] for j in of) / nuisances[k]
-            return structure.T, own.T
+            changes /= np.array([step for _, step in (*by_structure, *by_nuisance)])[:, None]
+            by_parameter = {free[k]: row for k, row in zip(moving, changes, strict=False)}
+            by_factor = [
+                sum(self._by_factor(j, values[j]) * by_parameter[j] for j in of) / nuisances[k]
+                for k, of in factors.items()
+            ]
+            felt = [*moving, *(p + k for k in (*stepping, *factors))]
+            return Sensitivity.of(np.vstack([changes, *by_factor]), felt, p, len(nuisances))
 
-        return in_parallel(lambda i: then(*blocks(i)), range(len(self.trials)), self.sizes)
+        return in_parallel(of_trial, range(len(self.trials)), self.sizes)
 
     def _by_factor(self, index: int, value: float) -> float:
         return self.structure.system.times_slope(self.structure.names[index], value)
@@ -274,20 +275,24 @@ class Problem:
     def changes(
         self, index: int, here: tuple[np.ndarray, np.ndarray], moved: Sequence[tuple[Any, ...]], *, coarse: bool = False
     ) -> np.ndarray:
-        """By what the residuals of a trial change, shape (n, len(moved)), from `here` to each of `moved` nearby:
-        values and the trial's nuisances."""
-        found = self._deviations(self._simulate([here, *moved], index, coarse=coarse, alike=True), index)
-        failed = np.flatnonzero((found[1:] == FAILED).any(axis=1))
-        seen = self._compressed(found[[0, *(failed + 1)]], index) if len(failed) else None
-        first, changes = found[:1], np.subtract(found[1:], found[0], out=found[1:])
-        first, weight = self._looked_at(first, index)
+        """By what the residuals of a trial change, shape (len(moved), n), from `here` to each of `moved` nearby: values
+        and the trial's nuisances."""
+        predictions = self._simulate([here, *moved], index, coarse=coarse, alike=True)
+        first, weight = self._looked_at(self._deviations(predictions[:1], index), index)
+        with np.errstate(over="ignore", invalid="ignore"):  # seen below
+            changes = self._samples(predictions[1:], index)
+            changes -= self._samples(predictions[:1], index)
+            changes *= self._weighing[index].weight
+        reach = np.maximum(changes.max(axis=1, initial=0.0), -changes.min(axis=1, initial=0.0))
+        away = np.flatnonzero(~(reach <= _MOST))  # failed, or nearly so
         if self.view.blur:
             changes, _ = self._looked_at(changes, index)
         # over as small a step as a derivative takes, the compression is a straight line
         changes *= weight / self.view.raised / np.hypot(1.0, first[0] / self.view.raised / self.view.soft_limit)
-        if seen is not None:
-            changes[failed] = seen[1:] - seen[0]
-        return changes.T
+        if len(away):
+            seen = self._weigh([predictions[0], *(predictions[k + 1] for k in away)], index)
+            changes[away] = seen[1:] - seen[0]
+        return changes
 
     def scaled(self, predictions: Sequence[Channels]) -> list[Channels]:
         """(measured - predicted) / sd for each trial and channel, neither compressed nor thinned; NaN where missing."""
@@ -348,47 +353,65 @@ class Problem:
     def _looked_at(self, z: np.ndarray, index: int) -> tuple[np.ndarray, np.ndarray]:
         """Deviations as the view has them, and the weight of each: blurred, each channel goes through a low-pass over
         even times, and as many samples of it are kept as it then has anything to say."""
-        _, _, thinning, keep = self._weighing[index]
-        weight = thinning[keep]
+        weight, ends = self._weighing[index].thinning, self._weighing[index].ends
         if not self.view.blur:
             return z, weight
-        known = keep.reshape(len(self.trials[index].channels), -1).sum(axis=1)
-        ends = np.cumsum(known)[:-1]
         found, weights = [], []
         for z_, w_, grid in zip(np.split(z, ends, axis=1), np.split(weight, ends), self._grids[index], strict=True):
             samples = z_.shape[1] * self.view.blur
             decay, every = np.exp(-1.0 / max(samples, 1e-3)), max(1, round(samples / 4))
             even = z_ if grid is None else grid.of(z_)
-            found.append(lfilter([1.0 - decay], [1.0, -decay], even)[:, every - 1 :: every])
+            whole = even.shape[1] // every
+            pieces = even[:, : whole * every].reshape(len(even), whole, every)
+            recent = pieces @ ((1.0 - decay) * decay ** np.arange(every)[::-1])
+            found.append(lfilter([1.0], [1.0, -(decay**every)], recent))
             weights.append(w_[every - 1 :: every] * np.sqrt(every))
         return np.concatenate(found, axis=1), np.concatenate(weights)
 
     def _slope(self, prediction: Channels, index: int) -> np.ndarray:
-        _, weight, thinning, keep = self._weighing[index]
-        return (weight * thinning)[keep] / np.hypot(
-            1.0, self._deviations([prediction], index)[0] / self.view.soft_limit
-        )
+        weighing, deviations = self._weighing[index], self._deviations([prediction], index)[0]
+        return weighing.weight * weighing.thinning / np.hypot(1.0, deviations / self.view.soft_limit)
 
     def _deviations(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of each prediction in standard deviations, uncompressed, a row each."""
-        measured, weight, _, keep = self._weighing[index]
-        channels = self.trials[index].channels
-        predicted = np.array([np.concatenate([prediction[c] for c in channels]) for prediction in predictions])
+        z = self._samples(predictions, index)
         with np.errstate(over="ignore"):  # what ran away counts as such below
-            predicted -= measured
-            predicted *= weight
-        z = predicted if keep.all() else predicted[:, keep]
+            z -= self._weighing[index].measured
+            z *= self._weighing[index].weight
         z[~np.isfinite(z)] = FAILED
         return np.clip(z, -_MOST, _MOST, out=z)
 
+    def _samples(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
+        """Of each prediction those that were measured, one channel after the other, a row each."""
+        channels, keep = self.trials[index].channels, self._weighing[index].keep
+        rows = np.empty((len(predictions), len(keep)))
+        for row, prediction in zip(rows, predictions, strict=True):
+            np.concatenate([prediction[c] for c in channels], out=row)
+        return rows if keep.all() else rows[:, keep]
 
-def _weighing(trial: Record, floor: NoiseFloor) -> tuple[np.ndarray, ...]:
-    measured = np.concatenate([trial.channels[c] for c in trial.channels])
-    weight = np.concatenate([1.0 / floor.sd(trial, c) for c in trial.channels])
-    thinning = np.concatenate(
-        [np.full(v.shape, floor.samples_per_piece(trial, c) ** -0.5) for c, v in trial.channels.items()]
-    )
-    return measured, weight, thinning, np.isfinite(measured)
+
+class _Weighing(NamedTuple):
+    """Of a trial's samples, one channel after the other, which ones were measured (`keep`); of these the values, one
+    over their standard deviation, one over the root of the samples in a piece, and where all channels but the last end.
+    """
+
+    keep: np.ndarray
+    measured: np.ndarray
+    weight: np.ndarray
+    thinning: np.ndarray
+    ends: np.ndarray
+
+    @classmethod
+    def of(cls, trial: Record, floor: NoiseFloor) -> _Weighing:
+        channels = trial.channels
+        measured = np.concatenate([*channels.values()])
+        weight = np.concatenate([1.0 / floor.sd(trial, c) for c in channels])
+        thinning = np.concatenate(
+            [np.full(v.shape, floor.samples_per_piece(trial, c) ** -0.5) for c, v in channels.items()]
+        )
+        keep = np.isfinite(measured)
+        ends = np.cumsum([np.isfinite(v).sum() for v in channels.values()])[:-1]
+        return cls(keep, measured[keep], weight[keep], thinning[keep], ends)
 
 
 def _span(samples: np.ndarray, sd: np.ndarray) -> float:

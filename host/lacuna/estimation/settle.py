@@ -114,7 +114,8 @@ def _derivatives(problem: Problem, point: Point, free: tuple[int, ...], along: _
         both = zip(values, nuisances + follow.T, strict=True)
         alone = ((point.values, nuisances + step) for step in np.diag(spread))
         changes = problem.changes(i, (point.values, nuisances), [*both, *alone])
-        own = changes[:, len(free) :] / spread
-        return Sensitivity.of((changes[:, : len(free)] - own @ follow) @ back, own)
+        own = changes[len(free) :] / spread[:, None]
+        taken = np.vstack([back.T @ (changes[: len(free)] - follow.T @ own), own])
+        return Sensitivity.of(taken, range(len(taken)), len(free), len(nuisances))
 
     return in_parallel(of_trial, range(len(problem.trials)), problem.sizes)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from lacuna.estimation.problem import Point, Problem, Steps, in_parallel
+from lacuna.estimation.problem import Point, Problem, in_parallel
 from lacuna.estimation.sensitivity import Sensitivity
 from lacuna.system import Parameter
 
@@ -86,7 +86,7 @@ def solve(
     scale = _limits(problem, here.point, free)[2]
     keep, steps = sensitivities is not None, problem.first_steps()
     if sensitivities is None:
-        sensitivities = _sensitivities(problem, here.point, free, steps)
+        sensitivities = problem.jacobians(here.point, free, steps)
     damping, converged, iteration = _LAMBDA_START, False, 0
     age = 0  # steps since the derivatives were taken
     while iteration < max_iterations:
@@ -110,7 +110,7 @@ def solve(
         if keep:
             break
         steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
-        sensitivities, age = _sensitivities(problem, here.point, free, steps), 0
+        sensitivities, age = problem.jacobians(here.point, free, steps), 0
     normal = _linearize(problem, here.point, free, here.residuals, sensitivities).normal
     return Solution(
         here.point, here.cost, converged, iteration, free, _eliminate(normal, len(free)), tuple(sensitivities)
@@ -177,10 +177,6 @@ def _descended(
         if once:
             break
     return None, damping, promise < least
-
-
-def _sensitivities(problem: Problem, point: Point, free: tuple[int, ...], steps: Steps) -> tuple[Sensitivity, ...]:
-    return tuple(problem.jacobians(point, free, steps, Sensitivity.of))
 
 
 def _corrected(

@@ -102,7 +102,7 @@ class Structure:
         return np.array([p.grain for p in self.parameters])
 
     def theta(self, values: np.ndarray) -> dict[str, float]:
-        return dict(zip(self.names, map(float, values), strict=True))
+        return dict(zip(self.names, values.tolist(), strict=True))
 
     def values(self, theta: Theta) -> np.ndarray:
         """The vector for `theta`; what it lacks stands at the start."""

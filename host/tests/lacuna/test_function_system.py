@@ -67,7 +67,7 @@ def test_the_derivative_by_a_factor_is_that_of_its_parameter(lower):
         gain = Parameter("gain_K_W", "K/W", 2.0, lower, 10.0)
         system = with_records(lacuna.System(simulate, [gain], nuisances=[wobble]), heater.records(2))
         problem = Problem(Structure(system), system.trials, estimate_noise(system, system.trials))
-        _, own = problem.jacobians(problem.start(), (0,), problem.first_steps())[0]
+        _, own = problem.jacobians(problem.start(), (0,), problem.first_steps())[0].dense()
         return own
 
     np.testing.assert_allclose(derivative(("gain_K_W",)), derivative(()), rtol=1e-3, atol=1e-6)

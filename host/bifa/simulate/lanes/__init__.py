@@ -80,9 +80,9 @@ def _around_the_first(kernel: Kernel, plants: Sequence[Plant], what: Experiment)
         mine = [next(rows) for _ in pack]
         if found:
             correction = found[0] - mine[0]
-            found += [row + correction for row in mine[1:]]
-        else:
-            found = mine
+            for row in mine[1:]:
+                row += correction
+        found += mine[bool(found) :]
     return found
 
 
