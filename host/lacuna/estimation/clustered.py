@@ -13,12 +13,14 @@ import numpy as np
 
 from lacuna.estimation.fit import Fit
 
-_KNOWN = 1e-9  # of the best known direction's information: what is left of less without a condition is rounding
+_KNOWN = 1e-9  # of the best known direction's information: less is rounding
+_LEFT = 0.1  # of a direction's information: to first order nothing follows from what is left of less
 
 
 def clustered_covariance(fit: Fit) -> np.ndarray:
     """Jackknife covariance of the free parameters, shape (P, P), by experiment and condition: how far the optimum moves
-    where one of them is left out. A direction that a single condition shows has none."""
+    where one of them is left out. A direction that a single condition shows nearly alone, whose move is no matter of
+    first order, moves as if a tenth of what is known of it were left."""
     solution = fit.solution
     units = np.sqrt(np.maximum(np.diag(solution.normal), 1e-300))
     scores: dict[object, np.ndarray] = {}
@@ -30,11 +32,17 @@ def clustered_covariance(fit: Fit) -> np.ndarray:
     clusters = len(scores)
     if clusters < 2:
         return np.zeros_like(solution.normal)
-    whole = solution.normal / np.outer(units, units)
-    moves = np.array(
-        [np.linalg.pinv(whole - normals[key], rcond=_KNOWN, hermitian=True) @ scores[key] for key in scores]
-    )
+    values, vectors = np.linalg.eigh(solution.normal / np.outer(units, units))
+    kept = values > _KNOWN * values.max()
+    root = vectors[:, kept] / np.sqrt(values[kept])  # of the covariance: in its coordinates all is known equally well
+    moves = np.array([root @ _moved(root.T @ normals[key] @ root, root.T @ scores[key]) for key in scores])
     return (clusters - 1) / clusters * moves.T @ moves / np.outer(units, units)
+
+
+def _moved(share: np.ndarray, score: np.ndarray) -> np.ndarray:
+    """By how much the optimum moves without a condition that has `share`, (P, P), of all information."""
+    left, directions = np.linalg.eigh(np.eye(len(share)) - share)
+    return directions @ (directions.T @ score / np.maximum(left, _LEFT))
 
 
 def _evidence(fit: Fit) -> tuple[list[np.ndarray], list[np.ndarray]]:
