@@ -23,8 +23,8 @@ def fit(
 ) -> None:
     """Identify the model (the paper's section IV): what static loadings, rests and sensors say by themselves, then
     everything together. Reports each parameter with its 90 % interval, what the data do not determine, and the error
-    in units of the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: like the paper's
-    Figs. 4 to 6.
+    in units of the noise, and writes a model file for `bifa simulate` and `bifa optimize`. Pictures: every condition as
+    measured and as modelled, like the paper's Figs. 4 to 6.
     """
     from bifa.files import check_targets, written_into
 
@@ -42,7 +42,7 @@ def fit(
     with console.status("reading"):
         from bifa.data import read_dataset
         from bifa.identify.identification import identify
-        from bifa.report.fit import errors_table, fit_page, parameters_and_remarks
+        from bifa.report.fit import draw_curves, errors_table, fit_page, parameters_and_remarks
         from bifa.report.terminal import print_sections, print_table
         from bifa.robot import load_model, save_model
 
@@ -67,10 +67,8 @@ def fit(
         write_page(fit_page(found), report)
         console.print(f"report: {report}")
     if pictures is not None:
-        from bifa.report.identification import draw
-
         with written_into(pictures) as aside:
-            draw(found, aside)
+            draw_curves(found, aside)
         console.print(f"pictures: {pictures}")
     console.print(
         f"{out}: fitted to {counted(len(measured.trials), 'trial')} in {time.perf_counter() - begun:.1f} s. "

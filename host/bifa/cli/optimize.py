@@ -188,17 +188,22 @@ def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: P
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
     from bifa.gait.sensitivity import front, sensitivity
-    from bifa.report import gaits as draw
+    from bifa.report.gaits import distribution_chart, front_chart, sensitivity_chart
+    from bifa.report.picture import draw_chart
+    from bifa.report.walks import SIMULATED, Walk, draw_walks
     from bifa.robot import BASELINE
     from bifa.simulate import gait_rows, plant
 
     flat, settings = plant(robot), optimum.settings
     draws = optimum.spread.plants(robot, 48, settings.seed + 3_000_017)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)
-    draw.draw_changes(before, after, folder / "changes.png", ("baseline", "optimised"))
-    draw.draw_sensitivity(
-        sensitivity(pool, flat, draws[:24], optimum.gait, settings.metric.quicker()), folder / "sensitivity.png"
-    )
+    walks = [
+        Walk(f"{title}: {one.speed_mm_s:.1f} mm/s", one.gait.period_s, {SIMULATED: one.record.columns})
+        for title, one in (("baseline", before), ("optimised", after))
+    ]
+    draw_walks(walks, folder / "changes.png")
+    scans = sensitivity(pool, flat, draws[:24], optimum.gait, settings.metric.quicker())
+    draw_chart(sensitivity_chart(scans), folder / "sensitivity.png")
     if settings.robust:
         robust = optimum.gait
         quick = Settings(robust=False, seed=settings.seed, evaluations=1500, space=settings.space)
@@ -208,9 +213,11 @@ def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: P
         robust, fast = library.load("robust").gait, optimum.gait
         other = {"the library's robust gait": robust}
     found = front(pool, flat, draws, robust, fast, settings.metric.quicker())
-    draw.draw_front(found, (optimum.nominal_mm_s, optimum.quantile_mm_s), folder / "front.png")
+    draw_chart(front_chart(found, (optimum.nominal_mm_s, optimum.quantile_mm_s)), folder / "front.png")
     fresh = optimum.spread.plants(robot, optimum.speeds_mm_s.size, settings.seed + 2_000_003)
     shown = {"baseline": BASELINE, **other}
     speeds = distribution(pool, fresh, gait_rows(list(shown.values())), settings.metric)
-    draw.draw_distribution(optimum, dict(zip(shown, speeds, strict=True)), folder / "distribution.png")
+    draw_chart(
+        distribution_chart(optimum, dict(zip(shown, speeds, strict=True))), folder / "distribution.png", width_in=6.4
+    )
     return reasons(before, after)

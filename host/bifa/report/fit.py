@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from bifa.identify.identification import Identification
 from bifa.printable import counted
 from bifa.report.compared_curves import compared_curves
 from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
 from bifa.report.page import ChartedSection, Page, PageTable
+from bifa.report.picture import draw_chart
 from bifa.report.words import (
     channel_words,
     experiment_words,
@@ -37,15 +40,29 @@ def fit_page(found: Identification) -> Page:
         "the noise floor."
     )
     fitted_to = f"{len(found.intervals)} parameters were fitted to {counted(len(dataset.trials), 'trial')}."
-    labels = {trial.file: trial.label for trial in dataset.trials}
-    curves = compared_curves(found.fit.problem.trials, {BASE: found.fit.predictions()}, labels)
     return Page(
         f"Fit of {dataset.name}",
         f"{says} {fitted_to}",
-        [*parameters_and_remarks(found), *curves],
+        [*parameters_and_remarks(found), *curves(found)],
         (f"{BASE_MODEL} {RMS} {NOISE_FLOOR} {_OF_REPEATS}",),
         (errors_table(found),),
     )
+
+
+def curves(found: Identification) -> list[ChartedSection]:
+    """What was measured beside the model, a section an experiment."""
+    labels = {trial.file: trial.label for trial in found.system.dataset.trials}
+    return compared_curves(found.fit.problem.trials, {BASE: found.fit.predictions()}, labels)
+
+
+def draw_curves(found: Identification, folder: Path) -> list[Path]:
+    """Those curves as PNG, a file an experiment, into `folder` (made if absent); returns their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for section in curves(found):
+        written.append(folder / f"{section.title.lower().replace(' ', '_')}.png")
+        draw_chart(section.charts[0], written[-1])
+    return written
 
 
 def parameters_and_remarks(found: Identification) -> list[ChartedSection]:

@@ -22,7 +22,7 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
     """Write the chart to `path`, with its legend above."""
     across = min(chart.across, len(chart.columns))
     rows = math.ceil(len(chart.columns) / across)
-    heights = [panel.height for panel in chart.columns[0].panels]
+    heights = [panel.height for panel in max((column.panels for column in chart.columns), key=len)]
     tall = rows * sum(heights) * chart.height / _PER_INCH + 0.35 * rows + 0.6
     with figure_style(dark) as palette:
         import matplotlib.pyplot as plt
@@ -41,7 +41,7 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
             figure.suptitle(chart.title)
         for number, column in enumerate(chart.columns):
             first = number // across * len(heights)
-            mine = axes[first : first + len(heights), number % across]
+            mine = axes[first : first + len(column.panels), number % across]
             mine[0].set_title(column.title, loc="left")
             for axis, panel in zip(mine, column.panels, strict=True):
                 axis.set_visible(True)
