@@ -6,60 +6,60 @@ namespace bifa {
 
 const char kCommandTexts[] BIFA_FLASH =
     "help [NAME]\0"
-    "li\206 ev\205y\235\213g,\217r expla\213\217ne\0"  // list everything, or explain one
+    "lis\205ev\214y\245\211g\213\216expla\211 \224e\0"  // list everything, or explain one
     "version\0"
-    "v\205si\256s\225ca\246\201\232\203\201la\206 \206\251t\0"  // versions, cause of the last start
+    "v\214\257\224s\213ca\246\206\221\201l\226\205\217\247t\0"  // versions, cause of the last start
     "status\0"
-    "\206\221e,\215\252\225\210\225v\227ves\225l\213k\0"  // state, fault, pressures, valves, link
+    "\217\227e\213\243\213\203\260\231s\213v\223v\251\213l\211k\0"  // state, fault, pressures, valves, link
     "show [NAME]\0"
-    "v\227ues\225\244s; *\236\205\201pow\205-up loads\212\223\235\205\0"  // values, ranges; * where power-up loads another
+    "v\223u\251\213r\225g\251\234* diff\214\212a\205\256w\214-up\0"  // values, ranges; * differs at power-up
     "set NAME VALUE\0"
-    "c\231ng\201\237\214\205,\212lso\236\222\201runn\213g\0"  // change a parameter, also while running
+    "ch\225g\206a \204\213\223s\252whil\206runn\211g\0"  // change a parameter, also while running
     "run\0"
-    "w\227k\0"  // walk
+    "w\223k\0"  // walk
     "stop\0"
-    "\206\257,\212\255 v\230\212l\254c\231mb\205s\0"  // stop, and vent all chambers
+    "\217\244\213\225d v\230\205\223l chamb\214s\0"  // stop, and vent all chambers
     "hold CHAMBER positive|vacuum|off\0"
-    "\213fl\221e\225evacu\221\201\233 v\230 \253\225\207\233\250a\222\0"  // inflate, evacuate or vent body, head or tail
+    "\211fl\227e\213ev\236u\227\206\216v\230\205\250\213\207\216\232\0"  // inflate, evacuate or vent body, head or tail
     "clear\0"
-    "\260\242as\201\237\206\257\217r\215\252\0"  // release a stop or fault
+    "\231\215\226\206a \217\244 \216\243\0"  // release a stop or fault
     "stream on|off\0"
-    "\224:\217n\201l\213\201(>)\212 samp\242\0"  // telemetry: one line (>) a sample
+    "te\215m\222ry: \224\206l\211\206(>) p\214\233amp\215\0"  // telemetry: one line (>) per sample
     "plot on|off\0"
-    "\224\215\233\203\201S\205i\227 Plott\205\0"  // telemetry for the Serial Plotter
+    "te\215m\222ry f\253\201S\214i\223 Plott\214\0"  // telemetry for the Serial Plotter
     "save [NAME]\0"
-    "keep\203\201\214\205s; wi\235out NAME\215\233\247ow\205-up\0"  // keep the parameters; without NAME for power-up
+    "save\201\204s\234wi\245\254\205NAME: f\216\256w\214-up\0"  // save the parameters; without NAME: for power-up
     "load PRESET\0"
-    "\246\201\237\202\0"  // use a preset
+    "load\240 \203\222\0"  // load a preset
     "presets\0"
-    "li\206\203\201\202s\0"  // list the presets
+    "li\217\201\203\222s\0"  // list the presets
     "forget PRESET\0"
-    "de\242t\201\237\202\215r\243\234\0"  // delete a preset from EEPROM
+    "de\215t\206a \203e\205from \235\0"  // delete a preset from EEPROM
     "defaults confirm\0"
-    "\205as\201\227\254\202s\212\255 \245t\213gs\0"  // erase all presets and settings
+    "\214\226\206\223l \203\222\212\225d\233\222t\211gs\0"  // erase all presets and settings
     "zero confirm|factory\0"
-    "tak\201\235\201\210\212\226z\205o;\217r u\255o\203\221\0"  // take the pressures as zero; or undo that
+    "z\214o\201\203\260r\206s\230s\253s\234\216und\252\245\227\0"  // zero the pressure sensors; or undo that
     "echo on|off\0"
-    "\260pe\221\236\221 you\204\201(b\251\201t\205m\213\227)\0";  // repeat what you type (bare terminal)
+    "\231pea\205wha\205y\254\202(b\247\206t\214m\211\223)\0";  // repeat what you type (bare terminal)
 const char kResultTexts[] BIFA_FLASH =
     "ok\0"
-    "\223\211comma\255;\204\201help\0"  // no such command; type help
-    "wr\256g\212rgum\230s\0"  // wrong arguments
-    "\223\211\214\205;\204\201show\0"  // no such parameter; type show
-    "out\217f \244\0"  // out of range
-    "\206\257p\241:\204\201c\242\251\215ir\206\0"  // stopped: type clear first
-    "\223t \213\203i\226\206\221e;\204\201\206\257\215ir\206\0"  // not in this state; type stop first
-    "\223\211\202;\204\201\202s\0"  // no such preset; type presets
-    "\237nam\201i\2261\250o 12\217f\212-z 0-9 _ -\225\223t\215\240\233y\0"  // a name is 1 to 12 of a-z 0-9 _ -, not factory
-    "\223 ro\243\242ft\0"  // no room left
-    "\235\201\234\215a\222\241\0"  // the EEPROM failed
-    "b\246y sav\213g;\250ry\212ga\213\0"  // busy saving; try again
-    "\223\250rans\240i\256\217pen,\217r\212\215ield wa\226\260ject\241\0"  // no transaction open, or a field was rejected
-    "\235\201\245\212rriv\241 damag\241\0"  // the set arrived damaged
-    "it\226ca\246\201i\226\206\222l\203\205e;\204\201\206\221\246\0"  // its cause is still there; type status
-    "time\226mu\206 \223t go backw\251ds\0"  // times must not go backwards
-    "\210 \206\222\254move: \260\206 4 s\215ir\206\0"  // pressures still move: rest 4 s first
-    "m\233\201t\231n 0.9\247si\215r\243z\205o\0";  // more than 0.9 psi from zero
+    "\210comm\225d;\202help\0"  // no such command; type help
+    "wr\224g\240rgum\230ts\0"  // wrong arguments
+    "\210\204;\202show\0"  // no such parameter; type show
+    "\254\205\221 r\225ge\0"  // out of range
+    "\217\244ped:\202c\215\247\241r\217\0"  // stopped: type clear first
+    "\237\205\211 \245i\212\217\227e;\202\217\244\241r\217\0"  // not in this state; type stop first
+    "\210\203\222;\202\203\222s\0"  // no such preset; type presets
+    "nam\251: 1 t\25212 \221\240-z 0-9 _ -\213\237\205f\236t\253y\0"  // names: 1 to 12 of a-z 0-9 _ -, not factory
+    "\237\233p\236\206\215ft\0"  // no space left
+    "\235 writ\206fai\215d\0"  // EEPROM write failed
+    "b\246y\233av\211g\234try\240ga\211\0"  // busy saving; try again
+    "\237 tr\225s\236\261\224 \244\230\213\216a\241eld wa\212\231jected\0"  // no transaction open, or a field was rejected
+    "\204\233e\205fai\215d it\212CRC\0"  // parameter set failed its CRC
+    "ca\246\206\217ill \203\230t;\202\217\227\246\0"  // cause still present; type status
+    "\261me\212m\246\205\237\205g\252b\236kw\247ds\0"  // times must not go backwards
+    "\203\260\231\212\237\205s\222t\215d\234wai\2054\233\0"  // pressures not settled; wait 4 s
+    "\221fse\205exceed\2120.9 p\257\0";  // offset exceeds 0.9 psi
 const char kChamberWords[] BIFA_FLASH =
     "body\0"
     "head\0"

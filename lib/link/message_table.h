@@ -60,7 +60,7 @@ extern const uint8_t kStopFrame[kStopFrameBytes];
 /// Exact size of the fields of a message to the Uno; false if there is no such message.
 bool inward_size(uint8_t message, uint8_t& size);
 
-/// open a session; what an earlier one began and did not finish is void, timed holds included: they vent.
+/// open a session; voids whatever an earlier one left unfinished, and vents its timed holds.
 struct ConnectMessage {
   uint16_t boot_nonce;
   uint16_t session_key;
@@ -74,19 +74,19 @@ struct HoldMessage {
 } __attribute__((packed));
 static_assert(sizeof(HoldMessage) == 2, "no holes");
 
-/// telemetry: one line (>) a sample.
+/// telemetry: one line (>) per sample.
 struct StreamMessage {
   uint8_t on;
 } __attribute__((packed));
 static_assert(sizeof(StreamMessage) == 1, "no holes");
 
-/// keep the parameters; without NAME for power-up.
+/// save the parameters; without NAME: for power-up.
 struct SaveMessage {
   char preset[12];
 } __attribute__((packed));
 static_assert(sizeof(SaveMessage) == 12, "no holes");
 
-/// use a preset.
+/// load a preset.
 struct LoadMessage {
   char preset[12];
 } __attribute__((packed));
@@ -104,7 +104,7 @@ struct ForgetMessage {
 } __attribute__((packed));
 static_assert(sizeof(ForgetMessage) == 12, "no holes");
 
-/// take the pressures as zero; or undo that.
+/// zero the pressure sensors; or undo that.
 struct ZeroMessage {
   uint8_t factory;
 } __attribute__((packed));
@@ -131,7 +131,7 @@ struct ScheduleAddMessage {
 } __attribute__((packed));
 static_assert(sizeof(ScheduleAddMessage) == 6, "no holes");
 
-/// in answer to version and connect; session_key is 0 when no session is open.
+/// answer to version and connect; session_key is 0 when no session is open.
 struct HelloMessage {
   uint8_t protocol;
   uint8_t firmware[3];
@@ -142,7 +142,7 @@ struct HelloMessage {
 } __attribute__((packed));
 static_assert(sizeof(HelloMessage) == 13, "no holes");
 
-/// the command of that number is finished.
+/// the command with that number has finished.
 struct DoneMessage {
   uint8_t result;
 } __attribute__((packed));

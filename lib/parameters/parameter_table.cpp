@@ -7,31 +7,31 @@ namespace bifa {
 const char kParameterTexts[] BIFA_FLASH =
     "period_s\0"
     "s\0"
-    "tim\201\232\217n\201cycl\201(1/f)\0"  // time of one cycle (1/f)
+    "\261m\206\221 \224\206cycl\206(1/f)\0"  // time of one cycle (1/f)
     "psi12_deg\0"
     "deg\0"
-    "p\231s\201\232\203\201\207a\207\232\203\201\2202)\0"  // phase of the head ahead of the body (psi_12)
+    "\255\226\206\221\201\207a\207\221\201\2202)\0"  // phase of the head ahead of the body (psi_12)
     "psi13_deg\0"
     "deg\0"
-    "p\231s\201\232\203\201ta\222\212\207\232\203\201\2203)\0"  // phase of the tail ahead of the body (psi_13)
+    "\255\226\206\221\201\232\240\207\221\201\2203)\0"  // phase of the tail ahead of the body (psi_13)
     "duty_body\0"
     "\0"
-    "\200\253 c\256tr\240\226(d_1)\0"  // fraction of the cycle under vacuum; the body contracts (d_1)
+    "\200\250 c\224tr\236t\212\2421)\0"  // fraction of the cycle under vacuum; the body contracts (d_1)
     "duty_head\0"
     "\0"
-    "\200\207\2162)\0"  // fraction of the cycle under vacuum; the head releases (d_2)
+    "\200\207\231\215\226e\212\2422)\0"  // fraction of the cycle under vacuum; the head releases (d_2)
     "duty_tail\0"
     "\0"
-    "\200ta\222 \2163)\0"  // fraction of the cycle under vacuum; the tail releases (d_3)
+    "\200\232 \231\215\226e\212\2423)\0"  // fraction of the cycle under vacuum; the tail releases (d_3)
     "coupling_per_s\0"
     "1/s\0"
-    "osc\222l\221\233s'\247ul\254\213to\247\231s\201(\227p\231_phi)\0"  // oscillators' pull into phase (alpha_phi)
+    "c\254pl\211g ga\211 \221\201oscill\227\253\212(\223\255a_\255i)\0"  // coupling gain of the oscillators (alpha_phi)
     "pressure_psi\0"
     "psi\0"
-    "\245-po\213t\217f\203\201positiv\201supply\0"  // set-point of the positive supply
+    "s\222-\256\211\205\221\201\256\257\261v\206\260pply\0"  // set-point of the positive supply
     "host_timeout_s\0"
     "s\0"
-    "v\230\212ft\205\211s\222enc\201\232\203\201ho\206; 0 = nev\205\0";  // vent after such silence of the host; 0 = never
+    "v\230\205if\201hos\205i\212\257\215n\205\245i\212l\224g\2340 = nev\214\0";  // vent if the host is silent this long; 0 = never
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {
     {500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1},  // period_s

@@ -18,9 +18,9 @@ struct ParameterSet {
   uint16_t duty_body_e4;  ///< duty_body: fraction of the cycle under vacuum; the body contracts (d_1)
   uint16_t duty_head_e4;  ///< duty_head: fraction of the cycle under vacuum; the head releases (d_2)
   uint16_t duty_tail_e4;  ///< duty_tail: fraction of the cycle under vacuum; the tail releases (d_3)
-  uint16_t coupling_milli_per_s;  ///< coupling_per_s: oscillators' pull into phase (alpha_phi)
+  uint16_t coupling_milli_per_s;  ///< coupling_per_s: coupling gain of the oscillators (alpha_phi)
   uint16_t pressure_mpsi;  ///< pressure_psi: set-point of the positive supply
-  uint16_t host_timeout_ms;  ///< host_timeout_s: vent after such silence of the host; 0 = never
+  uint16_t host_timeout_ms;  ///< host_timeout_s: vent if the host is silent this long; 0 = never
 };
 static_assert(sizeof(ParameterSet) == 24, "a set has no holes");
 

@@ -87,7 +87,7 @@ static void test_phrases_are_put_in_where_their_codes_stand() {
   TEST_ASSERT_EQUAL_STRING("phase of the head ahead of the body (psi_12)", printed);
   begin_line();
   print(text_of(ParameterId::kHostTimeoutS, ParameterText::kHelp));
-  TEST_ASSERT_EQUAL_STRING("vent after such silence of the host; 0 = never", printed);
+  TEST_ASSERT_EQUAL_STRING("vent if the host is silent this long; 0 = never", printed);
 }
 
 static void test_texts_in_flash() {

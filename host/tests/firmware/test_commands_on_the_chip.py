@@ -196,10 +196,10 @@ def test_a_line_that_makes_sense_does(bench, sense):
 def test_zero_is_refused_with_its_reason_and_shows_the_old_and_the_new_offset(bench):
     bench.volts = [2.52, 2.49, 2.5]
     bench.wait(0.8)
-    assert "error pressures still move: rest 4 s first" in bench.say("zero confirm", 0.5)
+    assert "error pressures not settled; wait 4 s" in bench.say("zero confirm", 0.5)
     bench.volts[0] = 2.7  # 1.5 psi
     bench.wait(6.0)
-    assert "error more than 0.9 psi from zero" in bench.say("zero confirm", 0.5)
+    assert "error offset exceeds 0.9 psi" in bench.say("zero confirm", 0.5)
     bench.volts[0] = 2.52
     bench.wait(6.0)
     lines = bench.say("zero confirm", 2.0).splitlines()
