@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 
 @dataclass(frozen=True)
@@ -35,5 +35,5 @@ def weighted_mean(
     scatter = float(np.sqrt(np.sum(weights * (values - mean) ** 2) / (n - 1) / weights.sum()))
     sd = float(np.hypot(scatter, common_sd))
     freedom = (n - 1) * (sd / scatter) ** 4 if scatter > 0 else np.inf
-    half = float(student.ppf(0.5 + confidence / 2, freedom)) * sd
+    half = float(stdtrit(freedom, 0.5 + confidence / 2)) * sd
     return IntervalEstimate(mean, sd, mean - half, mean + half, confidence)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.problem.switches import seconds_per_uno_s
@@ -130,7 +130,7 @@ def of_few(squares: Sequence[float]) -> float:
     off the next gait may be: a few tell an RMS badly. 0 of none."""
     if not squares:
         return 0.0
-    wider = t.ppf(_SIDE, len(squares)) / norm.ppf(_SIDE)
+    wider = stdtrit(len(squares), _SIDE) / ndtri(_SIDE)
     return float(wider * np.sqrt(max(float(np.mean(squares)), 0.0)))
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from lacuna.diagnosis.policy import Policy
 from lacuna.estimation.fit import Fit
@@ -61,7 +61,7 @@ def met_by_chance(before: Runs, after: Runs, followed: Sequence[Followed], param
     if spare < 1 or left >= was:
         return 1.0
     ratio = (was - left) / parameters / max(left / spare, 1e-300)
-    return float(f_distribution.sf(ratio, parameters, spare))
+    return float(fdtrc(parameters, spare, ratio))
 
 
 def _between(runs: Runs, followed: Sequence[Followed]) -> float:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.noise import NoiseFloor, at_times
@@ -133,7 +133,7 @@ def _of_singles(
     of_floor = sum((len(rows) - 1) * _in_common(rows) for rows in repeated)
     variance = 2 * samples_per_piece * (1 / len(samples) + (1 / of_floor if of_floor else 0.0))
     z = above / np.sqrt(variance)
-    return above, float(z), float(norm.sf(z)), float(np.sqrt(variance))
+    return above, float(z), float(ndtr(-z)), float(np.sqrt(variance))
 
 
 def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[tuple[str, str], list[np.ndarray]]:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
 
 from lacuna.estimation.sampling import evenly, sample_period
 from lacuna.system import Channels, Record
@@ -22,6 +21,8 @@ def peaks(
 ) -> list[float]:
     """The `count` most prominent frequencies [Hz] of the residuals `scaled`, pooled over trials and channels, each
     weighed by its own background."""
+    from scipy.signal import find_peaks  # slow to import
+
     resolution_hz = _resolution_hz(max(trial.time_s[-1] - trial.time_s[0] for trial in trials), upper_hz - lower_hz)
     frequencies = np.arange(lower_hz, upper_hz, resolution_hz)
     pooled, weight = np.zeros(len(frequencies)), np.zeros(len(frequencies))

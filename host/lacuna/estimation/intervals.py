@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit
@@ -20,7 +20,7 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     variance = np.maximum(np.diag(known.covariance), np.diag(clustered_covariance(fitted)))
     variance += fitted.structure.grains()[list(fitted.solution.free)] ** 2 / 12.0  # anywhere within a step
     conditions = len({(t.experiment, t.condition) for t in fitted.problem.trials})
-    half = np.sqrt(variance) * student.ppf(0.5 + _CONFIDENCE / 2, max(conditions - 1, 1))
+    half = np.sqrt(variance) * stdtrit(max(conditions - 1, 1), 0.5 + _CONFIDENCE / 2)
     found = {}
     for estimate, index, width in zip(known.estimates, fitted.solution.free, half, strict=True):
         parameter = fitted.structure.parameters[index]

@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from lacuna.cores import usable_cores
 from lacuna.estimation.noise import NoiseFloor
@@ -364,7 +363,8 @@ class Problem:
             whole = even.shape[1] // every
             pieces = even[:, : whole * every].reshape(len(even), whole, every)
             recent = pieces @ ((1.0 - decay) * decay ** np.arange(every)[::-1])
-            found.append(lfilter([1.0], [1.0, -(decay**every)], recent))
+            kept = decay ** (every * np.arange(whole))  # never less than the exponential of -1 over the blur
+            found.append(np.cumsum(recent / kept, axis=1) * kept)
             weights.append(w_[every - 1 :: every] * np.sqrt(every))
         return np.concatenate(found, axis=1), np.concatenate(weights)
 

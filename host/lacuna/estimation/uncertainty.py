@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import ndtri
 
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.noise import NoiseFloor
@@ -72,7 +72,7 @@ def uncertainty(fitted: Fit, *, confidence: float = 0.9, dispersion: float | Non
     inverse = (vectors / np.maximum(values, 1e-6)) @ vectors.T
     dispersion = _dispersion(fitted) if dispersion is None else dispersion
     covariance = dispersion * inverse * np.outer(scales, scales)
-    half = norm.ppf(0.5 + confidence / 2)
+    half = ndtri(0.5 + confidence / 2)
     loose = (vectors[:, open_] ** 2).sum(axis=1) > 0.1
     at_bound = fitted.at_bound
     estimates = []
@@ -109,7 +109,7 @@ def profile_interval(
     structure, solution = fitted.structure, fitted.solution
     index = structure.names.index(name)
     position = solution.free.index(index)
-    limit = 0.5 * chi2.ppf(confidence, 1) * _dispersion(fitted)
+    limit = 0.5 * ndtri(0.5 + confidence / 2) ** 2 * _dispersion(fitted)
     marginal = np.linalg.pinv(solution.normal, hermitian=True)[position, position]
     sd = float(np.sqrt(max(marginal, 1e-12 * structure.scales()[index] ** 2)))
     others = tuple(i for i in solution.free if i != index)
