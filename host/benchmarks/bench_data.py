@@ -1,4 +1,4 @@
-"""Reading an hour of 100 Hz walking data, strictly, as a telemetry and as a declared export: time and memory beside
+"""Reading an hour of 100 Hz walking data, strictly, and as an export: time and memory beside
 those of NumPy's and pandas' own readers on the same file."""
 
 import csv
@@ -13,18 +13,15 @@ import pandas
 
 from bifa.data import EXPERIMENTS, Dataset, Trial, read_dataset, write_dataset
 from bifa.data.export import OWN_NAMES, read_export
-from bifa.measure.instrument_csv import read_columns
 
 SECONDS_ALLOWED = 2.0
 NAMES = EXPERIMENTS["locomotion"].all_columns
-IMPORTS = "import pathlib, lacuna.records; from bifa.data import read_dataset; "
-IMPORTS += "from bifa.measure.instrument_csv import read_columns"
+IMPORTS = "import pathlib, lacuna.records; from bifa.data import read_dataset"
 READERS = {
     "numpy": "numpy.loadtxt(file, delimiter=',', skiprows=1)",
     "pandas": "pandas.read_csv(file)",
     "data set": "read_dataset(sys.argv[1])",
     "lacuna": "lacuna.records.read(pathlib.Path(file))",
-    "telemetry": "read_columns(pathlib.Path(file), ('time_s',))",
 }
 GAIT = {"period_s": 5.7, "psi12_deg": 270, "psi13_deg": 90, "duty_body": 0.5, "duty_head": 0.5, "duty_tail": 0.5}
 
@@ -42,16 +39,12 @@ def run() -> dict[str, float]:
         numpy_s = min(_seconds(lambda: np.loadtxt(file, delimiter=",", skiprows=1)) for _ in range(3))
         pandas_s = min(_seconds(lambda: pandas.read_csv(file)) for _ in range(3))
         csv_s = _seconds(lambda: _with_csv_module(file))
-        columns_s = min(_seconds(lambda: read_columns(file, ("time_s",))) for _ in range(3))
         export_s = min(_seconds(lambda: read_export(file, OWN_NAMES, NAMES)) for _ in range(3))
         peaks = {name: _peak_mb(code, str(folder)) for name, code in READERS.items()}
         megabytes = file.stat().st_size / 1e6
     print(f"read an hour of 100 Hz data strictly ({megabytes:.0f} MB): {read_s:.2f} s (allowed {SECONDS_ALLOWED:g} s)")
     print(f"  numpy.loadtxt alone, unchecked: {numpy_s:.2f} s; Python's csv and float: {csv_s:.2f} s")
-    print(
-        f"  pandas.read_csv alone: {pandas_s:.2f} s; as telemetry {columns_s:.2f} s, "
-        f"as a declared export {export_s:.2f} s"
-    )
+    print(f"  pandas.read_csv alone: {pandas_s:.2f} s; as an export {export_s:.2f} s")
     told = ", ".join(f"{name} {peak:.0f}" for name, peak in peaks.items())
     print(f"  memory beyond what is imported, at its peak, MB: {told}")
     print(f"  write it, read it back, publish it: {write_s:.2f} s")
@@ -64,7 +57,6 @@ def run() -> dict[str, float]:
         "dataset_read_hour_times_numpy_loadtxt": read_s / numpy_s,
         "export_read_hour_seconds": export_s,
         "export_read_hour_times_pandas": export_s / pandas_s,
-        "telemetry_read_hour_seconds": columns_s,
     } | {f"read_hour_peak_mb_{name.replace(' ', '_')}": peak for name, peak in peaks.items()}
 
 

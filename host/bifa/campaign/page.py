@@ -38,6 +38,7 @@ GAIT_NAMES = {
     "completed": "found with the completed model",
 }
 EDGE = "at the edge of what is known"
+ERROR_COLUMNS = ("base model", "completed model", "noise floor")
 _STAND_IN = "baseline: the {} model has none"
 _NAMES = GAIT_NAMES | {"edge": EDGE}
 FILES = (
@@ -289,9 +290,12 @@ def prediction_table(errors: Sequence[Mapping[str, Any]], only: str | None = Non
     rows = []
     for error in errors:
         if only in (None, error["trials"]):
-            unit = unit_of(error["quantity"])
             which = "" if only else f", {error['trials']}"
-            values = (f"{plain(error[side])}{NBSP}{unit}" for side in ("before", "after", "noise_floor"))
-            rows.append([f"{channel_words(error['quantity'])}{which}", *values])
-    what = f"RMS error, {only} trials" if only else "RMS error"
-    return PageTable([what, "base model", "completed model", "noise floor"], rows)
+            rows.append([f"{channel_words(error['quantity'])}{which}", *errors_in_words(error)])
+    return PageTable([f"RMS error, {only} trials" if only else "RMS error", *ERROR_COLUMNS], rows)
+
+
+def errors_in_words(error: Mapping[str, Any]) -> list[str]:
+    """An error in its instrument's unit, for `ERROR_COLUMNS`."""
+    sides = ("before", "after", "noise_floor")
+    return [f"{plain(error[side])}{NBSP}{unit_of(error['quantity'])}" for side in sides]

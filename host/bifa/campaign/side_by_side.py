@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from bifa.campaign.page import GAIT_NAMES
+from bifa.campaign.page import ERROR_COLUMNS, GAIT_NAMES, errors_in_words
 from bifa.errors import BifaError
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
 from bifa.report.diagnosis import BASE_MODEL, COMPLETED_MODEL, HELD_OUT, NOISE_FLOOR, RMS, verdict_sentence
 from bifa.report.evidence import before_and_after
 from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.words import (
-    NBSP,
     channel_words,
     effect_parameter,
     effect_words,
@@ -25,7 +24,6 @@ from bifa.report.words import (
     parameter_words,
     plain,
     quantity,
-    unit_of,
 )
 from bifa.robot import Model, load_model
 from bifa.robot.gait import Gait, load_gait
@@ -145,14 +143,13 @@ def speed_table(runs: Sequence[Campaign]) -> PageTable:
 
 def error_table(runs: Sequence[Campaign]) -> PageTable:
     """Errors on held-out trials, before and after, in the units of the instruments."""
-    rows = []
-    for run in runs:
-        for error in run.summary["prediction_error"]:
-            if error["trials"] == "held-out":
-                unit = unit_of(error["quantity"])
-                values = (f"{plain(error[side])}{NBSP}{unit}" for side in ("before", "after", "noise_floor"))
-                rows.append([f"{run.name}: {channel_words(error['quantity'])}", *values])
-    return PageTable(["RMS error, held-out trials", "base model", "completed model", "noise floor"], rows)
+    rows = [
+        [f"{run.name}: {channel_words(error['quantity'])}", *errors_in_words(error)]
+        for run in runs
+        for error in run.summary["prediction_error"]
+        if error["trials"] == "held-out"
+    ]
+    return PageTable(["RMS error, held-out trials", *ERROR_COLUMNS], rows)
 
 
 def parameter_table(runs: Sequence[Campaign]) -> PageTable:

@@ -1,9 +1,8 @@
 """`bifa experiment`: the paper's characterisation experiments on a rig, written as a data set."""
 
 import math
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -29,39 +28,21 @@ EXAMPLES = (
 )
 
 
-class ExperimentName(StrEnum):
-    """What can be run."""
-
-    STATIC_LOADING = "static_loading"
-    STEP_RESPONSE = "step_response"
-    ANCHOR_PULL = "anchor_pull"
-    LOCOMOTION = "locomotion"
-    ALL = "all"
+NAMES = ("static_loading", "step_response", "anchor_pull", "locomotion", "all")
 
 
 def _named(text: str) -> str:
-    if text not in list(ExperimentName):
-        raise typer.BadParameter(f"{text!r} is none of {', '.join(ExperimentName)}")
+    if text not in NAMES:
+        raise typer.BadParameter(f"{text!r} is none of {', '.join(NAMES)}")
     return text
 
 
-def _begun(incomplete: str) -> list[str]:
-    return [name for name in ExperimentName if name.startswith(incomplete)]
-
-
 WHICH = typer.Argument(
-    help=f"{', '.join(list(ExperimentName)[:-1])}, or all: the paper's section IV, and walks.",
+    help=f"{', '.join(NAMES[:-1])}, or all: the paper's section IV, and walks.",
     callback=_named,  # an enumeration's own help is one word that no narrow terminal can break
-    autocompletion=_begun,
+    autocompletion=lambda incomplete: [name for name in NAMES if name.startswith(incomplete)],
     metavar="EXPERIMENT",
 )
-
-
-class ActuatorName(StrEnum):
-    """Which actuator."""
-
-    LARGE = "large"
-    SMALL = "small"
 
 
 def experiment(
@@ -69,7 +50,7 @@ def experiment(
     out: Annotated[Path, typer.Option(help="Folder of the data set: a new one, or that of an interrupted session.")],
     port: Annotated[str | None, PORT] = None,
     actuator: Annotated[
-        ActuatorName | None, typer.Option(help="Only this one (static_loading, step_response).")
+        Literal["large", "small"] | None, typer.Option(help="Only this one (static_loading, step_response).")
     ] = None,
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed in mm/s.")] = None,
@@ -128,12 +109,12 @@ def experiment(
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
     if rate is not None and not math.isfinite(rate):
         raise typer.BadParameter(f"--rate must be a finite number of mm/s, not {rate:g}")
-    if inclination and name not in (ExperimentName.LOCOMOTION, ExperimentName.ALL):
+    if inclination and name not in ("locomotion", "all"):
         raise typer.BadParameter(f"--inclination applies to walks only; leave it out, or run locomotion, not {name}")
     gaits = [_load(path) for path in gait] if gait else [BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
-        plan.EXPERIMENTS if name == ExperimentName.ALL else (name,),
-        actuators=(actuator.value,) if actuator else plan.ACTUATORS,
+        plan.EXPERIMENTS if name == "all" else (name,),
+        actuators=(actuator,) if actuator else plan.ACTUATORS,
         repeats=repeats,
         pressures_psi=pressure or None,
         rate_mm_s=rate,

@@ -20,10 +20,10 @@ _WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters of the trace, and of what
 COLORS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
 
 
-def dial(phase_rad: float, width: int = 10) -> str:
-    """Where in its cycle an oscillator is."""
-    at = int(phase_rad / (2 * math.pi) * width) % width
-    return "·" * at + "●" + "·" * (width - 1 - at)
+def dial(phase_rad: float) -> str:
+    """Where in its cycle an oscillator is, in tenths."""
+    at = int(phase_rad / (2 * math.pi) * 10) % 10
+    return "·" * at + "●" + "·" * (9 - at)
 
 
 class Monitor:

@@ -14,19 +14,16 @@ from rich.progress import Progress
 from rich.status import Status
 
 from bifa.errors import BifaError
-from bifa.link import NoAnswerError, PortGoneError, RefusedError, RestartedError, Sample, StillMovingError, Uno
+from bifa.link import RefusedError, Sample, Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
-from bifa.rig import Rig, RigError, SameBoard
+from bifa.rig import GONE, RETRY_S, Rig, SameBoard
 from bifa.robot.gait import BASELINE, GaitFile, read_gait_file
 from bifa.screen import Console, warning
 
-RETRY_S = 1.0
 RESTARTS = 3  # of a board that kept its power, while its port was away: each counts its boot number on by one
-# RigError: no Uno is plugged in
-GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
 HEADER = [
     "time_s",
     "host_time_s",
@@ -136,7 +133,7 @@ class _TelemetryLog:
         self._board, self._parameters, self._end_s = SameBoard(port, open_rig), parameters, end_s
         self._console = console
         self._nonce: int | None = None  # of the start that was seen last; None before the first
-        self._desk = Desk(lambda text: console.print(text))
+        self._desk = Desk(console.print)
 
     @property
     def has_begun(self) -> bool:

@@ -10,7 +10,7 @@ restart when `bifa record` opened the port: the first edge after that pause is s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +23,6 @@ from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
 from bifa.data.sheet import Sheet
 from bifa.data.write import add_trial
-from bifa.errors import BifaError
 from bifa.link.table import CHAMBERS
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.measure.alignment import (
@@ -45,11 +44,12 @@ Columns = Mapping[str, np.ndarray]
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
-_LOST = "no value (a lost marker?); fill the gap by the instrument's own means, or record again"
+_REPAIR = "(a lost marker?); fill the gap by the instrument's own means, or record again"
+_LOST = f"no value {_REPAIR}"
 
 
-class InstrumentFileError(BifaError):
-    """An instrument's file or the telemetry cannot be used; the text says which and why."""
+class InstrumentFileError(DatasetError):
+    """An instrument's file and the telemetry do not go together; the text says why."""
 
 
 def import_trial(
@@ -67,8 +67,8 @@ def import_trial(
 
     known: what was measured directly (`bifa.measure.known`). export: how the instrument writes its files, if declared.
 
-    Raises InstrumentFileError where a column is missing, the two do not overlap, their clocks do not line up, or the
-    data set has this record already; DatasetError where `folder` exists, or is no data set to be added to.
+    Raises InstrumentFileError where the two do not overlap, their clocks do not line up, or the data set has this
+    record already; DatasetError where a file cannot be used, `folder` exists, or is no data set to be added to.
     """
     recorded = _added_to(folder, known) if add else None
     measured, edges = read_instrument(instrument, CHANNELS[planned.experiment], export)
@@ -122,51 +122,38 @@ def read_instrument(
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Columns of an instrument's file, `time_s` and `channels` among them, and the times of its sync edges [s], from
     the file beside it or as `export` declares; both rise. A tail that was not tracked at all is no column. `export`:
-    how the file is written; None: under the data set's names. Raises InstrumentFileError."""
-    columns, sheet, rows = _declared(path, channels, export or OWN_NAMES)
-    lines = [sheet.line(row) for row in rows]
-    _refuse_few(path, lines)
-    _refuse_gaps(path, columns, ("time_s", *channels), _LOST, lines)
-    _refuse_falling(path, columns, "time_s", lines)
-    _refuse_codes(path, columns, lines)
-    if _TAIL in columns:
-        if np.isnan(columns[_TAIL]).all():
-            del columns[_TAIL]
-        else:
-            _refuse_gaps(path, columns, (_TAIL,), _LOST, lines)
+    how the file is written; None: under the data set's names. Raises DatasetError."""
+    optional = (_TAIL,) if _HEAD in channels else ()
+    columns, sheet, rows = _read(path, ("time_s", *channels), optional, export or OWN_NAMES)
+    if _TAIL in columns and np.isnan(columns[_TAIL]).all():
+        del columns[_TAIL]
+    _refuse_gaps(columns, sheet, rows, columns, _LOST)
+    _refuse_falling(columns, sheet, rows, "time_s")
+    for name in columns.keys() - {"time_s"}:
+        if (coded := codes(columns[name])).any():
+            row = int(np.argmax(coded))
+            raise sheet.error(f"{columns[name][row]:g} is a code for a missing value {_REPAIR}", rows[row], name)
     if export is None or (export.needs_sync_file and export.units.get("time_s") != DATE):
         return columns, _read_edges(sync_file(path))
-    try:
-        if export.needs_sync_file:
-            return columns, dated_edges(export, sheet, rows, Sheet(sync_file(path)))
-        return columns, sync_edges(export, columns, sheet, rows)
-    except DatasetError as error:
-        raise InstrumentFileError(str(error)) from None
+    if export.needs_sync_file:
+        return columns, dated_edges(export, sheet, rows, Sheet(sync_file(path)))
+    return columns, sync_edges(export, columns, sheet, rows)
 
 
-def _declared(path: Path, channels: tuple[str, ...], export: Export) -> tuple[dict[str, np.ndarray], Sheet, np.ndarray]:
-    optional = (_TAIL,) if _HEAD in channels else ()
-    try:
-        return read_export(path, export, ("time_s", *channels), optional)
-    except DatasetError as error:
-        raise InstrumentFileError(str(error)) from None
+def _read(
+    path: Path, wanted: Iterable[str], optional: Iterable[str] = (), export: Export = OWN_NAMES
+) -> tuple[dict[str, np.ndarray], Sheet, np.ndarray]:
+    columns, sheet, rows = read_export(path, export, wanted, optional)
+    if len(rows) < 2:
+        raise InstrumentFileError(f"{path} holds {len(rows)} samples: too few to synchronise")
+    return columns, sheet, rows
 
 
 def _read_edges(path: Path) -> np.ndarray:
-    edges = read_columns(path, ("sync_time_s",))
-    _refuse_gaps(path, edges, ("sync_time_s",), _LOST)
-    _refuse_falling(path, edges, "sync_time_s")
+    edges, sheet, rows = _read(path, ("sync_time_s",))
+    _refuse_gaps(edges, sheet, rows, edges, _LOST)
+    _refuse_falling(edges, sheet, rows, "sync_time_s")
     return edges["sync_time_s"]
-
-
-def _refuse_codes(path: Path, columns: dict[str, np.ndarray], lines: Sequence[int]) -> None:
-    for name, values in columns.items():
-        if name != "time_s" and (coded := codes(values)).any():
-            row = int(np.flatnonzero(coded)[0])
-            raise InstrumentFileError(
-                f"{path}, line {lines[row]}, column {name}: {values[row]:g} is a code for a missing value (a lost "
-                "marker?); fill the gap by the instrument's own means, or record again"
-            )
 
 
 def sync_file(path: Path) -> Path:
@@ -178,9 +165,11 @@ def sync_file(path: Path) -> Path:
 
 
 def _read_telemetry(path: Path, planned: PlannedTrial) -> dict[str, np.ndarray]:
+    """A command is NaN where its chamber is off."""
     whole = ("time_s", "sequence", *(f"pressure_{chamber}_psi" for chamber in CHAMBERS))
-    columns = read_columns(path, (*whole, *(f"command_{chamber}" for chamber in _commanded(planned))))
-    _refuse_gaps(path, columns, whole, "no value (a cut line?); remove that line, or record again")
+    wanted = (*whole, *(f"command_{chamber}" for chamber in _commanded(planned)))
+    columns, sheet, rows = _read(path, wanted, ("strobe",))
+    _refuse_gaps(columns, sheet, rows, whole, "no value (a cut line?); remove that line, or record again")
     return columns
 
 
@@ -191,33 +180,17 @@ def _commanded(planned: PlannedTrial) -> tuple[str, ...]:
     return (CHAMBER_OF[planned.tested],) if planned.experiment == "step_response" else ()
 
 
-def _refuse_gaps(
-    path: Path, columns: dict[str, np.ndarray], names: tuple[str, ...], problem: str, lines: Sequence[int] | None = None
-) -> None:
+def _refuse_gaps(columns: Columns, sheet: Sheet, rows: np.ndarray, names: Iterable[str], problem: str) -> None:
     for name in names:
         if not np.isfinite(columns[name]).all():
-            row = int(np.flatnonzero(~np.isfinite(columns[name]))[0])
-            raise InstrumentFileError(f"{path}, line {_line(row, lines)}, column {name}: {problem}")
+            raise sheet.error(problem, rows[np.argmin(np.isfinite(columns[name]))], name)
 
 
-def _refuse_falling(path: Path, columns: dict[str, np.ndarray], name: str, lines: Sequence[int] | None = None) -> None:
-    steps = np.diff(columns[name])
-    if (steps <= 0.0).any():
-        row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
-        raise InstrumentFileError(
-            f"{path}, line {_line(row, lines)}, column {name}: not later than the line before; times rise from line to "
-            "line"
-        )
-
-
-def _refuse_few(path: Path, lines: Sequence[int]) -> None:
-    if len(lines) < 2:
-        raise InstrumentFileError(f"{path} holds {len(lines)} samples: too few to synchronise")
-
-
-def _line(row: int, lines: Sequence[int] | None) -> int:
-    """The line of a row; without `lines` the rows stand below one line of names."""
-    return row + 2 if lines is None else lines[row]
+def _refuse_falling(columns: Columns, sheet: Sheet, rows: np.ndarray, name: str) -> None:
+    falls = np.diff(columns[name]) <= 0.0
+    if falls.any():
+        problem = "not later than the line before; times rise from line to line"
+        raise sheet.error(problem, rows[np.argmax(falls) + 1], name)
 
 
 def _telemetry_file(path: Path) -> Path:
@@ -227,25 +200,6 @@ def _telemetry_file(path: Path) -> Path:
     if len(files) != 1:
         raise InstrumentFileError(f"{path} holds {len(files)} telemetry files: give the one of this trial")
     return files[0]
-
-
-def read_columns(path: Path, required: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Columns of numbers; an empty field is NaN (a chamber that is off), columns of text that nobody asks for are left
-    out."""
-    try:
-        sheet = Sheet(path)
-        labels = sheet.labels()
-        if missing := [name for name in required if name not in labels]:
-            raise InstrumentFileError(
-                f"{path} lacks the column {', '.join(missing)}; it has {sheet.listed() or 'none'}"
-            )
-        places = {name: sheet.find(name) for name in labels if name}
-        kept = {name: place for name, place in places.items() if name in required or not sheet.is_text(place)}
-        columns = {name: sheet.numbers(place, name) for name, place in kept.items()}
-    except DatasetError as error:
-        raise InstrumentFileError(str(error)) from None
-    _refuse_few(path, range(len(sheet)))
-    return columns
 
 
 def _line_up(edges_s: np.ndarray, uno: dict[str, np.ndarray], instrument: Path, telemetry: Path) -> ClockLine:

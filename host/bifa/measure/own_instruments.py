@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from bifa.data import DatasetError
 from bifa.data.export import MACHINE, ROLES, Export
 from bifa.errors import BifaError
 from bifa.files import is_stray
@@ -28,7 +29,7 @@ from bifa.measure.plan import PULL_MM, PlannedTrial
 Signature = tuple[Any, ...]
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
-SETTLED_S = 0.5  # a file whose size and time stay for so long has been written to its end
+SETTLED_S = 0.5  # during which a file's size and time stay the same
 
 _STAND = {
     "static_loading": "the {actuator} actuator in the testing machine, contracted",
@@ -82,8 +83,8 @@ class OwnInstruments:
         self._kept: Path | None = None
         self._step = ""
         self._experiment = ""
-        self._known: dict[Path, tuple[Any, ...]] = {}
-        self._seen: dict[Path, tuple[tuple[Any, ...], float]] = {}
+        self._known: dict[Path, Signature] = {}
+        self._seen: dict[Path, tuple[Signature, float]] = {}
         self._record: tuple[Path, dict[str, np.ndarray]] | None = None
 
     def begin(self, turn: Turn, kept: Path | None = None) -> None:
@@ -238,14 +239,17 @@ class OwnInstruments:
     def _tell_of_others(self) -> None:
         """Name files that have appeared and cannot be used, once for each version of them."""
         for path, signature in self._alone():
-            if self._told.get(path) == signature:
-                continue
-            before, since_s = self._seen.get(path, (None, 0.0))
-            if before != signature:
-                self._seen[path] = (signature, time.monotonic())
-            elif time.monotonic() - since_s >= SETTLED_S:
+            if self._told.get(path) != signature and self._is_settled(path, signature):
                 self._told[path] = signature
                 self._desk.say(self._why_not(path))
+
+    def _is_settled(self, path: Path, signature: Signature) -> bool:
+        """Whether a file has been the same for long enough to have been written to its end."""
+        before, since_s = self._seen.get(path, (None, 0.0))
+        if before != signature:
+            self._seen[path] = (signature, time.monotonic())
+            return False
+        return time.monotonic() - since_s >= SETTLED_S
 
     def _why_not(self, path: Path) -> str:
         if _is_sync(path):
@@ -265,12 +269,7 @@ class OwnInstruments:
         self._take_correction()
         self._tell_of_others()
         for path, signature in self._signatures():
-            if self._known.get(path) == signature:
-                continue
-            before, since_s = self._seen.get(path, (None, 0.0))
-            if before != signature:
-                self._seen[path] = (signature, time.monotonic())
-            elif time.monotonic() - since_s >= SETTLED_S:
+            if self._known.get(path) != signature and self._is_settled(path, signature):
                 self._known[path] = signature
                 if self._take(path):
                     return True
@@ -306,7 +305,7 @@ class OwnInstruments:
         try:
             columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
             self._refuse_earlier(path)
-        except InstrumentFileError as error:
+        except DatasetError as error:
             self._desk.say(f"{error}. Correct it and save it again.")
             return False
         self._record = (path, {**columns, "sync_time_s": edges})

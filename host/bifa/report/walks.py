@@ -54,9 +54,9 @@ def walks_chart(walks: Sequence[Walk]) -> Chart:
     )
 
 
-def draw_walks(walks: Sequence[Walk], path: Path, dark: bool = False) -> None:
+def draw_walks(walks: Sequence[Walk], path: Path) -> None:
     """Write the figure to `path` (PNG or SVG)."""
-    draw_chart(walks_chart(walks), path, dark, width_in=max(6.4, 4.4 * min(len(walks), 3)))
+    draw_chart(walks_chart(walks), path, width_in=max(6.4, 4.4 * min(len(walks), 3)))
 
 
 def _column(

@@ -10,9 +10,11 @@ from bifa.rig.rig import (
     is_offered,
     open_rig,
 )
-from bifa.rig.same_board import SameBoard
+from bifa.rig.same_board import GONE, RETRY_S, SameBoard
 
 __all__ = [
+    "GONE",
+    "RETRY_S",
     "Rig",
     "RigError",
     "SameBoard",

@@ -3,8 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
+from bifa.link import NoAnswerError, PortGoneError, RestartedError, StillMovingError
 from bifa.rig.ports import serial_ports
 from bifa.rig.rig import RigError, open_rig
+
+# Errors of a board that may come back. RigError: no Uno is plugged in.
+GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
+RETRY_S = 1.0  # until it is looked for again
 
 
 class SameBoard:

@@ -9,13 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from bifa.cli import app
-from bifa.data import read_dataset
+from bifa.data import DatasetError, read_dataset
 from bifa.data.export import parse_exports
 from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.link import Uno
 from bifa.link.table import MARK_PAUSE
-from bifa.measure.instrument_csv import InstrumentFileError, import_trial, read_instrument
+from bifa.measure.instrument_csv import import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import open_rig
 from bifa.toml import parse_toml
@@ -102,14 +102,14 @@ def test_what_is_refused_when_it_is_added_changes_nothing(files):
     assert not folder.exists()
     import_trial(files / "pull.csv", files, PULL, folder)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(InstrumentFileError, match=r"already, as anchor_8\.5psi_20mm_s_1\.csv"):
+    with pytest.raises(DatasetError, match=r"already, as anchor_8\.5psi_20mm_s_1\.csv"):
         import_trial(files / "pull.csv", files, PULL, folder, add=True)
     second = another(files, "second", 0.1)
     with pytest.raises(BifaError, match=r"dataset\.toml.*--known"):
         import_trial(second, files, PULL, folder, {"supply_positive_psi": 8.0}, add=True)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     (folder / "anchor_8.5psi_20mm_s_2.csv").write_text("mine")
-    with pytest.raises(InstrumentFileError, match="is not listed"):
+    with pytest.raises(DatasetError, match="is not listed"):
         import_trial(second, files, PULL, folder, add=True)
     assert (folder / "anchor_8.5psi_20mm_s_2.csv").read_text() == "mine"
 
@@ -150,14 +150,14 @@ def test_a_step_takes_its_commands_from_the_telemetry(files):
 )
 def test_a_file_that_cannot_be_used_is_named(files, file, text, message):
     (files / file).write_text(text)
-    with pytest.raises(InstrumentFileError, match=message):
+    with pytest.raises(DatasetError, match=message):
         import_trial(files / "pull.csv", files, PULL, files / "out")
     assert not (files / "out").exists()
 
 
 def test_missing_files_are_named(files):
     (files / "pull.sync.csv").unlink()
-    with pytest.raises(InstrumentFileError, match=r"pull\.sync\.csv"):
+    with pytest.raises(DatasetError, match=r"pull\.sync\.csv"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -186,7 +186,7 @@ def test_the_first_edge_after_a_restart_is_sample_1():
 def test_samples_lost_about_the_mark_ask_for_another_recording(files):
     lines = (files / "telemetry_1.csv").read_text().splitlines()
     (files / "telemetry_1.csv").write_text("\n".join(line for line in lines if f",{MARKED}.000000," not in line))
-    with pytest.raises(InstrumentFileError, match=r"lost on the link.*record again"):
+    with pytest.raises(DatasetError, match=r"lost on the link.*record again"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -194,7 +194,7 @@ def test_edges_that_do_not_fit_the_uno_are_refused(files):
     rng = np.random.default_rng(0)
     edges = np.concatenate([np.arange(-5.0, -2.0, 0.01), np.sort(np.arange(1, 800) * 0.01 + 0.008 * rng.random(799))])
     (files / "pull.sync.csv").write_text("sync_time_s\n" + "\n".join(f"{t:.6f}" for t in own(edges)))
-    with pytest.raises(InstrumentFileError, match=r"pull\.sync\.csv"):
+    with pytest.raises(DatasetError, match=r"pull\.sync\.csv"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -202,7 +202,7 @@ def test_a_lost_marker_is_named_by_file_line_and_column_and_leaves_nothing_behin
     lines = (files / "pull.csv").read_text().splitlines()
     time_s, _, force = lines[40].split(",")
     (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},,{force}", *lines[41:]]))
-    with pytest.raises(InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: no value"):
+    with pytest.raises(DatasetError, match=r"pull\.csv, line 41, column displacement_mm: no value"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
     (files / "pull.csv").write_text("\n".join(lines))
     import_trial(files / "pull.csv", files, PULL, files / "out")
@@ -234,7 +234,7 @@ def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
 )
 def test_a_file_in_another_shape_is_refused_with_what_to_do(files, file, text, message):
     (files / file).write_text(text)
-    with pytest.raises(InstrumentFileError, match=message):
+    with pytest.raises(DatasetError, match=message):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -242,18 +242,18 @@ def test_a_tail_with_gaps_is_refused_and_one_never_tracked_is_absent(tmp_path):
     path, header = tmp_path / "walk.csv", "time_s,displacement_head_mm,displacement_tail_mm\n"
     (tmp_path / "walk.sync.csv").write_text("sync_time_s\n1\n2\n3\n")
     path.write_text(header + "1,1,1\n2,1,\n3,1,1\n")
-    with pytest.raises(InstrumentFileError, match="line 3, column displacement_tail_mm: no value"):
+    with pytest.raises(DatasetError, match="line 3, column displacement_tail_mm: no value"):
         read_instrument(path, ("displacement_head_mm",))
     path.write_text(header + "1,1,\n2,1,\n3,1,\n")
     assert "displacement_tail_mm" not in read_instrument(path, ("displacement_head_mm",))[0]
 
 
 def test_telemetry_without_commands_or_with_a_gap_is_refused(files):
-    with pytest.raises(InstrumentFileError, match="lacks the column command_body"):
+    with pytest.raises(DatasetError, match="lacks the column command_body"):
         import_trial(files / "pull.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
     path = files / "telemetry_1.csv"
     path.write_text(path.read_text().replace(",200.000000,", ",,"))
-    with pytest.raises(InstrumentFileError, match="column sequence: no value"):
+    with pytest.raises(DatasetError, match="column sequence: no value"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -261,7 +261,7 @@ def test_a_record_is_not_added_again_with_other_pressures(files):
     import_trial(files / "pull.csv", files, PULL, files / "out")
     path = files / "telemetry_1.csv"
     path.write_text(path.read_text().replace("8.500000", "8.400000"))
-    with pytest.raises(InstrumentFileError, match="already"):
+    with pytest.raises(DatasetError, match="already"):
         import_trial(files / "pull.csv", files, PULL, files / "out", add=True)
 
 
@@ -269,7 +269,7 @@ def test_a_hole_in_the_telemetry_is_not_filled(files):
     lines = (files / "telemetry_1.csv").read_text().splitlines()
     kept = [line for line in lines if not line[0].isdigit() or not 4.5 < float(line.split(",")[0]) < 6.5]
     (files / "telemetry_1.csv").write_text("\n".join(kept))
-    with pytest.raises(InstrumentFileError, match=r"the telemetry has a hole of 2\.00 s at 4\.50 s"):
+    with pytest.raises(DatasetError, match=r"the telemetry has a hole of 2\.00 s at 4\.50 s"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -282,7 +282,7 @@ def test_rows_of_a_camera_that_are_missing_are_named_with_file_and_column(files)
     header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
     text = "\n".join([f"{header},command_body", *(f"{row},{float(row[:4]) >= 2.5:d}" for row in rows)])
     (files / "telemetry_1.csv").write_text(text)
-    with pytest.raises(InstrumentFileError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not filled in"):
+    with pytest.raises(DatasetError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not filled in"):
         import_trial(files / "cam.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
 
 
@@ -292,7 +292,7 @@ def test_a_code_for_no_value_is_no_value(files, code):
     time_s, _, force = lines[40].split(",")
     (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{code},{force}", *lines[41:]]))
     with pytest.raises(
-        InstrumentFileError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ is a code for a missing value"
+        DatasetError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ is a code for a missing value"
     ):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
@@ -360,7 +360,7 @@ def test_frames_that_the_strobe_triggers_line_themselves_up(files):
     frames = FORM.replace('time_s = "s"', 'time_s = "frame"') + 'sync = "frames"\nrate_hz = 100\n'
     text = "t,x,F\n" + "".join(f"{k},{20 * max(0, k / 100 - 5):.4f},1\n" for k in range(len(edges)))
     (files / "take.csv").write_text(text)
-    with pytest.raises(InstrumentFileError, match="pause"):  # counted frames hide it: nothing tells which is which
+    with pytest.raises(DatasetError, match="pause"):  # counted frames hide it: nothing tells which is which
         import_trial(files / "take.csv", files, PULL, files / "other", export=declared(frames))
 
 

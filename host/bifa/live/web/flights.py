@@ -9,12 +9,9 @@ import math
 import time
 from collections.abc import Callable
 
-from bifa.link import NoAnswerError, PortGoneError, RestartedError, StillMovingError, Uno
+from bifa.link import Uno
 from bifa.live.web.pilot import Pilot, Tell
-from bifa.rig import RigError, SameBoard
-
-RETRY_S = 1.0
-GONE = (PortGoneError, NoAnswerError, RestartedError, StillMovingError, RigError)
+from bifa.rig import GONE, RETRY_S, SameBoard
 
 
 def fly(

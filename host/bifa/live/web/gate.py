@@ -21,8 +21,7 @@ ACCEPTED_AT_ONCE = 4  # connections, before the loop looks at what the others sa
 class Gate:
     """Counts connections; `http` and `websocket` are the protocols that uvicorn is to serve with."""
 
-    def __init__(self, most_strangers: int = MOST_STRANGERS) -> None:
-        self._most_strangers = most_strangers
+    def __init__(self) -> None:
         self.strangers: dict[asyncio.Transport, asyncio.TimerHandle] = {}  # the oldest first
 
         class Http(H11Protocol):
@@ -51,7 +50,7 @@ class Gate:
             self._forget(transport)
 
     def _enter(self, http: H11Protocol) -> None:
-        while len(self.strangers) >= self._most_strangers:
+        while len(self.strangers) >= MOST_STRANGERS:
             self._end(next(iter(self.strangers)))
         loop = asyncio.get_running_loop()
         self.strangers[http.transport] = loop.call_later(HEADERS_WITHIN_S, self._look_for_headers, http)
