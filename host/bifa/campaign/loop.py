@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bifa.campaign.again import Trades, again
-from bifa.campaign.prediction_error import prediction_errors
-from bifa.campaign.residuals import residuals
+from bifa.campaign.before_and_after import prediction_errors, residuals
 from bifa.campaign.resolve import joined, resolve
 from bifa.campaign.setup import Effort, Setup, about
 from bifa.campaign.stages import OnProgress, Stage
@@ -24,7 +23,7 @@ from bifa.identify.completed import completed_model
 from bifa.identify.identification import identify
 from bifa.identify.start import prepare
 from bifa.measure import plan
-from bifa.measure.known import known_of
+from bifa.measure.bench_file import known_of
 from bifa.measure.session import run_session
 from bifa.report.words import spoken
 from bifa.robot import Model, load_model, save_model

@@ -23,7 +23,7 @@ class Effort:
 class Setup:
     """`port` as for `--port`; `options` go to a virtual rig. Every stage draws its own noise.
 
-    `known`: what the person has measured directly, in place of what the rig declares (`bifa.measure.known`).
+    `known`: what the person has measured directly, in place of what the rig declares (`bifa.measure.bench_file`).
     `hands`: on a serial port, whose rig has no instruments, the person who works the lab's own.
     """
 

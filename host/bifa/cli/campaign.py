@@ -57,7 +57,7 @@ def campaign(
     """
     _check(out, port)
 
-    from bifa.measure.known import parse_known
+    from bifa.measure.bench_file import parse_known
 
     run_campaign(out, port, seed, quick, rerun, parse_known(known), profile, watch, bench)
 

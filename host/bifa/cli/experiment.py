@@ -96,7 +96,7 @@ def experiment(
     from bifa.data.layout import INCLINATION_RANGE_DEG
     from bifa.data.write import refuse_existing
     from bifa.measure import plan
-    from bifa.measure.known import parse_known
+    from bifa.measure.bench_file import parse_known
     from bifa.ranges import RANGES
     from bifa.robot import BASELINE
     from bifa.screen import Console
@@ -163,7 +163,7 @@ def _run(
     from rich.table import Column
 
     from bifa.cli.campaign import at_desk
-    from bifa.measure.known import known_of
+    from bifa.measure.bench_file import known_of
     from bifa.measure.session import provenance, run_session
     from bifa.rig import open_rig
     from bifa.screen import warning, words

@@ -94,6 +94,7 @@ def _show(console: "Console", file: Path, seen: "Look") -> None:
 
 def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
     """The declaration, question by question; Enter takes what is proposed in brackets."""
+    from bifa.data.export import units_for
     from bifa.measure.propose import parsed, wanted
 
     preset = seen.presets.get(role)
@@ -107,13 +108,13 @@ def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
     for name in [*wanted(role), *(["displacement_tail_mm"] if role == "camera" else [])]:
         proposed = given.columns.get(name) if given else seen.guess(name)
         if name != "time_s":
-            proposed = proposed if proposed is not None and _is_there(seen, proposed) else "-"
+            proposed = proposed if proposed is not None and seen.sheet.has(proposed) else "-"
         column = _column(console, seen, name, proposed)
         if column == "-":
             continue
         columns[name] = column
         told = seen.unit(name, column.split(" + ")[0]) or (given.units.get(name) if given else None)
-        units[name] = _unit(name, column, told)
+        units[name] = _choice(f"In which unit is {column!r}?", units_for(name), told)
         if name != "time_s" and typer.confirm(f"Reverse the sign of {name}?", default=False):
             sign[name] = -1
         more |= _clock(units[name], given) if name == "time_s" else {}
@@ -122,15 +123,6 @@ def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
         table |= {"columns": columns, "units": units}
     table |= {key: value for key, value in more.items() if not given or getattr(given, key) != value}
     return table | ({"sign": sign} if sign else {}) | _sync(seen)
-
-
-def _is_there(seen: "Look", column: str) -> bool:
-    from bifa.data.errors import DatasetError
-
-    try:
-        return seen.sheet.find(column) >= 0
-    except DatasetError:
-        return False
 
 
 def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -> str:
@@ -147,12 +139,6 @@ def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -
             return column
         except DatasetError as error:
             console.print(str(error))
-
-
-def _unit(name: str, column: str, proposed: str | None) -> str:
-    from bifa.measure.propose import units_for
-
-    return _choice(f"In which unit is {column!r}?", units_for(name), proposed)
 
 
 def _choice(question: str, allowed: list[str], proposed: str | None) -> str:

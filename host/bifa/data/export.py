@@ -205,6 +205,11 @@ def _sizes(name: str) -> Mapping[str, float]:
     return UNITS.get(name.rsplit("_", 1)[-1], {})
 
 
+def units_for(name: str) -> list[str]:
+    """The units in which a column of the data set may be declared."""
+    return [*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())]
+
+
 # -- the declaration ------------------------------------------------------------------------------------------------
 
 
@@ -284,7 +289,7 @@ def _check_columns(fields: Fields, export: Export) -> None:
             _check_value(fields, export, key, name, value)
     for name in export.columns:
         if not is_command(name) and name not in export.units and name not in export.factor:
-            allowed = " | ".join([*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())])
+            allowed = " | ".join(units_for(name))
             raise fields.error("units", f"{name} has no unit: declare the one in the file ({allowed}), or a factor")
 
 
@@ -298,9 +303,8 @@ def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any
     if key == "sign" and (value not in (1, -1) or isinstance(value, bool)):
         raise fields.error(key, f"{name} must be 1 or -1")
     if key == "units":
-        allowed = [*_sizes(name), *((FRAME, DATE) if name == "time_s" else ())]
-        if value not in allowed:
-            raise fields.error(key, f"{name} is {value!r}; it must be one of {', '.join(allowed)}")
+        if value not in units_for(name):
+            raise fields.error(key, f"{name} is {value!r}; it must be one of {', '.join(units_for(name))}")
         if value == FRAME and export.rate_hz is None:
             raise fields.error("rate_hz", "must be given, in frames a second, where time_s counts frames")
 

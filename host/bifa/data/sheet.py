@@ -216,6 +216,13 @@ class Sheet:
             )
         return places[0]
 
+    def has(self, name: str) -> bool:
+        """Whether `find` finds the column."""
+        try:
+            return self.find(name) >= 0
+        except DatasetError:
+            return False
+
     # -- cells -----------------------------------------------------------------------------------------------------
 
     def __len__(self) -> int:

@@ -58,36 +58,36 @@ def record_trial(
 
 def _static(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(bench, uno, "static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
-    instruments, chamber = bench.instruments, CHAMBER_OF[planned.tested]
+    chamber = CHAMBER_OF[planned.tested]
     _pressurise(bench, uno, chamber, planned.commanded_psi)
-    with Recording(bench, uno, on_progress) as tape:
-        tape.wait(LEAD_S)
-        instruments.move()
-        tape.wait_while(lambda: instruments.moving, 2 * 54.0 / planned.commanded_mm_s)
-        tape.wait(LEAD_S)
-    _refuse_unheld(tape, chamber, planned.commanded_psi)
-    moved = _moving_span(tape)
-    return _machine_columns(tape, chamber, moved), noted(tape.clock), tape.lost_samples
+    return _moved(bench, uno, on_progress, chamber, planned.commanded_psi, 2 * 54.0 / planned.commanded_mm_s)
 
 
 def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(bench, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
-    instruments, psi = bench.instruments, planned.commanded_psi
+    psi = planned.commanded_psi
     # Extended first: a head holds with no pressure at all, but it has to snap out for that.
     _pressurise(bench, uno, "head", SNAP_PSI)
     if psi < SNAP_PSI:
         _pressurise(bench, uno, "head", psi, RELIEF_S)
     elif psi > SNAP_PSI:
         _pressurise(bench, uno, "head", psi)
+    columns, extra, lost = _moved(bench, uno, on_progress, "head", psi, PULL_MM / planned.commanded_mm_s)
+    return columns, extra | {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}, lost
+
+
+def _moved(
+    bench: Bench, uno: Uno, on_progress: Progress, chamber: str, pressure_psi: float, expected_s: float
+) -> Recorded:
+    """The cross-head's motion, which takes about `expected_s`, on a chamber that is held as `_pressurise` had it."""
+    instruments = bench.instruments
     with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         instruments.move()
-        tape.wait_while(lambda: instruments.moving, PULL_MM / planned.commanded_mm_s)
+        tape.wait_while(lambda: instruments.moving, expected_s)
         tape.wait(LEAD_S)
-    _refuse_unheld(tape, "head", psi)
-    moved = _moving_span(tape)
-    known = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}
-    return _machine_columns(tape, "head", moved), noted(tape.clock) | known, tape.lost_samples
+    _refuse_unheld(tape, chamber, pressure_psi)
+    return _machine_columns(tape, chamber, _moving_span(tape)), noted(tape.clock), tape.lost_samples
 
 
 def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:

@@ -65,7 +65,7 @@ def import_trial(
     """Write a data set of one trial, `planned`, from an instrument's file and the folder or file of telemetry; or `add`
     it to the data set that there is, as the next repeat of its condition.
 
-    known: what was measured directly (`bifa.measure.known`). export: how the instrument writes its files, if declared.
+    known: what was measured directly. export: how the instrument writes its files, if declared.
 
     Raises InstrumentFileError where the two do not overlap, their clocks do not line up, or the data set has this
     record already; DatasetError where a file cannot be used, `folder` exists, or is no data set to be added to.

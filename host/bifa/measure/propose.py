@@ -14,9 +14,8 @@ from typing import Any
 
 import tomli_w
 
-from bifa.data.clocks import DATE, FRAME
 from bifa.data.errors import DatasetError
-from bifa.data.export import ROLES, UNITS, Export, parse_exports, presets, unit_in, unit_in_file
+from bifa.data.export import ROLES, Export, parse_exports, presets, unit_in, unit_in_file, units_for
 from bifa.data.fields import Fields, Source
 from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, workbook
 from bifa.measure.instruments import CHANNELS
@@ -60,11 +59,6 @@ class Look:
         return told if told in units_for(name) else None
 
 
-def units_for(name: str) -> list[str]:
-    """The units in which a column of the data set may be declared."""
-    return [*UNITS.get(name.rsplit("_", 1)[-1], {}), *((FRAME, DATE) if name == "time_s" else ())]
-
-
 def wanted(role: str) -> list[str]:
     """The columns that an instrument of this role records, over all its experiments."""
     names = [name for experiment, channels in CHANNELS.items() if ROLES[experiment] == role for name in channels]
@@ -80,29 +74,20 @@ def look(path: Path) -> Look:
 
 def declaration(role: str, table: Mapping[str, Any]) -> str:
     """As it stands in a bench's file."""
-    return f"[instrument.{role}]\n{tomli_w.dumps(dict(table))}" if not _nested(table) else _inline(role, table)
+    lines = [f"[instrument.{role}]"]
+    for key, value in table.items():
+        if isinstance(value, Mapping):  # a table in one line, as people write it
+            pairs = [tomli_w.dumps({name: one}).strip() for name, one in value.items()]
+            lines.append(f"{key} = {{ {', '.join(pairs)} }}")
+        else:
+            lines.append(tomli_w.dumps({key: value}).strip())
+    return "\n".join(lines) + "\n"
 
 
 def parsed(role: str, table: Mapping[str, Any]) -> Export:
     """The declaration, checked; DatasetError."""
     source = Source("", 0, "the declaration")
     return parse_exports(Fields({role: dict(table)}, source, table="instrument"), source)[role]
-
-
-def _nested(table: Mapping[str, Any]) -> bool:
-    return any(isinstance(value, Mapping) for value in table.values())
-
-
-def _inline(role: str, table: Mapping[str, Any]) -> str:
-    """Tables of one line each, as people write them."""
-    lines = [f"[instrument.{role}]"]
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            pairs = [tomli_w.dumps({name: one}).strip() for name, one in value.items()]
-            lines.append(f"{key} = {{ {', '.join(pairs)} }}")
-        else:
-            lines.append(tomli_w.dumps({key: value}).strip())
-    return "\n".join(lines) + "\n"
 
 
 # -- how it is written -----------------------------------------------------------------------------------------------
@@ -188,8 +173,8 @@ def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
     for row in reversed(above):
         if not 1 < len(row) <= width + 1 or not any(cell.strip() for cell in row) or len(heads) == _MOST_HEADS:
             break
-        if row[0].strip() and heads and _names(heads[0]) and not _is_of_units(heads[0]):
-            break  # a line of the preamble
+        if row[0].strip() and heads and heads[0][0].strip() and not _is_of_units(heads[0]):
+            break  # a line of the preamble, above one that names its first column
         heads.insert(0, row)
     units = int(bool(heads) and len(heads) > 1 and _is_of_units(heads[-1]))
     names = heads[: len(heads) - units]
@@ -205,11 +190,6 @@ def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
     return how
 
 
-def _names(row: Sequence[str]) -> bool:
-    """Whether a row names its first column, so that what is above it is no part of the names."""
-    return bool(row[0].strip())
-
-
 def _is_of_units(row: Sequence[str]) -> bool:
     written = [cell for cell in row if cell.strip()]
     return sum(unit_in(cell) is not None for cell in written) > len(written) / 2
@@ -221,16 +201,9 @@ def _preset(path: Path, role: str) -> str | None:
         try:
             export = parsed(role, {"preset": name})
             sheet = Sheet(path, export.form)
-            found = {own for own in _MAY_HAVE if own in export.columns and _is_found(sheet, export.columns[own])}
+            found = {own for own in _MAY_HAVE if own in export.columns and sheet.has(export.columns[own])}
             if "time_s" in found and len(found) > 1 and len(sheet) and ("force_N" in found) == (role == "machine"):
                 return name
         except DatasetError:
             continue
     return None
-
-
-def _is_found(sheet: Sheet, column: str) -> bool:
-    try:
-        return sheet.find(column) >= 0
-    except DatasetError:
-        return False

@@ -49,39 +49,27 @@ def check_bounds(name: str, value: float, lower: float, upper: float, unit: str 
 _SEARCHED = "found to reproduce the paper's reported speeds and forces"
 
 
-def _row(
-    name: str,
-    value: float,
-    unit: str,
-    lower: float,
-    upper: float,
-    plausible: tuple[float, float],
-    meaning: str,
-    source: str,
-) -> tuple[str, ModelParameter]:
-    return name, ModelParameter(name, value, unit, lower, upper, plausible, meaning, source)
-
-
-BASE_PARAMETERS: dict[str, ModelParameter] = dict(
-    [
-        _row("head_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_h (4)", "paper: 350 g, a half each"),
-        _row("tail_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_t (4)", "paper: 350 g, a half each"),
-        _row("head_segment_mass_kg", 0.1, "kg", 0.0, 0.5, (0.05, 0.15), "m_h (7) of an anchor pull", _SEARCHED),
-        _row("body_damping_Ns_m", 130.0, "N s/m", 10.0, 1000.0, (60.0, 260.0), "b_b (1)", _SEARCHED),
-        _row("body_area_N_psi", 9.0, "N/psi", 2.0, 25.0, (7.0, 12.0), "a of the body (2)", _SEARCHED),
-        _row("body_alpha_n_per_s", 2.0, "1/s", 0.1, 20.0, (1.2, 3.5), "alpha_n of the body (3)", _SEARCHED),
-        _row("body_alpha_s_per_s", 0.575, "1/s", 0.05, 10.0, (0.35, 1.0), "alpha_s of the body (3)", _SEARCHED),
-        _row("small_mass_kg", 0.015, "kg", 0.002, 0.2, (0.007, 0.03), "m of a small actuator (1)", _SEARCHED),
-        _row("small_damping_Ns_m", 15.0, "N s/m", 1.0, 200.0, (7.0, 30.0), "b, small (1)", _SEARCHED),
-        _row("small_area_N_psi", 3.2021838525, "N/psi", 0.5, 10.0, (2.4, 4.3), "a, small (2)", _SEARCHED),
-        _row("small_alpha_n_per_s", 2.3, "1/s", 0.1, 20.0, (1.4, 4.0), "alpha_n, small (3)", _SEARCHED),
-        _row("small_alpha_s_per_s", 0.8, "1/s", 0.05, 10.0, (0.45, 1.4), "alpha_s, small (3)", _SEARCHED),
-        _row("wall_offset_m", 0.0278019066198, "m", 0.015, 0.034, (0.0262, 0.0291), "x_w (8)", _SEARCHED),
-        _row("wall_stiffness_N_m", 8000.0, "N/m", 300.0, 1e5, (3000.0, 2e4), "k_w (8)", _SEARCHED),
-        _row("wall_damping_Ns_m", 20.0, "N s/m", 0.0, 500.0, (0.0, 80.0), "b_w (8)", _SEARCHED),
-        _row("mu_s", 0.45, "", 0.02, 2.0, (0.3, 0.65), "static friction (5)", _SEARCHED),
-        _row("mu_k", 0.38, "", 0.02, 2.0, (0.25, 0.55), "kinetic friction (5)", _SEARCHED),
-        _row("supply_positive_psi", 8.5, "psi", 0.0, 14.0, (7.5, 9.5), "positive supply", "paper, section V.B"),
-        _row("supply_negative_psi", -13.0, "psi", -14.7, 0.0, (-14.0, -12.0), "vacuum", "paper, section V.B"),
-    ]
-)
+BASE_PARAMETERS = {
+    row[0]: ModelParameter(*row)
+    for row in (
+        ("head_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_h (4)", "paper: 350 g, a half each"),
+        ("tail_mass_kg", 0.175, "kg", 0.02, 1.0, (0.1, 0.3), "m_t (4)", "paper: 350 g, a half each"),
+        ("head_segment_mass_kg", 0.1, "kg", 0.0, 0.5, (0.05, 0.15), "m_h (7) of an anchor pull", _SEARCHED),
+        ("body_damping_Ns_m", 130.0, "N s/m", 10.0, 1000.0, (60.0, 260.0), "b_b (1)", _SEARCHED),
+        ("body_area_N_psi", 9.0, "N/psi", 2.0, 25.0, (7.0, 12.0), "a of the body (2)", _SEARCHED),
+        ("body_alpha_n_per_s", 2.0, "1/s", 0.1, 20.0, (1.2, 3.5), "alpha_n of the body (3)", _SEARCHED),
+        ("body_alpha_s_per_s", 0.575, "1/s", 0.05, 10.0, (0.35, 1.0), "alpha_s of the body (3)", _SEARCHED),
+        ("small_mass_kg", 0.015, "kg", 0.002, 0.2, (0.007, 0.03), "m of a small actuator (1)", _SEARCHED),
+        ("small_damping_Ns_m", 15.0, "N s/m", 1.0, 200.0, (7.0, 30.0), "b, small (1)", _SEARCHED),
+        ("small_area_N_psi", 3.2021838525, "N/psi", 0.5, 10.0, (2.4, 4.3), "a, small (2)", _SEARCHED),
+        ("small_alpha_n_per_s", 2.3, "1/s", 0.1, 20.0, (1.4, 4.0), "alpha_n, small (3)", _SEARCHED),
+        ("small_alpha_s_per_s", 0.8, "1/s", 0.05, 10.0, (0.45, 1.4), "alpha_s, small (3)", _SEARCHED),
+        ("wall_offset_m", 0.0278019066198, "m", 0.015, 0.034, (0.0262, 0.0291), "x_w (8)", _SEARCHED),
+        ("wall_stiffness_N_m", 8000.0, "N/m", 300.0, 1e5, (3000.0, 2e4), "k_w (8)", _SEARCHED),
+        ("wall_damping_Ns_m", 20.0, "N s/m", 0.0, 500.0, (0.0, 80.0), "b_w (8)", _SEARCHED),
+        ("mu_s", 0.45, "", 0.02, 2.0, (0.3, 0.65), "static friction (5)", _SEARCHED),
+        ("mu_k", 0.38, "", 0.02, 2.0, (0.25, 0.55), "kinetic friction (5)", _SEARCHED),
+        ("supply_positive_psi", 8.5, "psi", 0.0, 14.0, (7.5, 9.5), "positive supply", "paper, section V.B"),
+        ("supply_negative_psi", -13.0, "psi", -14.7, 0.0, (-14.0, -12.0), "vacuum", "paper, section V.B"),
+    )
+}

@@ -28,15 +28,11 @@ def _open_once(port: str) -> None:
 
 def build_image(project: Path, on_line: Callable[[str], None]) -> Path:
     """Build the image for the Uno; return its path. `on_line` gets PlatformIO's output as it comes."""
-    _run_platformio(project, ["run", "--environment", ENVIRONMENT], "", on_line)
+    run([platformio_program(), "run", "--environment", ENVIRONMENT], project, "", on_line, name="PlatformIO")
     return image_path(project)
 
 
 def upload_image(project: Path, port: str, on_line: Callable[[str], None]) -> None:
     """Build if needed and write the image to the Uno at `port`; the upload itself resets the board."""
     arguments = ["run", "--environment", ENVIRONMENT, "--target", "upload", "--upload-port", port]
-    _run_platformio(project, arguments, port, on_line)
-
-
-def _run_platformio(project: Path, arguments: list[str], port: str, on_line: Callable[[str], None]) -> None:
     run([platformio_program(), *arguments], project, port, on_line, name="PlatformIO")

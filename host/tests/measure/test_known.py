@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from bifa.link.units import set_point_psi
-from bifa.measure.known import known_of, parse_known
+from bifa.measure.bench_file import known_of, parse_known
 from bifa.rig import SerialRig, open_rig
 from bifa.robot.parameters import ModelParameterError
 

@@ -1,10 +1,13 @@
-"""How far predictions are off in the units of the instruments, before and after, beside what repeats differ by."""
+"""What a diagnosis comes to on its trials, before and after: errors in the units of the instruments, and where the
+residual lives."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.residual_error import repeat_differences, rms
@@ -12,6 +15,7 @@ from lacuna.estimation.fit import evaluate_on
 from lacuna.system import Channels
 
 _QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
+_POINTS = 400  # of a trace, enough for a small figure
 
 
 def prediction_errors(found: Diagnosis) -> list[dict[str, Any]]:
@@ -38,3 +42,35 @@ def _only(quantity: str, members: Sequence[Channels]) -> list[Channels]:
     """Channels of one quantity: "displacement_head_mm" is one of "displacement_mm"."""
     first, last = quantity.rsplit("_", 1)
     return [{c: r for c, r in channels.items() if c.startswith(first) and c.endswith(last)} for channels in members]
+
+
+def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any]]:
+    """For each held-out condition the channel whose residual shrank most, in standard deviations of the noise, under
+    the base model and the final one; thinned. Plain types. labels: what trials are called, by file."""
+    held_out = found.split.not_fitted
+    before, after = evaluate_on(found.base, held_out), evaluate_on(found.final, held_out)
+    shown, seen = [], set()
+    for trial, old, new in zip(
+        held_out, before.scaled_residuals(), before.problem.scaled(after.predictions()), strict=True
+    ):
+        if (trial.experiment, trial.condition) in seen:
+            continue
+        seen.add((trial.experiment, trial.condition))
+        channel = max(old, key=lambda name: _rms(old[name]) - _rms(new[name]))
+        keep = slice(None, None, max(1, len(trial.time_s) // _POINTS))
+        shown.append(
+            {
+                "trial": trial.name,
+                "label": labels.get(trial.name, trial.name),
+                "experiment": trial.experiment,
+                "channel": channel,
+                "time_s": [round(float(t), 3) for t in trial.time_s[keep]],
+                "before": [round(float(v), 2) for v in np.nan_to_num(old[channel][keep])],
+                "after": [round(float(v), 2) for v in np.nan_to_num(new[channel][keep])],
+            }
+        )
+    return shown
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
