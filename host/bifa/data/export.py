@@ -38,9 +38,11 @@ _PRESSURES = {"psi": 1.0, "kPa": 0.1450377377, "bar": 14.50377377, "mbar": 0.014
 UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": SECONDS}  # by what a column's name ends with
 _SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", "inch": "in", "lb": "lbf", "volts": "v"}
 _SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
-_FORM_KEYS = ("separator", "decimal", "encoding", "skip_rows", "header", "header_rows", "units_rows", "sheet")
+_ROWS = {"skip_rows": 0, "header_rows": 1, "units_rows": 0}  # and the least of each
+_CHOICES = {"format": ("csv", "xlsx"), "decimal": (".", ",")}
 _TABLES = ("columns", "units", "factor", "sign", "offset")  # by the data set's columns
-_KEYS = ("preset", "format", *_FORM_KEYS, *_TABLES, "rate_hz", "date_format", "zone")
+_KEYS = ("preset", *_CHOICES, "separator", "encoding", *_ROWS, "header", "sheet", *_TABLES, "where", "sync")
+_KEYS += ("rate_hz", "date_format", "zone")
 _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*$")
 _OWN = {name for layout in EXPERIMENTS.values() for name in layout.all_columns}
 _SYNC_FILE, _SYNC_FRAMES = "file", "frames"
@@ -215,65 +217,51 @@ def units_for(name: str) -> list[str]:
 
 def parse_export(fields: Fields, name: str) -> Export:
     """The declaration in a table; DatasetError, with its line, for what is unknown, missing or out of range."""
-    given = dict(_preset(fields)) if "preset" in fields else {}
-    own = {key: fields.take(key) for key in (*_KEYS[1:], "where", "sync") if key in fields}
-    fields.finish(also=(*_KEYS, "where", "sync"))
-    for key in (*_TABLES, "where"):
-        if not isinstance(own.get(key, {}), dict):
-            raise fields.error(key, "must be a table")
-        merged = given.get(key, {}) | own.get(key, {})
-        own[key] = merged
-    given |= own
-    export = _export(fields, name, given)
+    if "preset" in fields:
+        preset = presets()[fields.choice("preset", tuple(presets()))]
+        fields = fields.completed({key: value for key, value in preset.items() if key in _KEYS})
+    sync, threshold = _sync(fields)
+    export = Export(
+        name,
+        _form(fields),
+        **{key: fields.table(key) for key in (*_TABLES, "where") if key in fields},
+        rate_hz=fields.number("rate_hz", 1e-3, 1e6) if "rate_hz" in fields else None,
+        date_format=fields.text("date_format") if "date_format" in fields else None,
+        zone=fields.text("zone") if "zone" in fields else None,
+        sync=sync,
+        threshold=threshold,
+    )
+    fields.finish(also=_KEYS)
+    try:
+        if export.zone:
+            zone_of(export.zone)
+    except ValueError as error:
+        raise fields.error("zone", str(error)) from None
     _check_columns(fields, export)
     return export
 
 
-def _export(fields: Fields, name: str, given: dict[str, Any]) -> Export:
-    form = _form(fields, given)
-    sync, threshold = given.get("sync", _SYNC_FILE), _THRESHOLD
-    if isinstance(sync, dict):
-        threshold, sync = sync.get("threshold", _THRESHOLD), sync.get("column")
-        if not isinstance(sync, str) or not isinstance(threshold, int | float):
-            raise fields.error("sync", 'must be "file", "frames" or { column = "NAME", threshold = 2.5 }')
-    elif sync not in (_SYNC_FILE, _SYNC_FRAMES):
+def _sync(fields: Fields) -> tuple[str, float]:
+    given = fields.take("sync") if "sync" in fields else _SYNC_FILE
+    if given in (_SYNC_FILE, _SYNC_FRAMES):
+        return given, _THRESHOLD
+    column = given.get("column") if isinstance(given, dict) else None
+    threshold = given.get("threshold", _THRESHOLD) if isinstance(given, dict) else None
+    if not isinstance(column, str) or not isinstance(threshold, int | float):
         raise fields.error("sync", 'must be "file", "frames" or { column = "NAME", threshold = 2.5 }')
-    for key, kind in (("rate_hz", int | float), ("date_format", str), ("zone", str)):
-        if key in given and (isinstance(given[key], bool) or not isinstance(given[key], kind)):
-            raise fields.error(key, f"must be {'a number' if key == 'rate_hz' else 'a string'}")
-    rate_hz = given.get("rate_hz")
-    if rate_hz is not None and not 0.0 < rate_hz < 1e6:
-        raise fields.error("rate_hz", f"{rate_hz:g} is not a rate")
-    try:
-        if "zone" in given:
-            zone_of(given["zone"])
-    except ValueError as error:
-        raise fields.error("zone", str(error)) from None
-    tables = {key: given[key] for key in (*_TABLES, "where")}
-    rest: dict[str, Any] = {key: given.get(key) for key in ("date_format", "zone")}
-    return Export(name, form, **tables, **rest, rate_hz=rate_hz, sync=sync, threshold=float(threshold))
+    return column, float(threshold)
 
 
-def _form(fields: Fields, given: Mapping[str, Any]) -> SheetForm:
-    how: dict[str, Any] = {"format": given.get("format", "csv")}
-    if how["format"] not in ("csv", "xlsx"):
-        raise fields.error("format", "must be csv or xlsx")
-    for key in _FORM_KEYS:
-        if key not in given:
-            continue
-        value = given[key]
-        whole = key in ("skip_rows", "header_rows", "units_rows")
-        if isinstance(value, bool) or not isinstance(value, int if whole else str):
-            raise fields.error(key, f"must be {'a whole number' if whole else 'a string'}")
-        least = int(key == "header_rows")
-        if isinstance(value, int) and not least <= value < 10_000:
-            raise fields.error(key, f"{value} is outside {least} to 9999")
-        how[key] = value
-    how["separator"] = SEPARATORS.get(how.get("separator", ","), how.get("separator", ","))
+def _form(fields: Fields) -> SheetForm:
+    how: dict[str, Any] = {key: fields.text(key) for key in ("header", "encoding", "sheet") if key in fields}
+    how |= {key: fields.whole(key, least, 9999) for key, least in _ROWS.items() if key in fields}
+    how |= {key: fields.choice(key, allowed) for key, allowed in _CHOICES.items() if key in fields}
+    mark = fields.take("separator") if "separator" in fields else ","
+    how["separator"] = SEPARATORS.get(str(mark), mark)
     if how["separator"] not in SEPARATORS.values():
         raise fields.error("separator", f"must be one of {', '.join(SEPARATORS)}, or that character")
-    if how.get("decimal", ".") not in (".", ",") or how.get("decimal") == how["separator"]:
-        raise fields.error("decimal", 'must be "." or ",", and differ from the separator')
+    if how.get("decimal") == how["separator"]:
+        raise fields.error("decimal", "must be another character than the separator")
     try:
         "".encode(how.get("encoding", "utf-8"))
     except LookupError:
@@ -307,13 +295,6 @@ def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any
             raise fields.error(key, f"{name} is {value!r}; it must be one of {', '.join(units_for(name))}")
         if value == FRAME and export.rate_hz is None:
             raise fields.error("rate_hz", "must be given, in frames a second, where time_s counts frames")
-
-
-def _preset(fields: Fields) -> Mapping[str, Any]:
-    name = fields.text("preset")
-    if name not in presets():
-        raise fields.error("preset", f"{name!r} is unknown; there are {', '.join(presets())}")
-    return {key: value for key, value in presets()[name].items() if key in (*_KEYS, "where", "sync")}
 
 
 @cache

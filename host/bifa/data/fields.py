@@ -1,8 +1,11 @@
 """Typed, exhaustive reading of a TOML table: every key is asked for, and what is left over is refused."""
 
+from __future__ import annotations
+
 import itertools
 import math
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from .errors import DatasetError
@@ -119,13 +122,13 @@ class Fields:
             raise self.error(key, f"{value:g} must be above zero")
         return value
 
-    def whole(self, key: str, low: int) -> int:
-        """A whole number of at least `low` that fits 32 bits."""
+    def whole(self, key: str, low: int, high: int = 2**31 - 1) -> int:
+        """A whole number in [low, high]."""
         value = self.take(key)
         if isinstance(value, bool) or not isinstance(value, int):
             raise self.error(key, f"must be a whole number, not {_kind(value)}")
-        if not low <= value < 2**31:
-            raise self.error(key, f"{value} is outside {low} to {2**31 - 1}")
+        if not low <= value <= high:
+            raise self.error(key, f"{value} is outside {low} to {high}")
         return value
 
     def table(self, key: str) -> dict[str, Any]:
@@ -134,6 +137,16 @@ class Fields:
         if not isinstance(value, dict):
             raise self.error(key, f"must be a table, not {_kind(value)}")
         return value
+
+    def completed(self, defaults: Mapping[str, Any]) -> Fields:
+        """What is left of this table, with `defaults` for what it does not say; a table in it is completed alike."""
+        mixed = {
+            key: {**defaults[key], **value}
+            if isinstance(value, dict) and isinstance(defaults.get(key), dict)
+            else value
+            for key, value in self._values.items()
+        }
+        return Fields({**defaults, **mixed}, self._source, self._trial, self._table)
 
     def remaining(self) -> list[str]:
         """Keys that have not been asked for yet."""

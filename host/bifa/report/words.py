@@ -6,33 +6,13 @@ import re
 from collections.abc import Mapping
 
 from bifa.effects import library
+from bifa.robot.parameters import BASE_PARAMETERS
 
 _EXPERIMENTS = {
     "static_loading": "static loading",
     "step_response": "step response",
     "anchor_pull": "anchor pull",
     "locomotion": "walk",
-}
-_PARAMETERS = {
-    "head_mass_kg": "mass of the head",
-    "tail_mass_kg": "mass of the tail",
-    "head_segment_mass_kg": "mass of the head's segment in a pull",
-    "body_damping_Ns_m": "damping of the body",
-    "body_area_N_psi": "area of the body",
-    "body_alpha_n_per_s": "filling rate αn of the body",
-    "body_alpha_s_per_s": "filling rate αs of the body",
-    "small_mass_kg": "moving mass of a small actuator",
-    "small_damping_Ns_m": "damping of a small actuator",
-    "small_area_N_psi": "area of a small actuator",
-    "small_alpha_n_per_s": "filling rate αn of a small actuator",
-    "small_alpha_s_per_s": "filling rate αs of a small actuator",
-    "wall_offset_m": "offset of the wall",
-    "wall_stiffness_N_m": "stiffness of the wall",
-    "wall_damping_Ns_m": "damping of the wall",
-    "mu_s": "static friction coefficient",
-    "mu_k": "kinetic friction coefficient",
-    "supply_positive_psi": "positive supply",
-    "supply_negative_psi": "vacuum supply",
 }
 # What an effect's numbers say in a phrase; one without a phrase has them listed with their meanings.
 _PHRASES = {
@@ -133,7 +113,8 @@ def gait_parameter_words(name: str) -> str:
 
 def parameter_words(name: str) -> str:
     """A parameter of the model, an effect's, or a nuisance."""
-    return _PARAMETERS.get(name) or _without_unit(name).replace("_", " ")
+    known = BASE_PARAMETERS.get(name)
+    return known.meaning if known else _without_unit(name).replace("_", " ")
 
 
 def effect_words(name: str, parameters: Mapping[str, float] | None = None) -> str:
@@ -175,7 +156,7 @@ def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
 def _said(name: str) -> str:
     if name in _EXPERIMENTS:
         return experiment_words(name)
-    if name in _PARAMETERS or name in library():
+    if name in BASE_PARAMETERS or name in library():
         return parameter_words(name)
     return channel_words(name)
 

@@ -228,7 +228,7 @@ def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
         (SIMPLE.replace(', force_N = "N"', ""), r"units: force_N has no unit: declare the one in the file.*N \| kN"),
         (SIMPLE + "skip_row = 2\n", r"line 4, .*skip_row: unknown key"),
         (SIMPLE + "skip_rows = -2\n", r"skip_rows: -2 is outside"),
-        (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; there are arduino"),
+        (SIMPLE + 'preset = "bluehil"\n', r"preset: 'bluehil' is unknown; it must be one of arduino"),
         (SIMPLE + 'encoding = "latin1-de"\n', r"encoding: 'latin1-de' is unknown"),
         (SIMPLE + 'separator = "|"\n', r"separator: must be one of comma"),
         (SIMPLE + 'decimal = ","\n', r"decimal: must be"),
