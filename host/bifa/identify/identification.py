@@ -21,7 +21,7 @@ from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit, fit_base
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
-from lacuna.estimation.solve import solve
+from lacuna.estimation.solve import one_thread, solve
 from lacuna.estimation.uncertainty import Uncertainty, profile_interval, uncertainty
 
 CONFIDENCE = 0.9
@@ -82,6 +82,7 @@ class Identification:
     error: Mapping[tuple[str, str], float]
 
 
+@one_thread
 def identify(
     dataset: Dataset,
     model: Model | None = None,

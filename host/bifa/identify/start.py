@@ -19,6 +19,7 @@ from bifa.problem.curves import FittedCurve
 from bifa.problem.stiffness import UndeterminedError
 from bifa.problem.system import RobotSystem, fittable
 from bifa.robot import Model, ModelParameterError
+from lacuna.estimation.solve import one_thread
 
 _ACTUATORS = {"large": "body", "small": "small"}
 _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supply
@@ -26,6 +27,7 @@ _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supp
 OnProgress = Callable[[str], None]
 
 
+@one_thread
 def prepare(dataset: Dataset, model: Model | None = None, on_progress: OnProgress = lambda stage: None) -> RobotSystem:
     """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
     stand where the static stage leaves them, and the rest is as in `model` (default: nominal).
