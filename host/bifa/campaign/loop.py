@@ -1,7 +1,6 @@
 """The whole loop: measure, fit, walk, find what is missing, optimise with it, walk again, compare."""
 
 import json
-from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +31,7 @@ from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
+CHARACTERISATION = "campaign: characterisation"  # the name of that data set
 _AT_EDGE = 0.05  # of the robots that may fall off
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
@@ -60,31 +60,11 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
 
 
 def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
-    if setup.is_kept:
-        return [_measure_once(setup, effort, on_progress), _declare(setup)]
-    return [_measure(setup, effort, on_progress)]
-
-
-def _measure(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
-    run, _ = _session(setup, effort, on_progress, "bench", "campaign: characterisation", setup.known)
-    title = "characterise the robot on its bench"
-    settings = setup.settings(0) | {"effort": asdict(effort), "known": dict(setup.known)}
-    return Stage("measure", title, (), ("bench",), run, settings, resumes=True)
-
-
-def _measure_once(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
-    """A real robot, without the known values that the person gives: to correct one is no reason to measure again."""
-    run, trials = _session(setup, effort, on_progress, "measured", "campaign", {})
-    title = f"characterise the robot: {trials} trials"
-    settings = setup.settings(0) | {"effort": asdict(effort)}
-    return Stage("measure", title, (), ("measured",), run, settings, resumes=True, by_hand=True)
-
-
-def _session(
-    setup: Setup, effort: Effort, on_progress: OnProgress, data: str, name: str, known: Mapping[str, float]
-) -> tuple[Callable[[Path, Path], None], int]:
-    """What records the characterisation into the data set `data`, named `name`, and of how many trials it is."""
-    trials, on_trial = plan.session(quick=effort.quick), _unless_by_hand(setup, on_progress)
+    """A real robot is measured without the known values that the person gives, which are declared afterwards: to
+    correct one is no reason to measure again."""
+    kept, trials = setup.is_kept, plan.session(quick=effort.quick)
+    data, known = ("measured", {}) if kept else ("bench", dict(setup.known))
+    on_trial = _unless_by_hand(setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         with setup.open(0) as rig:
@@ -92,14 +72,17 @@ def _session(
                 rig,
                 outputs / data,
                 trials,
-                name=name,
+                name="campaign" if kept else CHARACTERISATION,
                 known=known_of(rig, known),
                 provenance=setup.settings(0),
                 record=setup.hands,
                 on_event=lambda e: on_trial(e.planned.title, (e.number - 1 + e.share) / e.total),
             )
 
-    return run, len(trials)
+    title = f"characterise the robot: {len(trials)} trials" if kept else "characterise the robot on its bench"
+    settings = setup.settings(0) | {"effort": asdict(effort)} | ({} if kept else {"known": known})
+    measure = Stage("measure", title, (), (data,), run, settings, resumes=True, by_hand=kept)
+    return [measure, _declare(setup)] if kept else [measure]
 
 
 def _declare(setup: Setup) -> Stage:
@@ -108,7 +91,7 @@ def _declare(setup: Setup) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
         measured = read_dataset(inputs / "measured")
         known = {**measured.known, **setup.known}
-        write_dataset(outputs / "bench", replace(measured, name="campaign: characterisation", known=known))
+        write_dataset(outputs / "bench", replace(measured, name=CHARACTERISATION, known=known))
 
     return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(setup.known)})
 
