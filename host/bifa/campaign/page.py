@@ -25,10 +25,16 @@ from bifa.report.diagnosis import (
     settings_words,
     verdict_sentence,
 )
-from bifa.report.evidence import BASE, COMPLETED, errors_chart
+from bifa.report.evidence import (
+    BASE,
+    COMPLETED,
+    STANDING_MM_S,
+    errors_chart,
+    residual_charts,
+    robustness_chart,
+    standing_share,
+)
 from bifa.report.page import ChartedSection, Motion, Page, PageTable
-from bifa.report.residuals import residual_charts
-from bifa.report.robustness import STANDING_MM_S, robustness_chart, standing_share
 from bifa.report.walks import MEASURED, Walk, walks_chart
 from bifa.report.words import NBSP, channel_words, effect_words, gait_words, plain, spoken, unit_of
 

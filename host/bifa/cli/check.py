@@ -65,7 +65,7 @@ def warn_of_units(console: "Console", dataset: "Dataset") -> None:
 def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
     from rich.text import Text
 
-    from bifa.check.alike import gathered
+    from bifa.check.finding import gathered
 
     for found in gathered(findings):
         console.print(Text.assemble(("warning", "yellow"), f" [{found.kind}] {found.text}"))

@@ -1,18 +1,21 @@
-"""Charts of a diagnosis: error before and after per experiment, and what was learnt."""
+"""Charts of a diagnosis and of a campaign: error before and after, residuals, what was learnt, robustness of gaits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series
-from bifa.report.words import experiment_words
+from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
+from bifa.report.words import channel_words, experiment_words
 
 BASE, COMPLETED = "base model", "completed model"
 MODEL_KEYS = (Key(BASE, "before"), Key(COMPLETED, "after"))
+STANDING_MM_S = 0.5  # a robot that is slower slips in place
 _ROW_PX = 34
+_QUANTITIES = ("force", "displacement", "pressure")
+_COLORS = ("quiet", "before", "after")  # of gaits
 
 
 def errors_chart(error: Mapping[str, Any]) -> Chart:
@@ -87,3 +90,73 @@ def _bars(side: Mapping[str, Any]) -> dict[str, float]:
         bars["new conditions"] = side["held_out_conditions"]
     bars |= {experiment_words(name): value for name, value in side.get("by_experiment", {}).items()}
     return {name: value for name, value in bars.items() if value is not None}
+
+
+# -- residuals ----------------------------------------------------------------------------------------------------
+
+
+def residual_charts(traces: Sequence[Mapping[str, Any]]) -> dict[str, Chart]:
+    """By quantity, the one that the base model misses most first: a small plot a condition, the worst first.
+
+    traces: as in residuals.json: label, channel, time_s, before, after, in units of the noise floor.
+    """
+    groups = {q: [t for t in traces if t["channel"].startswith(q)] for q in _QUANTITIES}
+    groups = {q: sorted(mine, key=_size, reverse=True) for q, mine in groups.items() if mine}
+    return {q: _residual_chart(q, groups[q]) for q in sorted(groups, key=lambda q: _size(groups[q][0]), reverse=True)}
+
+
+def _residual_chart(what: str, traces: Sequence[Mapping[str, Any]]) -> Chart:
+    return Chart(
+        [_residual_column(trace) for trace in traces],
+        MODEL_KEYS,
+        f"Measured minus predicted {what} over time in each condition, before and after",
+        "Measured minus predicted, in standard deviations of the noise; each plot has its own scale.",
+        height=110,
+    )
+
+
+def _residual_column(trace: Mapping[str, Any]) -> Column:
+    series = [
+        Series((key,), *thinned(trace["time_s"], trace[side], 240), color)
+        for key, side, color in ((BASE, "before", "before"), (COMPLETED, "after", "after"))
+    ]
+    title = f"{_label(trace)}: {channel_words(trace['channel'])}, {_size(trace):.1f} × noise"
+    return Column([Panel(series, Axis("time, s"), Axis("noise sd"))], title)
+
+
+def _label(trace: Mapping[str, Any]) -> str:
+    """What the trial is called; records of earlier versions have only its file."""
+    return trace.get("label") or trace["trial"].removesuffix(".csv").replace("_", " ")
+
+
+def _size(trace: Mapping[str, Any]) -> float:
+    """RMS of what the base model leaves."""
+    return float(np.sqrt(np.mean(np.square(trace["before"]))))
+
+
+# -- robustness ---------------------------------------------------------------------------------------------------
+
+
+def standing_share(speeds: Sequence[float]) -> float:
+    """The share of robots that do not walk, 0 to 1."""
+    return float(np.mean(np.asarray(speeds) < STANDING_MM_S))
+
+
+def robustness_chart(speeds: Mapping[str, Sequence[float]], titles: Mapping[str, str]) -> Chart:
+    """The share of robots on which each gait is slower than a speed. `speeds`: by gait, mm/s, sorted."""
+    series, keys = [], []
+    for (name, values), color in zip(speeds.items(), _COLORS, strict=False):
+        share = 100.0 * np.arange(1, len(values) + 1) / len(values)
+        label = titles.get(name, name)
+        x, y = np.concatenate(([0.0], values)), np.concatenate(([0.0], share))
+        series.append(Series((label,), x, y, color, "steps"))
+        keys.append(Key(label, color))
+    fastest = max(values[-1] for values in speeds.values())
+    panel = Panel(
+        series,
+        Axis("settled speed, mm/s", (0.0, 1.05 * fastest)),
+        Axis("% of robots no faster", (0.0, 103.0)),
+        [("y", 10.0, "one robot in ten")],
+        1.4,
+    )
+    return Chart([Column([panel])], keys, "Speed of each gait on robots that differ slightly from this one", across=1)

@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bifa.check import Finding
-from bifa.check.alike import gathered
+from bifa.check.finding import gathered
 from bifa.cli import app
 from bifa.data import write_dataset
 

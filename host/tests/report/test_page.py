@@ -13,8 +13,8 @@ from bifa.effects import library
 from bifa.files import TargetError
 from bifa.report.animation import FRAMES_PER_S, animate_walks
 from bifa.report.diagnosis import diagnosis_page, settings_words, verdict_sentence
+from bifa.report.evidence import residual_charts
 from bifa.report.page import ChartedSection, Page, PageTable, render, write_page
-from bifa.report.residuals import residual_charts
 from bifa.report.style import CHAMBER_COLORS, DARK, LIGHT
 from bifa.report.terminal import print_table
 from bifa.report.words import effect_words, quantity, spoken
