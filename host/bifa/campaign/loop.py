@@ -31,7 +31,7 @@ from lacuna.diagnosis.diagnose import Diagnosis, diagnose
 from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
-CHARACTERISATION = "campaign: characterisation"  # the name of that data set
+BENCH_NAME = "campaign: characterisation"  # of its data set
 _AT_EDGE = 0.05  # of the robots that may fall off
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
@@ -72,7 +72,7 @@ def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list
                 rig,
                 outputs / data,
                 trials,
-                name="campaign" if kept else CHARACTERISATION,
+                name="campaign" if kept else BENCH_NAME,
                 known=known_of(rig, known),
                 provenance=setup.settings(0),
                 record=setup.hands,
@@ -91,7 +91,7 @@ def _declare(setup: Setup) -> Stage:
     def run(inputs: Path, outputs: Path) -> None:
         measured = read_dataset(inputs / "measured")
         known = {**measured.known, **setup.known}
-        write_dataset(outputs / "bench", replace(measured, name=CHARACTERISATION, known=known))
+        write_dataset(outputs / "bench", replace(measured, name=BENCH_NAME, known=known))
 
     return Stage("declare", "declare what is known", ("measured",), ("bench",), run, {"known": dict(setup.known)})
 
