@@ -66,9 +66,7 @@ def _read(name: str, folder: Path) -> Campaign:
             f"{folder} holds no finished campaign (no summary.json); finish it with: bifa campaign --out {folder}"
         ) from None
     except ValueError as error:
-        raise CompareError(
-            f"{folder / 'summary.json'} is damaged ({error}); make it anew with --rerun compare"
-        ) from None
+        raise CompareError(f"{folder / 'summary.json'} is damaged ({error}); rebuild it with --rerun compare") from None
     which = ("base", "completed")
     models = {w: load_model(folder / f"model-{w}.toml") for w in which}
     return Campaign(name, folder, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})

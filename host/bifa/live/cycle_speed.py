@@ -25,7 +25,7 @@ class CycleSpeed:
         self.settled = ""
 
     def take(self, is_walking: bool, time_s: float, phase_rad: float, position_mm: float) -> None:
-        """One look: the body's phase and where the head is. A robot that stands, or starts anew, has no cycle."""
+        """One look: the body's phase and where the head is. A robot that stands, or restarts, has no cycle."""
         if not is_walking or (self.path and time_s < self.path[-1][1]):
             self._begin()
             return

@@ -20,7 +20,7 @@ TICK_S = 1e-3  # the Uno switches valves at its ticks
 
 
 def noted(clock: ClockLine) -> dict[str, Any]:
-    """What every trial notes of how its clocks were lined up, and of what the Uno does besides its commands."""
+    """What every trial notes of how its clocks were lined up, and of what the Uno does beyond its commands."""
     return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate, "dead_time_s": DEAD_TIME_S}
 
 

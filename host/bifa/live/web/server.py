@@ -45,7 +45,7 @@ from bifa.robot.gait import GAIT_NAMES, Gait
 HOST = "127.0.0.1"
 PROTOCOL = "bifa"  # of the websocket; the token is offered beside it
 _ANSWER_S = 15.0  # a page waits at most so long for the robot
-_BACK_WITHIN_S = 3.0  # a page that is loaded anew has not been closed
+_BACK_WITHIN_S = 3.0  # a page that is reloaded has not been closed
 _HANDED_OVER_S = 0.05
 _WAITING = 64  # messages that a slow page may be behind
 _PIECE = 64 * 1024

@@ -107,7 +107,7 @@ class Kernel:
     @staticmethod
     def _call(function: Callable[..., int], setting: _Setting, jobs: np.ndarray) -> None:
         if function(ctypes.addressof(setting), _address(jobs), len(jobs)):
-            raise MemoryError("no memory for a simulation")
+            raise MemoryError("out of memory for a simulation")
 
 
 def _jobs(plants: Sequence[Plant], rigs: Sequence[Mounting]) -> tuple[np.ndarray, _Setting, object]:

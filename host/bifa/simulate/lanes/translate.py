@@ -153,7 +153,7 @@ class _Body:
             source = textwrap.dedent(inspect.getsource(function))
             self.tree = next(node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef))
         except (OSError, StopIteration, SyntaxError) as e:
-            raise UntranslatableError(f"{function.__module__}.{function.__name__}: no source to be read") from e
+            raise UntranslatableError(f"{function.__module__}.{function.__name__}: its source is not available") from e
         self.parameters = [argument.arg for argument in self.tree.args.args]
         if len(self.parameters) != len(kinds):
             raise self._no(self.tree, f"takes {len(self.parameters)} arguments, not {len(kinds)}")
@@ -224,7 +224,7 @@ class _Body:
         for statement in statements:
             method = getattr(self, f"_do_{type(statement).__name__.lower()}", None)
             if method is None:
-                raise self._no(statement, f"has a {type(statement).__name__}, which is not understood")
+                raise self._no(statement, f"has a {type(statement).__name__}, which is not supported")
             method(statement)
 
     def _do_expr(self, node: ast.Expr) -> None:
@@ -255,7 +255,7 @@ class _Body:
             return
         parts = self._tuple(node.value)
         if len(parts) != len(target.elts):
-            raise self._no(node, f"gives {len(parts)} values to {len(target.elts)} names")
+            raise self._no(node, f"unpacks {len(parts)} values into {len(target.elts)} names")
         held = []
         for code, kind in parts:  # all before the first is stored
             name = self._fresh("t")
@@ -306,7 +306,7 @@ class _Body:
 
     def _store_name(self, node: ast.AST, name: str, code: str, kind: Kind) -> None:
         if isinstance(kind, tuple):
-            raise self._no(node, f"gives several values to {name}")
+            raise self._no(node, f"assigns several values to {name}")
         if name == "_":
             self._emit(f"(void)({code});")
             return
@@ -316,7 +316,7 @@ class _Body:
             kind, code = _varying(kind), _as(code, kind, _varying(kind))
         joined = _joined(known, kind)
         if joined is None:
-            raise self._no(node, f"gives {name} a {kind} where it was a {known}")
+            raise self._no(node, f"assigns a {kind} to {name}, which was a {known}")
         self.kinds[name] = joined
         code = _as(code, kind, joined)
         if joined == "F":
@@ -439,7 +439,7 @@ class _Body:
             raise self._no(node, "loops as often as only a lane knows")
         name = node.target.id
         if _joined(self.kinds.get(name), "i") != "i":
-            raise self._no(node, f"counts with {name}, which is something else, too")
+            raise self._no(node, f"loops over {name}, which is in use already")
         self.kinds[name] = "i"
         self.regions_of.setdefault(name, self.region)
         name = f"x_{name}"
@@ -488,7 +488,7 @@ class _Body:
     def _value(self, node: ast.expr) -> _Coded:
         method = getattr(self, f"_of_{type(node).__name__.lower()}", None)
         if method is None:
-            raise self._no(node, f"has a {type(node).__name__}, which is not understood")
+            raise self._no(node, f"has a {type(node).__name__}, which is not supported")
         return method(node)
 
     def _of_constant(self, node: ast.Constant) -> _Coded:
@@ -503,7 +503,7 @@ class _Body:
             if math.isnan(value):
                 return "NAN", "f"
             return f"({float(value)!r})" if value < 0 else repr(float(value)), "f"
-        raise self._no(node, f"uses {value!r}, which is no number")
+        raise self._no(node, f"uses {value!r}, which is not a number")
 
     def _of_name(self, node: ast.Name) -> _Coded:
         if node.id in self.kinds:
@@ -519,7 +519,7 @@ class _Body:
             for scope in (space, inspect.getclosurevars(self.function).builtins, vars(__import__("builtins"))):
                 if node.id in scope:
                     return scope[node.id]
-        raise self._no(node, f"uses {ast.unparse(node)}, which is nowhere")
+        raise self._no(node, f"uses {ast.unparse(node)}, which is undefined")
 
     def _of_attribute(self, node: ast.Attribute) -> _Coded:
         root: ast.expr = node
@@ -532,7 +532,7 @@ class _Body:
             return self._size(node, code, kind), "i"
         fields = self.shapes.fields.get(kind, {})
         if node.attr not in fields:
-            raise self._no(node, f"asks a {kind} for {node.attr}")
+            raise self._no(node, f"reads {node.attr} of a {kind}")
         found = fields[node.attr]
         if found in ("Active",):
             return code, found
@@ -544,7 +544,7 @@ class _Body:
             return f"{code}.size"
         if kind.startswith("F[") and kind != "F[]":
             return kind[2:-1]
-        raise self._no(node, f"asks for the size of {kind}")
+        raise self._no(node, f"takes the size of a {kind}")
 
     def _of_subscript(self, node: ast.Subscript) -> _Coded:
         match node.value:
@@ -552,7 +552,7 @@ class _Body:
                 code, kind = self._value(table)
                 axis = ast.literal_eval(node.slice)
                 if (kind, axis) not in self.shapes.sizes:
-                    raise self._no(node, f"asks for the shape of a {kind}")
+                    raise self._no(node, f"takes the shape of a {kind}")
                 return self.shapes.sizes[kind, axis].format(f"({code})"), "i"
         if isinstance(node.value, ast.Name) and node.value.id not in self.kinds:
             array = self._object(node.value)
@@ -578,7 +578,7 @@ class _Body:
         if kind == "f[]":
             return f"{code}.at[{at}]"
         if not kind.startswith("F["):
-            raise self._no(node, f"looks into a {kind}")
+            raise self._no(node, f"indexes a {kind}")
         return f"({code})[{at}]"
 
     def _pair(self, node: ast.expr) -> list[ast.expr]:
@@ -610,7 +610,7 @@ class _Body:
             return f"({a} {bits} {b})", "i"
         for kind in (ka, kb):
             if kind not in ("f", "i", "b", "F", "B"):
-                raise self._no(node, f"calculates with a {kind}")
+                raise self._no(node, f"does arithmetic with a {kind}")
         varying = "F" in (ka, kb) or "B" in (ka, kb)
         if isinstance(node.op, ast.Pow):
             if varying:
@@ -662,7 +662,7 @@ class _Body:
             return f"ne({code}, splat(0.0))", "B"
         if kind == "Active":
             return f"having({code}, ~0L)", "B"
-        raise self._no(node, f"asks whether a {kind} holds")
+        raise self._no(node, f"tests a {kind} as a condition")
 
     def _of_ifexp(self, node: ast.IfExp) -> _Coded:
         truth, kind = self._truth(node.test)
@@ -674,7 +674,7 @@ class _Body:
         (a, ka), (b, kb) = yes, no
         joined = _joined(ka, kb)
         if joined is None:
-            raise UntranslatableError(f"{self.name}: a choice between {ka} and {kb}")
+            raise UntranslatableError(f"{self.name}: a conditional of {ka} and {kb}")
         if kind == "b" and joined in ("F", "B"):
             c = c_type(joined)
             return f"({truth} ? ({c})({_as(a, ka, joined)}) : ({c})({_as(b, kb, joined)}))", joined
@@ -723,7 +723,7 @@ class _Body:
             values = [_as(code, kind, _varying(kind)) for code, kind in arguments]
             return intrinsic.code.format(*values, m=self.region.mask), intrinsic.returns
         if not inspect.isfunction(function):
-            raise self._no(node, f"calls {ast.unparse(node.func)}, which has no form in lanes")
+            raise self._no(node, f"calls {ast.unparse(node.func)}, which cannot be vectorised")
         whole = self.region.full
         try:
             callee = self.translator.function(function, tuple(kinds), whole)
