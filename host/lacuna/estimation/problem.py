@@ -357,13 +357,9 @@ class Problem:
             return z, weight
         found, weights = [], []
         for z_, w_, grid in zip(np.split(z, ends, axis=1), np.split(weight, ends), self._grids[index], strict=True):
-            samples = z_.shape[1] * self.view.blur
-            decay, every = np.exp(-1.0 / max(samples, 1e-3)), max(1, round(samples / 4))
-            even = z_ if grid is None else grid.of(z_)
-            whole = even.shape[1] // every
-            pieces = even[:, : whole * every].reshape(len(even), whole, every)
-            recent = pieces @ ((1.0 - decay) * decay ** np.arange(every)[::-1])
-            kept = decay ** (every * np.arange(whole))  # never less than the exponential of -1 over the blur
+            shares, kept = _low_pass(z_.shape[1], self.view.blur)
+            even, every, whole = z_ if grid is None else grid.of(z_), len(shares), len(kept)
+            recent = even[:, : whole * every].reshape(len(even), whole, every) @ shares
             found.append(np.cumsum(recent / kept, axis=1) * kept)
             weights.append(w_[every - 1 :: every] * np.sqrt(every))
         return np.concatenate(found, axis=1), np.concatenate(weights)
@@ -412,6 +408,15 @@ class _Weighing(NamedTuple):
         keep = np.isfinite(measured)
         ends = np.cumsum([np.isfinite(v).sum() for v in channels.values()])[:-1]
         return cls(keep, measured[keep], weight[keep], thinning[keep], ends)
+
+
+@cache
+def _low_pass(count: int, blur: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of so many samples, taken in pieces: what each sample of a piece adds to the low-passed one at its end, and what
+    is kept at the end of each piece of something before them all."""
+    samples = count * blur
+    decay, every = np.exp(-1.0 / max(samples, 1e-3)), max(1, round(samples / 4))
+    return (1.0 - decay) * decay ** np.arange(every)[::-1], decay ** (every * np.arange(count // every))
 
 
 def _span(samples: np.ndarray, sd: np.ndarray) -> float:
