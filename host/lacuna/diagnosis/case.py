@@ -150,6 +150,11 @@ class Case:
         )
         return lost > lost_before or error > _ASTRAY * error_before
 
+    @_once
+    def remainder_of(self, candidate: Candidate) -> Remainder:
+        """What an explanation leaves at the end of plain least squares: what a verdict rests on."""
+        return self.remainder(self.converged(candidate))
+
     def remainder(self, fitted: Fit) -> Remainder:
         """What a fit leaves, on its own trials and on the others that may inform a choice."""
         names = {t.name for t in fitted.problem.trials}
@@ -162,7 +167,7 @@ class Case:
         return (
             self.nearly(candidate)
             and self.remainder(self.on_known(candidate)).worst < _DOUBTFUL
-            and not self.remainder(self.converged(candidate)).matters
+            and not self.remainder_of(candidate).matters
             and not self.hidden(candidate)
         )
 

@@ -201,12 +201,12 @@ class Assessed:
 
 def _judged(case: Case, found: Search, choice: Choice) -> Assessed:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
-    remainder, drifts = case.remainder(base), find_drift(chosen, policy=case.policy, seed=case.seed)
+    remainder, drifts = case.remainder_of(found.base), find_drift(chosen, policy=case.policy, seed=case.seed)
     unshared = "" if remainder.matters else _unshared(case, choice, found)
     floor = floor_of(chosen, case.split)
     tested = _tested(case, base, chosen, floor) if remainder.matters else None
     verdict = _verdict(case, choice, found, remainder.matters, unshared, drifts, tested)
-    explained, left = (chosen, case.remainder(chosen)) if verdict == "identified" else (base, remainder)
+    explained, left = (chosen, case.remainder_of(choice.explanation)) if verdict == "identified" else (base, remainder)
     return Assessed(verdict, base, explained, remainder, left, unshared, floor, drifts, tested)
 
 
