@@ -11,13 +11,13 @@ import numpy as np
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.linear import remaining_after, stacked
 from lacuna.diagnosis.policy import Policy
-from lacuna.diagnosis.race import begun, initial_guess
+from lacuna.diagnosis.race import cold, initial_guess
 from lacuna.diagnosis.residual_error import rms
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on, starting_point
 from lacuna.estimation.problem import Point, Problem
-from lacuna.estimation.solve import solve
+from lacuna.estimation.solve import Solution, solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 
@@ -25,6 +25,7 @@ _MOST = 4  # curves in one correction
 _FITTED = 4  # sites where a curve is sketched, the most promising first,
 _SOUGHT = 8  # sites where further curves are sought
 _PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
+_COARSE: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
 _REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
 
 
@@ -89,10 +90,10 @@ def _best_grown(
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
     lost = before.checked_error > (0, policy.lost)
     jobs = [
-        (p.problem, [initial_guess(p.problem.structure, fit.theta)] if lost else [], p.start, fit.cost)
-        for p, fit in ((p, p.candidate.fitted) for p in promises)
+        (p.problem, p.start, initial_guess(p.problem.structure, p.candidate.fitted.theta) if lost else None)
+        for p in promises
     ]
-    solutions = workers.map("learning a curve for", names, begun, jobs)
+    solutions = workers.map("learning a curve for", names, _coarse, jobs)
     grown = [
         judge(Fit(p.problem, solution, 1, 1), split, policy) for p, solution in zip(promises, solutions, strict=True)
     ]
@@ -116,6 +117,14 @@ def _best_of(
 def _excess(fit: Fit) -> float:
     """Of a fit's cost, what noise at the floor would not leave."""
     return max(fit.cost - 0.5 * effective_samples(fit), 0.0)
+
+
+def _coarse(problem: Problem, start: Point, cold_values: np.ndarray | None) -> Solution:
+    """From where the parent stands; where that may be lost, cold as well."""
+    found = [solve(problem, start, **_COARSE)]
+    if cold_values is not None:
+        found.append(cold(problem, cold_values))
+    return min(found, key=lambda s: s.cost)
 
 
 def _refined(coarse: Fit) -> Fit:

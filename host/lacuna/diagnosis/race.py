@@ -113,18 +113,16 @@ def _cost(candidate: Candidate) -> float:
 def coarse_fits(parent: Candidate, promises: Sequence[Promise], split: Split, workers: Workers) -> list[Candidate]:
     names = [one.problem.structure.effects for one in promises]
     jobs = [(one.problem, cold_starts(one), one.start, parent.fitted.cost) for one in promises]
-    solutions = workers.map("fitting", names, begun, jobs)
+    solutions = workers.map("fitting", names, _begun, jobs)
     fits = [Fit(one.problem, solution, 1, 1) for one, solution in zip(promises, solutions, strict=True)]
     return [judge(fitted, split, parent.policy, near=parent.checked) for fitted in fits]
 
 
-def begun(problem: Problem, begins: Sequence[np.ndarray], warm: Point, contained: float) -> Solution:
-    """The best coarse fit of those begun cold; where it costs more than the fit `contained` in it, or there is none,
-    the warm one, too."""
-    found = [cold(problem, values) for values in begins]
-    if min((s.cost for s in found), default=np.inf) > contained:
-        found.append(solve(problem, warm, **COARSE))
-    return min(found, key=lambda s: s.cost)
+def _begun(problem: Problem, begins: Sequence[np.ndarray], warm: Point, contained: float) -> Solution:
+    found = min((cold(problem, values) for values in begins), key=lambda s: s.cost)
+    if found.cost <= contained:
+        return found
+    return min(found, solve(problem, warm, **COARSE), key=lambda s: s.cost)
 
 
 def cold(problem: Problem, values: np.ndarray) -> Solution:
