@@ -62,9 +62,9 @@ def search(
     workers: Workers,
     keep: Callable[[Sequence[Candidate]], None] = lambda _: None,
 ) -> Search:
-    """Race single effects, then pairs, then sets of three, until one is `enough(candidate)` or none takes, or promises
-    to take, its share away. The best of each size is tried in a form of its own, too, before another effect joins it.
-    `keep` is called with what there is, in case that somebody stops the search."""
+    """Race single effects, then pairs, then sets of three, until one is `enough(candidate)` or none promises to take
+    its share away. The best of each size is tried in a form of its own, too, before another effect joins it. `keep` is
+    called with what there is, in case that somebody stops the search."""
     split, floor = case.split, first.fitted.problem.floor
 
     def raced(parent: Candidate, promises: Sequence[Promise]) -> list[Candidate]:
@@ -94,7 +94,7 @@ def search(
             tried = _against(tried, size, split, lower, case.policy.reach)
             freed = [reweighed(c, split, lower) for c in freed]
             ranked = _ranked(tried, size)
-        if enough(ranked[0]) or (size > 1 and not _grew(ranked[0], _ranked(tried, size - 1)[0])):
+        if enough(ranked[0]):
             break
         if own := free_form(ranked[0], split, policy=case.policy, workers=workers):
             freed.append(own)
@@ -105,12 +105,6 @@ def search(
             break
         _keep(tried, raced(ranked[0], promises))
     return Search(tried[frozenset()], floor, tuple(tried.values()), scores.screened(), tuple(freed))
-
-
-def _grew(larger: Candidate, smaller: Candidate) -> bool:
-    """Whether the best set of its size takes a share of what the best smaller one leaves away: else a third effect, or
-    a curve, has nothing to add to that the smaller set had not."""
-    return smaller.cost - larger.cost > smaller.policy.promising * smaller.excess
 
 
 def _keep(tried: dict[frozenset[str], Candidate], found: Iterable[Candidate]) -> None:
