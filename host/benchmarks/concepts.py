@@ -53,7 +53,7 @@ def diagnosed(
         nuisances=spring.NUISANCES,
         spare=spare,
     )
-    return lacuna.diagnose(system, records, on_progress=False)
+    return lacuna.diagnose(system, records, progress=False)
 
 
 def floor(palette: Palette) -> tuple[Any, str]:
@@ -212,7 +212,7 @@ def _late_block() -> Verdict:
         experiments=offers,
     )
     records = [measured(shape, size, run) for shape in shapes for size in (2.0, 4.0) for run in (1, 2, 3)]
-    return lacuna.diagnose(system, records, on_progress=False)
+    return lacuna.diagnose(system, records, progress=False)
 
 
 def _words(effects: Sequence[str]) -> str:

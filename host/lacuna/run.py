@@ -41,7 +41,7 @@ def diagnose(
     n_jobs: int | None = None,
     executor: Executor | None = None,
     policy: Policy = POLICY,
-    on_progress: Callable[[str], None] | bool = True,
+    progress: Callable[[str], None] | bool = True,
 ) -> Verdict:
     """What the model of `system` lacks, judged by `records`.
 
@@ -51,7 +51,7 @@ def diagnose(
     by default some of each condition. `starts`: number of initial points of the base model's fit. `n_jobs`: number of
     processes that try explanations, -1 for one per core; by default one process with a thread per core, which suits a
     `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any from `concurrent.futures`,
-    or dask's. `on_progress`: a function called with a description of each step, or False for silence; the steps are
+    or dask's. `progress`: a function called with a description of each step, or False for silence; the steps are
     logged, too (`logging`, "lacuna").
 
     Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
@@ -63,7 +63,7 @@ def diagnose(
         system = _tested_on(system, names)
     if random_state is not None:
         seed = random_state if isinstance(random_state, int) else int(random_state.integers(2**32))
-    shown = Progress(len(system.effects)) if on_progress is True else on_progress or (lambda _: None)
+    shown = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
 
     def reported(what: str) -> None:
         _log.info("%s: %s", system.name, what)

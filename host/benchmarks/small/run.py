@@ -34,7 +34,7 @@ def diagnosed(offered: Offered) -> tuple[dict[str, Any], dict[str, Any], Predict
     )
     began = time.process_time()
     try:
-        verdict = lacuna.diagnose(system, offered.tables, on_progress=False)
+        verdict = lacuna.diagnose(system, offered.tables, progress=False)
     except Exception as error:  # whatever it is, the trial goes on and counts it
         said = {"verdict": "crash", "effects": [], "crash": f"{type(error).__name__}: {error}"[:300]}
         return said | _cost(began, simulations), {}, None

@@ -132,7 +132,7 @@ def diagnosed():
     parameters = [Parameter("gain", "1", 1.5, 0.1, 9.0)]
     system = lacuna.System(simulations.of(simulate), parameters, effects, outputs="y")
     given = [measured(slope, run) for slope in (0.5, 1.0, 2.0) for run in (1, 2, 3)]
-    verdict = lacuna.diagnose(system, given, on_progress=False)
+    verdict = lacuna.diagnose(system, given, progress=False)
     return verdict, simulations.count
 
 

@@ -137,7 +137,7 @@ def test_the_engine_is_given_no_more_than_what_is_offered(monkeypatch):
     monkeypatch.setattr(running.lacuna, "diagnose", diagnose)
     said, tried, predict = running.diagnosed(offered)
     assert (said["verdict"], tried, predict) == ("crash", {}, None)
-    assert given["how"] == {"on_progress": False}
+    assert given["how"] == {"progress": False}
     columns = {"name", "condition", "time_s", offered.kind.input, offered.kind.output}
     assert all(set(table) == columns for table in given["records"])
     assert set(given["system"].effects) == {e.name for e in offered.effects}

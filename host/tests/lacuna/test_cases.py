@@ -22,7 +22,7 @@ def test_rivals_that_are_the_same_mechanism_are_named_as_a_group():
         y = 2.0 * u + 0.3 * u**2 + 0.05 * draw.standard_normal(200)
         records.append({"time_s": np.arange(200.0), "u": u, "y": y})
     effects = [Effect(f"square_{k}", Parameter("per", "1", 0.3, -5.0, 5.0)) for k in range(3)]
-    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, on_progress=False)
+    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, progress=False)
     (named,) = found.effects
     assert {named.name, *named.confusable_with} == {"square_0", "square_1", "square_2"}
     assert named.probability > 0.99
@@ -39,7 +39,7 @@ def test_nothing_is_named_that_predicts_what_chose_nothing_worse():
         y = 2.0 * u + (-0.6 if n in (4, 9) else 1.0) + 0.05 * draw.standard_normal(200)
         records.append({"time_s": np.arange(200.0), "u": u, "y": y})
     system = lacuna.System(simulate, GAIN, [Effect("offset", Parameter("y", "1", 1.0, -5.0, 5.0))])
-    found = lacuna.diagnose(system, records, on_progress=False)
+    found = lacuna.diagnose(system, records, progress=False)
     assert (found.verdict, found.effects) == ("unexplained", ())
     assert "those that chose nothing (record 5, record 10) worse than without" in found.warnings[0]
 
@@ -64,7 +64,7 @@ def test_what_is_in_every_set_of_weight_is_named_however_little_is_closed_by_the
                 {"time_s": t, "u": u, "a": a, "b": b, "c": c, "y": y, "level": level, "condition": f"{level:g}"}
             )
     effects = [Effect(k, Parameter("size", "1", 1.0, -30.0, 30.0)) for k in "abcd"]
-    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, on_progress=False)
+    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, progress=False)
     assert found.verdict == "identified"
     assert found.effects[0].name == "a"
     assert {e.name for e in found.effects} <= {"a", "b", "c"}
@@ -80,7 +80,7 @@ def test_an_effect_that_the_model_never_uses_is_pointed_out():
         u = draw.uniform(-1, 1, 100)
         records.append({"time_s": np.arange(100.0), "u": u, "y": 2.0 * u + 0.05 * draw.standard_normal(100)})
     effects = [Effect(name, Parameter("per", "1", 0.3, -5.0, 5.0)) for name in ("used", "forgotten")]
-    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, on_progress=False)
+    found = lacuna.diagnose(lacuna.System(simulate, GAIN, effects), records, progress=False)
     assert [w for w in found.warnings if "changes no prediction" in w] == [
         "Effect forgotten changes no prediction, at none of its sizes that fits begin at: does the model use it, and do"
         " these records reach it?"
@@ -143,6 +143,6 @@ def test_a_limit_beside_a_stronger_effect_is_tried_though_none_of_its_sizes_help
         u = np.repeat(draw.uniform(0, 8, 10), 6)
         y = simulate({"u": u}, truth)["y"] + 0.02 * draw.standard_normal(n)
         records.append({"time_s": np.arange(float(n)), "u": u, "y": y})
-    found = lacuna.diagnose(system, records, on_progress=False)
+    found = lacuna.diagnose(system, records, progress=False)
     assert {e.name for e in found.effects} == {"drain", "clip"}
     assert abs(found.theta.clip.limit_V - 11.9) < 0.1

@@ -157,7 +157,7 @@ def test_refuses_repeats_of_different_inputs():
     records = heater.records(repeats=2)
     records["steps_4W_2"]["power_W"] = -records["steps_4W_2"]["power_W"]
     with pytest.raises(MisuseError, match=r"steps_4W_1 and steps_4W_2 are declared as repeats.*power_W differs"):
-        lacuna.diagnose(heater.system(), records, on_progress=pytest.fail)
+        lacuna.diagnose(heater.system(), records, progress=pytest.fail)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_refuses_a_record_without_a_column(column, said):
     records = heater.records(repeats=2)
     del records["sweep_4W_1"][column]
     with pytest.raises(RecordError, match=f"record sweep_4W_1 {said}"):
-        lacuna.diagnose(heater.system(), records, on_progress=pytest.fail)
+        lacuna.diagnose(heater.system(), records, progress=pytest.fail)
 
 
 def test_refuses_to_guess_which_column_is_predicted():
@@ -303,7 +303,7 @@ def test_refuses_words_among_the_inputs():
 def test_refuses_a_csv_that_is_no_table(tmp_path):
     (tmp_path / "a_1.csv").write_text("time_s,y\n0,1\n1\n")
     with pytest.raises(RecordError, match=r"a_1\.csv"):
-        lacuna.diagnose(heater.system(), tmp_path, on_progress=pytest.fail)
+        lacuna.diagnose(heater.system(), tmp_path, progress=pytest.fail)
     with pytest.raises(RecordError, match="no such folder"):
         lacuna.diagnose(heater.system(), tmp_path / "elsewhere")
 
@@ -312,7 +312,7 @@ def test_refuses_a_csv_that_is_no_table(tmp_path):
 
 
 def warned(system, records):
-    return " ".join(lacuna.diagnose(system, records, on_progress=False).warnings)
+    return " ".join(lacuna.diagnose(system, records, progress=False).warnings)
 
 
 def test_warns_of_trials_that_the_model_cannot_predict():
@@ -476,6 +476,6 @@ def test_a_model_may_return_one_array_again_and_again():
     found = []
     for one in (heater.simulate, thrifty):
         system = lacuna.System(one, heater.PARAMETERS, _all(), outputs="temperature_K")
-        found.append(lacuna.diagnose(system, given, on_progress=False))
+        found.append(lacuna.diagnose(system, given, progress=False))
     assert found[0].record["verdict"] == found[1].record["verdict"] == "identified"
     assert found[0].theta == found[1].theta

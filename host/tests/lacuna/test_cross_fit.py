@@ -102,14 +102,14 @@ def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_
 
 def test_the_names_do_not_depend_on_the_order_of_the_records():
     given = records(2, 7, bend=0.6)
-    found = [lacuna.diagnose(system(), given[k:] + given[:k], on_progress=False) for k in range(7)]
+    found = [lacuna.diagnose(system(), given[k:] + given[:k], progress=False) for k in range(7)]
     assert {tuple(e.name for e in one.effects) for one in found} == {("bend",)}
 
 
 def test_records_that_show_more_than_those_fitted_are_told():
     """The bend shows where x is largest, in the one record that judges at the end."""
     given = records(2, 7, bend=0.3)
-    found = lacuna.diagnose(system(), given[2:] + given[:2], on_progress=False)
+    found = lacuna.diagnose(system(), given[2:] + given[:2], progress=False)
     assert found.verdict == "none"
     assert any("Records that were not fitted (r6) are predicted to 1.39 times the noise" in w for w in found.warnings)
-    assert not lacuna.diagnose(system(), records(2, 7), on_progress=False).warnings
+    assert not lacuna.diagnose(system(), records(2, 7), progress=False).warnings

@@ -33,7 +33,7 @@ def emps():
 
 @pytest.fixture(scope="module")
 def verdict(emps):
-    return lacuna.diagnose(emps.system, emps.windows(emps.read(DATA / "DATA_EMPS.mat")), on_progress=False)
+    return lacuna.diagnose(emps.system, emps.windows(emps.read(DATA / "DATA_EMPS.mat")), progress=False)
 
 
 def test_names_friction_and_its_asymmetry(verdict):
@@ -61,7 +61,7 @@ def _predicted(emps, record, theta):
 def test_rejects_the_decoy_where_the_pulses_were_applied(emps):
     """With pulses at other places of each cycle no window repeats another."""
     tables = lacuna.windows(emps.read(DATA / "DATA_EMPS_PULSES.mat"), 1.0, every=1.04)
-    found = lacuna.diagnose(emps.system, tables, on_progress=False)
+    found = lacuna.diagnose(emps.system, tables, progress=False)
     names = {e.name for e in found.effects}
     assert "pulses" not in names | {c for e in found.effects for c in e.confusable_with}
     assert "asymmetric_friction" in names
@@ -71,7 +71,7 @@ def test_a_cycle_of_another_length_is_refused(emps):
     """Taken for 6.249 s (it is 6.240 s), windows drift apart, and what they differ by would pass for noise."""
     tables = lacuna.windows(emps.read(DATA / "DATA_EMPS.mat"), 1.0, every=6.249 / 6, period=6.249)
     with pytest.raises(lacuna.LacunaError, match="declared as repeats"):
-        lacuna.diagnose(emps.system, tables, on_progress=False)
+        lacuna.diagnose(emps.system, tables, progress=False)
 
 
 def test_the_example_is_short():

@@ -29,7 +29,7 @@ LIMIT = {"saturation__limit_W": 6.0}
 
 @pytest.fixture(scope="module")
 def verdict():
-    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), on_progress=False)
+    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), progress=False)
 
 
 def test_names_what_a_plain_function_lacks(verdict):
@@ -40,13 +40,13 @@ def test_names_what_a_plain_function_lacks(verdict):
 
 
 def test_says_none_where_nothing_is_missing():
-    assert lacuna.diagnose(heater.system(), heater.records(seed=2), on_progress=False).verdict == "none"
+    assert lacuna.diagnose(heater.system(), heater.records(seed=2), progress=False).verdict == "none"
 
 
 @pytest.mark.parametrize("written", [heater.LIMITED, heater.INVERSE], ids=["limit", "inverse"])
 def test_a_limit_and_its_inverse_are_the_same_effect(written):
     system = heater.system(heater.SENSOR, heater.OFFSET, written, heater.DEAD)
-    found = lacuna.diagnose(system, heater.records(seed=3, **LIMIT), on_progress=False)
+    found = lacuna.diagnose(system, heater.records(seed=3, **LIMIT), progress=False)
     assert [e.name for e in found.effects] == ["saturation"]
     ((name, value),) = found.effects[0].parameters.items()
     limit = value if name == "limit_W" else 1.0 / value
@@ -95,9 +95,9 @@ def test_a_curve_that_was_learnt_is_part_of_the_screen(verdict):
 
 def test_it_is_said_if_the_final_records_speak_against_what_was_named():
     records, without = heater.records(**LAG), heater.records()
-    final = {trial.name for trial in lacuna.diagnose(heater.system(), records, on_progress=False).diagnosis.split.final}
+    final = {trial.name for trial in lacuna.diagnose(heater.system(), records, progress=False).diagnosis.split.final}
     mixed = {name: (without if name in final else records)[name] for name in records}
-    found = lacuna.diagnose(heater.system(), mixed, on_progress=False)
+    found = lacuna.diagnose(heater.system(), mixed, progress=False)
     assert list(found.diagnosis.choice.candidate.effects) == ["sensor_lag"], "they inform no choice"
     assert (found.verdict, found.effects) == ("unexplained", ()), "but nothing is named that they contradict"
     assert found.warnings[0].startswith("With sensor_lag most records are predicted better, but those that chose")
@@ -105,7 +105,7 @@ def test_it_is_said_if_the_final_records_speak_against_what_was_named():
 
 def test_it_is_said_of_what_is_supported_that_it_explains_too_little(monkeypatch):
     monkeypatch.setattr("lacuna.diagnosis.case.Case.closed", lambda *asked: 0.4)
-    found = lacuna.diagnose(heater.system(), heater.records(**LAG), on_progress=False)
+    found = lacuna.diagnose(heater.system(), heater.records(**LAG), progress=False)
     assert found.verdict == "unexplained"
     assert found.warnings[0].startswith("sensor_lag: a better prediction beyond doubt, but too little")
     assert "though not named: sensor_lag" in str(found)
@@ -195,7 +195,7 @@ def test_what_is_predicted_need_not_be_named_where_the_function_names_it():
 
 @pytest.mark.slow
 def test_processes_and_threads_come_to_the_same_verdict(verdict):
-    there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), n_jobs=2, on_progress=False)
+    there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), n_jobs=2, progress=False)
     assert {**there.record, "seconds": 0} == {**verdict.record, "seconds": 0}
 
 
@@ -204,7 +204,7 @@ def test_a_pool_of_forked_processes_does_not_hang(verdict):
     from multiprocessing import get_context
 
     with ProcessPoolExecutor(1, mp_context=get_context("fork")) as pool:
-        there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), executor=pool, on_progress=False)
+        there = lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), executor=pool, progress=False)
     assert there.record["effects"] == verdict.record["effects"]
 
 
@@ -222,7 +222,7 @@ def test_progress_says_of_how_much_and_how_long_it_may_take(monkeypatch):
 def test_the_announced_total_is_an_upper_bound():
     said = []
     hidden = {"sensor_lag__lag_s": 3.0, "offset__power_W": 0.4}
-    lacuna.diagnose(heater.system(), heater.records(seed=5, **hidden), on_progress=said.append)
+    lacuna.diagnose(heater.system(), heater.records(seed=5, **hidden), progress=said.append)
     assert 5 < len(said) <= most_steps(4)
     assert [what.split()[0] for what in said[-2:]] == ["deciding", "estimating"]
 
@@ -238,7 +238,7 @@ def test_ctrl_c_gives_the_best_so_far():
                 os.kill(os.getpid(), signal.SIGINT)
 
     assert threading.current_thread() is threading.main_thread()
-    found = lacuna.diagnose(heater.system(), heater.records(seed=6, **hidden), on_progress=interrupt)
+    found = lacuna.diagnose(heater.system(), heater.records(seed=6, **hidden), progress=interrupt)
     assert "stopped by hand" in found.warnings[0]
     assert found.error["after"] < 0.9 * found.error["before"]
 

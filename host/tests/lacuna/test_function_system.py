@@ -52,7 +52,7 @@ def test_any_other_error_of_the_model_says_where():
 def test_a_wrong_shape_from_the_start_is_refused():
     short = lacuna.System(lambda record, theta: {"temperature_K": np.zeros(3)}, heater.PARAMETERS)
     with pytest.raises(MisuseError, match=r"shape \(3,\)"):
-        lacuna.diagnose(short, heater.records(1), on_progress=False)
+        lacuna.diagnose(short, heater.records(1), progress=False)
 
 
 @pytest.mark.parametrize("lower", [0.1, -1.0])
@@ -82,7 +82,7 @@ def test_the_completed_model_of_a_segment_gives_its_own_samples():
     time = np.linspace(0.0, 4.0, 400)
     noise = 0.01 * np.random.default_rng(0).standard_normal(400)
     pieces = segments(Table("long", time, {"y": 2.0 * time + 0.3 * time**2 + noise}, {}), 10)
-    verdict = lacuna.diagnose(system, pieces, on_progress=False)
+    verdict = lacuna.diagnose(system, pieces, progress=False)
     trial = stretched(pieces[5], pieces[5].record(["y"]), ["y"])
     for asked in (pieces[5], trial):
         np.testing.assert_allclose(verdict.model(asked)["y"], pieces[5].columns["y"], atol=0.05)
@@ -96,6 +96,6 @@ def test_records_that_the_model_cannot_predict_are_structure():
 
     effects = (heater.SENSOR, heater.OFFSET, heater.DEAD)
     system = lacuna.System(simulate, heater.PARAMETERS, effects, outputs="temperature_K")
-    verdict = lacuna.diagnose(system, heater.records(), on_progress=False)
+    verdict = lacuna.diagnose(system, heater.records(), progress=False)
     assert verdict.verdict == "unexplained"
     assert "could not predict" in " ".join(verdict.warnings)

@@ -64,7 +64,7 @@ def test_what_acts_smoothly_has_no_steps():
 
 @pytest.mark.parametrize("delay_s", [0.4, 0.8])
 def test_a_delay_in_whole_samples_is_named_alone_and_pointed_out(delay_s):
-    found = lacuna.diagnose(a_system(delayed_by_whole), records(delay_s), on_progress=False)
+    found = lacuna.diagnose(a_system(delayed_by_whole), records(delay_s), progress=False)
     assert [e.name for e in found.effects] == ["delay"]
     (effect,) = found.effects
     assert effect.parameters["delay_s"] == pytest.approx(delay_s, abs=0.5 * SAMPLE_S)

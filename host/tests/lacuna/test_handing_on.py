@@ -16,7 +16,7 @@ LAG = {"sensor_lag__lag_s": 3.0}
 
 @pytest.fixture(scope="module")
 def verdict():
-    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), on_progress=False)
+    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), progress=False)
 
 
 def test_parameters_come_as_a_table_with_their_intervals(verdict):
@@ -58,7 +58,7 @@ def test_what_is_no_verdict_is_refused(text, tmp_path):
 
 def test_what_is_done_is_logged(caplog):
     caplog.set_level(logging.INFO, "lacuna")
-    lacuna.diagnose(heater.system(), heater.records(seed=2, repeats=2), on_progress=False)
+    lacuna.diagnose(heater.system(), heater.records(seed=2, repeats=2), progress=False)
     said = [one.getMessage() for one in caplog.records]
     assert any("fitting the base model" in one for one in said)
     assert "<none" in said[-1]
@@ -75,7 +75,7 @@ def test_a_random_state_is_a_seed(monkeypatch):
     given = [{"seed": 3}, {"random_state": 3}, {"random_state": np.random.default_rng(0)}]
     for how in (*given, given[-1] | {"random_state": np.random.default_rng(0)}):
         with pytest.raises(KeyboardInterrupt):
-            lacuna.diagnose(heater.system(), heater.records(repeats=2), on_progress=False, **how)
+            lacuna.diagnose(heater.system(), heater.records(repeats=2), progress=False, **how)
     assert seeds[0] == seeds[1] == 3
     assert seeds[2] == seeds[3]
 
@@ -88,9 +88,9 @@ def test_a_person_says_which_records_are_the_test():
     assert not {t.name for t in split.known + split.unseen} & {"a0", "b2"}
     assert len(split.fit + split.judging + split.final) == 6
     given = heater.records(seed=1, repeats=3, **LAG)
-    found = lacuna.diagnose(heater.system(), given, test=["steps_4W_2", "sweep_10W_3"], on_progress=False)
+    found = lacuna.diagnose(heater.system(), given, test=["steps_4W_2", "sweep_10W_3"], progress=False)
     assert [e.name for e in found.effects] == ["sensor_lag"]
     held_out = found.record["held_out"]
     assert {*held_out["repeats"], *held_out["conditions"]} == {"steps_4W_2", "sweep_10W_3"}
     with pytest.raises(lacuna.LacunaError, match="no record is called"):
-        lacuna.diagnose(heater.system(), given, test=["steps_5W_1"], on_progress=False)
+        lacuna.diagnose(heater.system(), given, test=["steps_5W_1"], progress=False)

@@ -40,7 +40,7 @@ def test_a_tied_parameter_follows_another_whether_that_is_fitted_or_fixed():
 
 def test_a_diagnosis_names_the_same_and_tells_of_what_it_held():
     lag = {"sensor_lag__lag_s": 3.0}
-    found = lacuna.diagnose(heater.system(fixed={"tau_s": 15.0}), heater.records(seed=1, **lag), on_progress=False)
+    found = lacuna.diagnose(heater.system(fixed={"tau_s": 15.0}), heater.records(seed=1, **lag), progress=False)
     assert [e.name for e in found.effects] == ["sensor_lag"]
     assert found.theta["tau_s"] == 15.0
     assert np.isnan(found.to_frame().loc["tau_s", "lower_90"])

@@ -53,7 +53,7 @@ def followed(verdict):
 
 
 def test_what_nuisances_follow_is_named():
-    found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), on_progress=False)
+    found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), progress=False)
     assert [effect.name for effect in found.effects] == ["expansion"]
     lower, upper = found.effects[0].interval["mm_per_K"]
     assert 0.5 * lower < 0.08 < 2.0 * upper
@@ -65,14 +65,14 @@ def test_what_nuisances_follow_is_named():
 @pytest.mark.slow
 def test_nuisances_of_their_own_follow_nothing():
     for seed in range(3):
-        found = lacuna.diagnose(system(), records(seed, np.zeros(6)), on_progress=False)
+        found = lacuna.diagnose(system(), records(seed, np.zeros(6)), progress=False)
         assert found.verdict == "none"
         assert not followed(found)
 
 
 def test_what_a_condition_sets_is_told_and_no_effect_named():
     """Neither grows with the temperature: where the runs of each condition begin."""
-    found = lacuna.diagnose(system(), records(4, (0.7, -0.5, 0.6, -0.7, 0.5, -0.6)), on_progress=False)
+    found = lacuna.diagnose(system(), records(4, (0.7, -0.5, 0.6, -0.7, 0.5, -0.6)), progress=False)
     assert not found.effects
     assert len(followed(found)) == 1
 
@@ -94,7 +94,7 @@ def test_probability_of_meeting_conditions_by_chance(parameters):
 
 @pytest.mark.slow
 def test_no_share_of_a_gap_is_given_where_nuisances_had_closed_it(tmp_path):
-    found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), on_progress=False)
+    found = lacuna.diagnose(system(), records(2, 0.08 * np.array(TEMPERATURES_K)), progress=False)
     assert found.record["effects"][0]["share_of_gap"] is None
     assert "What was missing" in str(found)
     assert "of the gap" not in str(found)

@@ -75,7 +75,7 @@ def test_an_exact_model_of_a_rounded_record_lacks_nothing():
         for k in range(6)
     ]
     one = system(settling, [Effect("bend", Parameter("per", "", 1e-6, -1e-3, 1e-3))])
-    assert lacuna.diagnose(one, records, on_progress=False).verdict == "none"
+    assert lacuna.diagnose(one, records, progress=False).verdict == "none"
 
 
 # --- Uneven sampling ---
@@ -137,7 +137,7 @@ def test_uneven_records_are_diagnosed():
         time_s = np.sort(draw.uniform(0.0, 3.0 + 0.2 * k, 150))
         records.append({"time_s": time_s, "y": 2.0 * time_s + 0.4 * time_s**2 + 0.1 * draw.standard_normal(150)})
     found = lacuna.diagnose(
-        system(bent, [Effect("bend", Parameter("per", "", 0.3, -5.0, 5.0))]), records, on_progress=False
+        system(bent, [Effect("bend", Parameter("per", "", 0.3, -5.0, 5.0))]), records, progress=False
     )
     assert [e.name for e in found.effects] == ["bend"]
 
@@ -158,6 +158,6 @@ def test_a_model_that_runs_away_beyond_a_border_ends_in_a_verdict(beyond):
         y = 2.0 * u + 0.2 * u**3 + 0.01 * draw.standard_normal(200)
         records.append({"time_s": np.arange(200.0), "u": u, "y": y})
     one = system(simulate, [Effect("soft", Parameter("per", "1", 0.3, -5.0, 5.0))])
-    found = lacuna.diagnose(one, records, on_progress=False)
+    found = lacuna.diagnose(one, records, progress=False)
     assert [e.name for e in found.effects] == ["soft"]
     assert found.effects[0].parameters["per"] == pytest.approx(0.2, rel=0.02)

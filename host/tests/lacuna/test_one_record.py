@@ -43,7 +43,7 @@ def named(verdict):
 @pytest.mark.parametrize("slow_K", [0.0, 0.3])
 def test_names_both_effects_by_segments_of_one_run(written, slow_K):
     found = lacuna.diagnose(
-        heater.system(*WRITTEN[written]), lacuna.segments(record(3, slow_K=slow_K, **BOTH)), on_progress=False
+        heater.system(*WRITTEN[written]), lacuna.segments(record(3, slow_K=slow_K, **BOTH)), progress=False
     )
     assert named(found) == {"sensor_lag", "saturation"}
     assert "Without repeats" in str(found)
@@ -53,7 +53,7 @@ def test_names_both_effects_by_segments_of_one_run(written, slow_K):
 def test_the_answer_is_the_same_in_either_parametrisation():
     """Fitted in one coordinate, so not just alike: the same."""
     limit, inverse = (
-        lacuna.diagnose(heater.system(*effects), lacuna.segments(record(4, slow_K=0.3, **LIMIT)), on_progress=False)
+        lacuna.diagnose(heater.system(*effects), lacuna.segments(record(4, slow_K=0.3, **LIMIT)), progress=False)
         for effects in WRITTEN.values()
     )
     assert named(limit) == named(inverse) == {"saturation"}
@@ -66,7 +66,7 @@ def test_the_answer_is_the_same_in_either_parametrisation():
 def test_error_is_no_worse_than_scipys_with_twenty_starts_on_the_same_structure():
     system = heater.system()
     records = lacuna.segments(record(5, slow_K=0.1, **BOTH))
-    found = lacuna.diagnose(system, records, on_progress=False)
+    found = lacuna.diagnose(system, records, progress=False)
     assert named(found) == {"sensor_lag", "saturation"}
     bound = with_records(system, records)
     names = ["gain_K_W", "tau_s", "sensor_lag.lag_s", "saturation.limit_W"]
@@ -94,13 +94,13 @@ def test_windows_begin_in_states_of_their_own():
 
     effects = (heater.OFFSET, heater.LIMITED, heater.DEAD, heater.SENSOR)
     system = lacuna.System(simulate, heater.PARAMETERS, effects, nuisances=start)
-    found = lacuna.diagnose(system, lacuna.windows(record(6, **LIMIT), 150.0), on_progress=False)
+    found = lacuna.diagnose(system, lacuna.windows(record(6, **LIMIT), 150.0), progress=False)
     assert named(found) == {"saturation"}
     assert found.effects[0].parameters["limit_W"] == pytest.approx(8.0, rel=0.05)
 
 
 def test_slow_noise_without_an_effect_is_said_to_be_either():
-    left = lacuna.diagnose(heater.system(), lacuna.segments(record(3, slow_K=0.3)), on_progress=False)
+    left = lacuna.diagnose(heater.system(), lacuna.segments(record(3, slow_K=0.3)), progress=False)
     assert left.verdict == "unexplained"
     (said,) = [w for w in left.warnings if "correlation time" in w]
     seconds = float(said.split("about ")[1].split(" s")[0])
@@ -110,7 +110,7 @@ def test_slow_noise_without_an_effect_is_said_to_be_either():
 @pytest.mark.parametrize("told", [10.0, {"temperature_K": 10.0}, "estimated"])
 def test_noise_that_is_told_or_estimated_to_be_slow_is_noise(told):
     one = lacuna.segments(record(3, slow_K=0.3))
-    found = lacuna.diagnose(heater.system(noise_time_s=told), one, on_progress=False)
+    found = lacuna.diagnose(heater.system(noise_time_s=told), one, progress=False)
     assert found.verdict == "none"
     assert "correlation time" in str(found).replace("\n", " ")
     (noise,) = found.diagnosis.search.floor.channels.values()
@@ -119,7 +119,7 @@ def test_noise_that_is_told_or_estimated_to_be_slow_is_noise(told):
 
 def test_slow_noise_hides_no_effect_that_is_larger():
     one = lacuna.segments(record(4, slow_K=0.3, **LIMIT))
-    found = lacuna.diagnose(heater.system(noise_time_s="estimated"), one, on_progress=False)
+    found = lacuna.diagnose(heater.system(noise_time_s="estimated"), one, progress=False)
     assert named(found) == {"saturation"}
 
 
@@ -213,7 +213,7 @@ def test_a_record_that_is_itself_fast_does_not_pass_for_noise(cubic, verdict):
         [lacuna.Effect("cubic", lacuna.Parameter("gain", "", 0.1, -2.0, 2.0))],
         outputs="y",
     )
-    found = lacuna.diagnose(system, [measured(0.2 + 0.1 * k) for k in range(8)], on_progress=False)
+    found = lacuna.diagnose(system, [measured(0.2 + 0.1 * k) for k in range(8)], progress=False)
     assert found.verdict == verdict
     assert "Repeats share" not in str(found)
     if verdict == "identified":

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import lacuna
 from lacuna.decimals import decimal
 from lacuna.records import RecordError, Table, cell_by_cell, numbers_alone, read, segments, windows
 
@@ -292,3 +293,7 @@ def test_what_scripts_outside_import_keeps_its_name(name):
     """Written as text, so that whoever renames it in all files meets it here."""
     module, own = name.split(".")
     assert hasattr(importlib.import_module(f"lacuna.{module}"), own)
+
+
+def test_scripts_elsewhere_turn_progress_off_by_this_name():
+    assert lacuna.diagnose.__kwdefaults__["progress"] is True

@@ -112,7 +112,7 @@ def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spr
         [lacuna.Effect("bend", lacuna.Parameter("by", "", 0.001, -0.1, 0.1))],
         nuisances=[lacuna.Parameter("offset", "", 0.0, -20.0, 20.0, scale=spread)],
     )
-    found = lacuna.diagnose(system, records, on_progress=False)
+    found = lacuna.diagnose(system, records, progress=False)
     assert found.verdict == verdict
     if verdict == "identified":
         assert found.diagnosis.search.floor.channels["run", "y"].sd == pytest.approx(0.05, rel=0.1)

@@ -44,7 +44,7 @@ def test_something_is_left_to_judge_by(conditions):
 @pytest.mark.parametrize("count", [3, 4])
 def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
     given = dict(list(heater.records(repeats=1, sensor_lag__lag_s=3.0).items())[:count])
-    verdict = lacuna.diagnose(heater.system(), given, on_progress=False)
+    verdict = lacuna.diagnose(heater.system(), given, progress=False)
     assert verdict.verdict in str(verdict)
     assert "<html" in verdict.report(tmp_path / "page.html").read_text()
     assert verdict.plot()

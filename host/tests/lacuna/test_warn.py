@@ -40,6 +40,6 @@ def test_nuisances_that_are_all_a_little_off_are_pointed_out(mean_C, said):
         clean = mean_C + draw.standard_normal() + 60.0 * np.exp(-heater.TIME_S / 40.0)
         noise = 0.1 * draw.standard_normal(len(clean))
         records.append({"time_s": heater.TIME_S, "temperature_C": clean + noise, "condition": len(records)})
-    found = [one for one in lacuna.diagnose(system, records, on_progress=False).warnings if one.startswith("room_C")]
+    found = [one for one in lacuna.diagnose(system, records, progress=False).warnings if one.startswith("room_C")]
     assert len(found) == said
     assert all("on average over 10 trials, where 20 C is expected" in one for one in found)

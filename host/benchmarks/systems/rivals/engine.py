@@ -11,6 +11,6 @@ def solve(problem: KnownProblem) -> RivalAnswer:
     system = lacuna.System(
         problem.simulate, problem.parameters, problem.effects, nuisances=problem.nuisances, outputs=problem.output
     )
-    verdict = lacuna.diagnose(system, problem.cut(problem.fitted), on_progress=False)
+    verdict = lacuna.diagnose(system, problem.cut(problem.fitted), progress=False)
     named = tuple(effect.name for effect in verdict.effects)
     return RivalAnswer(named, lambda record: verdict.model(record)[problem.output], verdict.verdict)
