@@ -42,7 +42,7 @@ def enters(console: Terminal, line: str, *answers: str, keys: str = "") -> None:
 
 def test_a_stranger_tweaks_a_gait_from_help_alone(console, uno):
     console.presses("help" + ENTER)
-    console.sees("[save [NAME]  keep", "[load PRESET", "[parameters: period_s", "[try: set period_s 6, run")
+    console.sees("[save [NAME]  save", "[load PRESET", "[parameters: period_s", "[try: set period_s 6, run")
     enters(console, "help period_s", "[period_s  time of one cycle (1/f)", f"[period_s 5.7 {PERIOD}")
     enters(console, "set period_s 4", "[period_s 5.700 -> 4.000 s", "ok")
     enters(console, "run", "ok")
