@@ -48,7 +48,7 @@ def main() -> int:
         subprocess.run([sys.executable, "-c", _COMPILE], env=os.environ | {"BIFA_LANES": "0"}, check=True)
         commands = {
             "fit": ["fit", str(day), "--out", model],
-            # By what is known of this model, which lacks an effect, no gait walks.
+            # A margin that the work does not owe to what this fit, of a model that lacks an effect, knows.
             "robust gait": [
                 "optimize",
                 "--model",

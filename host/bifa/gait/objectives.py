@@ -18,13 +18,11 @@ class NominalSpeed:
     """Speed of gaits on one model, in mm/s, 0 where the metric's rules are broken."""
 
     def __init__(self, runs: Simulations, plant: Plant, space: SearchSpace, metric: Metric | Passage):
-        self._runs, self._plants, self._space, self._metric = runs, [plant], space, metric
+        self._runs, self._plant, self._space, self._metric = runs, plant, space, metric
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """(n,) of points (n, dimensions) of the unit cube."""
-        rows = gait_rows(self._space.gaits(points))
-        which = np.zeros(len(rows), dtype=np.int64)
-        return self._runs.judged(self._plants, which, rows, self._metric).counted_mm_s
+        return on_model(self._runs, self._plant, gait_rows(self._space.gaits(points)), self._metric)
 
 
 class RobustSpeed:
@@ -78,8 +76,13 @@ class RobustSpeed:
         return self._runs.judged(self._draws, which, rows, self._metric).counted_mm_s
 
 
+def on_model(runs: Simulations, nominal: Plant, gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:
+    """(n,) speeds of gaits (n, 6) on the model itself, by the metric's rules, in mm/s."""
+    return runs.judged([nominal], np.zeros(len(gaits), dtype=np.int64), gaits, metric).counted_mm_s
+
+
 def distribution(runs: Simulations, draws: Sequence[Plant], gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:
-    """(n, draws) speeds of gaits (n, 6) on every draw, by the metric's rules, in mm/s."""
+    """(n, draws) speeds of gaits (n, 6) on every draw, by the metric's rules for draws, in mm/s."""
     n, m = len(gaits), len(draws)
-    judged = runs.judged(draws, np.tile(np.arange(m), n), np.repeat(gaits, m, axis=0), metric)
+    judged = runs.judged(draws, np.tile(np.arange(m), n), np.repeat(gaits, m, axis=0), metric.of_draws())
     return judged.counted_mm_s.reshape(n, m)

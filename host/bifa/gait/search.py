@@ -10,7 +10,7 @@ from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.methods.cma_es import basins, climb, climb_basins
 from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
-from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution
+from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
 from bifa.gait.prediction import FINE_M, Prediction, predict_speed
 from bifa.gait.settling import STANDING_MM_S
@@ -158,7 +158,7 @@ def optimize(
         refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
     fresh = spread.plants(model, VERIFYING_DRAWS, settings.seed + 2_000_003)
-    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M).of_draws())[0]
+    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M))[0]
     on_progress("verify", 1.0, nominal)
     return Optimum(
         gait,
@@ -296,7 +296,7 @@ def best_of_finalists(
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)
-    metric = replace(settings.metric, tolerance_m=FINE_M).of_draws()
+    metric = replace(settings.metric, tolerance_m=FINE_M)
     # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
     least = max(0.5 * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])
@@ -324,8 +324,7 @@ def _at_periods(stage: RobustRound, space: SearchSpace, points: np.ndarray) -> l
 
 
 def _finely(model: Model, runs: Simulations, rows: np.ndarray, settings: Settings) -> np.ndarray:
-    which = np.zeros(len(rows), dtype=np.int64)
-    return runs.judged([plant(model)], which, rows, settings.metric.finer()).counted_mm_s
+    return on_model(runs, plant(model), rows, settings.metric.finer())
 
 
 def _best(rows: np.ndarray, speeds: np.ndarray) -> tuple[Gait, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.gait.metric import Metric, Passage
-from bifa.gait.objectives import QUANTILE, distribution
+from bifa.gait.objectives import QUANTILE, distribution, on_model
 from bifa.gait.pool import Simulations
 from bifa.ranges import RANGES
 from bifa.robot.gait import Gait
@@ -50,13 +50,13 @@ def sensitivity(
         values = np.mod(values, 360.0) if name.startswith("psi") else np.clip(values, lower, upper)
         scans[name] = base[name] + width * np.linspace(-1.0, 1.0, points)
         rows += [Gait(**{**base, name: float(value)}) for value in values]
-    speeds = distribution(runs, [nominal, *draws], gait_rows(rows), metric)
+    own = on_model(runs, nominal, gait_rows(rows), metric)
+    quantiles = np.quantile(distribution(runs, draws, gait_rows(rows), metric), QUANTILE, axis=1)
     result = []
     for number, (name, values) in enumerate(scans.items()):
-        part = speeds[number * points : (number + 1) * points]
-        quantile = np.quantile(part[:, 1:], QUANTILE, axis=1)
-        unit = RANGES[name][2]
-        result.append(Scan(name, unit, base[name], values, part[:, 0], quantile, _room(values, quantile)))
+        part = slice(number * points, (number + 1) * points)
+        room = _room(values, quantiles[part])
+        result.append(Scan(name, RANGES[name][2], base[name], values, own[part], quantiles[part], room))
     return result
 
 
@@ -107,5 +107,5 @@ def front(
     around = np.repeat(rows[:: max(1, points // 6)], 7, axis=0)
     around[:, 0] = (rows[:: max(1, points // 6), 0][:, None] * periods.T).ravel()
     rows = np.concatenate([rows, around])
-    speeds = distribution(runs, [nominal, *draws], rows, metric)
-    return Front(rows, speeds[:, 0], np.quantile(speeds[:, 1:], QUANTILE, axis=1))
+    quantiles = np.quantile(distribution(runs, draws, rows, metric), QUANTILE, axis=1)
+    return Front(rows, on_model(runs, nominal, rows, metric), quantiles)

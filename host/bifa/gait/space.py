@@ -51,9 +51,8 @@ class SearchSpace:
 
     def gaits(self, points: np.ndarray) -> list[Gait]:
         """The gaits of points of shape (n, dimensions)."""
-        lower = np.array([axis.lower for axis in self.axes])
-        upper = np.array([axis.upper for axis in self.axes])
-        values = lower + self.fold(np.atleast_2d(points)) * (upper - lower)
+        lower, width = self._box
+        values = lower + self.fold(np.atleast_2d(points)) * width
         return [
             Gait(**{name: value for axis, value in zip(self.axes, row, strict=True) for name in axis.sets})
             for row in values.tolist()
@@ -84,9 +83,14 @@ class SearchSpace:
     def _unfolded(self, gait: Gait) -> np.ndarray:
         values = gait.as_dict()
         means = np.array([np.mean([values[name] for name in axis.sets]) for axis in self.axes])
-        lower = np.array([axis.lower for axis in self.axes])
-        upper = np.array([axis.upper for axis in self.axes])
-        return (means - lower) / (upper - lower)
+        lower, width = self._box
+        return (means - lower) / width
+
+    @property
+    def _box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Its lower corner and its widths, (dimensions,) each."""
+        ends = np.array([(axis.lower, axis.upper) for axis in self.axes])
+        return ends[:, 0], ends[:, 1] - ends[:, 0]
 
 
 def paper_space(

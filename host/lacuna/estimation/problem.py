@@ -284,6 +284,7 @@ class Problem:
             changes *= self._weighing[index].weight
         reach = np.maximum(changes.max(axis=1, initial=0.0), -changes.min(axis=1, initial=0.0))
         away = np.flatnonzero(~(reach <= _MOST))  # failed, or nearly so
+        changes[away] = 0.0  # replaced below: infinite ones would be summed
         if self.view.blur:
             changes, _ = self._looked_at(changes, index)
         # over as small a step as a derivative takes, the compression is a straight line
