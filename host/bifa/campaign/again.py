@@ -18,7 +18,7 @@ import numpy as np
 
 from bifa.campaign.resolve import joined
 from bifa.campaign.stages import StageError
-from bifa.campaign.walks import predict, predicted_speed, prediction_of, speed_of
+from bifa.campaign.walks import predict, prediction_of, speed_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.files import write_text
 from bifa.gait.prediction import FELL
@@ -116,7 +116,7 @@ def judged(model: Model, effects: tuple[str, ...], walks: Dataset, at_edge: bool
     return Round(
         effects,
         trials[0].walked,
-        predicted_speed(model, trials[0]),
+        prediction.speed_mm_s,
         float(np.mean(measured)),
         float(np.std(measured, ddof=1)) if several else 0.0,
         float(np.sqrt(np.mean(residuals**2))),

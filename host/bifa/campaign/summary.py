@@ -13,7 +13,7 @@ import bifa
 from bifa.campaign.again import read_rounds
 from bifa.campaign.page import campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
-from bifa.campaign.walks import predict, predicted_speed, prediction_of, speed_of, walks_of
+from bifa.campaign.walks import predict, prediction_of, speed_of, walks_of
 from bifa.data import Dataset, Trial, read_dataset
 from bifa.data.dataset import labels_of
 from bifa.gait import simulations
@@ -40,8 +40,8 @@ PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3, "edge": 23.3}
 @dataclass(frozen=True)
 class GaitResult:
     """Speeds in mm/s over the settled cycles, of which `settled_cycles` were measured in all; `spread` is that of the
-    repeats. `interval_90_mm_s`, `walks_probability`: what the model predicted with which the gait was found (of the
-    baseline, the completed model). `stand_in`: the baseline, since no gait walks on the model."""
+    repeats. `interval_90_mm_s`, `walks_probability`: what the completed model predicts, at the edge that of the last
+    round. `stand_in`: the baseline, since no gait walks on the model."""
 
     gait: str
     base_model: float
@@ -124,11 +124,11 @@ def _edge(inputs: Path) -> Sequence[Trial]:
 def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> GaitResult:
     measured, trial = [speed_of(one) for one in trials], trials[0]
     means = [speed.mean_mm_s for speed in measured]
-    prediction = prediction_of(base if gait == "base" else completed, trial)
+    prediction = prediction_of(completed, trial)
     return GaitResult(
         gait,
-        predicted_speed(base, trial),
-        predicted_speed(completed, trial),
+        prediction_of(base, trial).speed_mm_s,
+        prediction.speed_mm_s,
         float(np.mean(means)),
         float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
         PAPER_MM_S[gait],

@@ -94,9 +94,3 @@ def predict(model: Model, trial: Trial) -> dict[str, Any]:
     commands = valves_of(of_gait(gait, trial.time_s[-1] + gait.period_s), trial)
     columns = walk(model, commands=commands, time_s=trial.time_s * seconds_per_uno_s(trial)).columns
     return dict(columns) | {"time_s": trial.time_s}
-
-
-def predicted_speed(model: Model, trial: Trial) -> float:
-    """The settled speed that the model gives to the walk in `trial`, judged as the measured one is; mm/s."""
-    columns = predict(model, trial)
-    return measured_speed(columns["time_s"], columns["displacement_head_mm"], trial.walked["period_s"], 0.0).mean_mm_s

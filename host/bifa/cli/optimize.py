@@ -65,10 +65,10 @@ def optimize(
     pictures: Annotated[Path | None, PICTURES] = None,
     no_pictures: Annotated[bool, NO_PICTURES] = False,
 ) -> None:
-    """Find the gait that maximises the settled speed: periodic, without slip, verified with a finer step.
+    """Find the gait that maximises the settled speed, verified with a finer step.
 
     By default the 10th percentile of the speed over the model's uncertainty is maximised, since the fastest nominal
-    gait collapses under a 1 % change. Pictures go to a folder next to the gait file by default.
+    gait, which may not slip, collapses under a 1 % change. Pictures go to a folder next to the gait file by default.
     """
     from bifa.files import check_targets
 

@@ -14,6 +14,7 @@ from bifa.simulate.terrain import passed_at_m, terrain, tunnel
 
 # The body is shorter than this under any pressure: the tail's end is behind by no more when the head's has come so far.
 _LONGEST_BODY_M = 0.06
+_OF_DRAWS = 0.02  # of the advance: a robot that drags a longer tether in each cycle never is periodic to a thousandth
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,12 @@ class Metric:
 
     def quicker(self) -> "Metric":
         """For searches over many draws: six cycles, longer steps. What it lets through is judged again."""
-        return replace(self, cycles=6, judged=2, periodic=5e-3, tolerance_m=3e-5)
+        return replace(self, cycles=6, judged=2, periodic=max(self.periodic, 5e-3), tolerance_m=3e-5)
 
     def of_draws(self) -> "Metric":
-        """For robots that the model may be: they may slip. Their friction is not well known, and a speed that is
-        measured counts however a robot comes by it."""
-        return replace(self, slip_m=np.inf)
+        """For robots that the model may be, the model itself among them: they may slip, and their cycles differ by as
+        much as a camera hardly tells. A speed that is measured counts however a robot comes by it."""
+        return replace(self, slip_m=np.inf, periodic=_OF_DRAWS)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""

@@ -26,8 +26,8 @@ class NominalSpeed:
 
 
 class RobustSpeed:
-    """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws; 0 where the
-    metric's rules are broken on the model itself.
+    """A low quantile, `share`, of the speed over draws of the model, every gait meeting the same draws and the model
+    itself, which bounds it, all by the metric's rules for draws.
 
     Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so
     the r-th smallest met so far bounds it from above: a gait whose bound is below `abandon` of the best value
@@ -45,7 +45,8 @@ class RobustSpeed:
         abandon: float = 0.9,
     ):
         self._runs, self._space, self._draws = runs, space, draws
-        self._metric, self._own = metric.of_draws(), NominalSpeed(runs, nominal, space, metric)
+        self._metric = metric.of_draws()
+        self._own = NominalSpeed(runs, nominal, space, self._metric)
         self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
         self._abandon, self._best = abandon, 0.0

@@ -139,7 +139,8 @@ def optimize(
     started = runs.count
     flat, spread = plant(model), settings.knowledge(model)
     timing = spread.scatter
-    metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
+    rules = settings.metric.of_draws() if settings.robust else settings.metric
+    metric = replace(rules, clock=timing.clock, dead_time_s=timing.dead_time_s)
     settings = replace(settings, metric=metric)
     own = NominalSpeed(runs, flat, settings.space, metric.quicker() if settings.robust else metric)
     explored = _explore(own, settings, on_progress)
