@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 _DIRECTION_WINDOW = 25  # samples: half a second at 50 Hz
 _SMOOTHING_WINDOW = 11
@@ -39,15 +39,29 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMot
     if n < 3:
         return ImposedMotion(displacement_m.copy(), np.zeros(n, int))
     window = min(_DIRECTION_WINDOW, n - 1 + n % 2)
-    speed = savgol_filter(displacement_m, window, 1, deriv=1) / np.median(np.diff(time_s))
+    speed = moving_line(displacement_m, window)[1] / np.median(np.diff(time_s))
     direction = np.where(np.abs(speed) > 0.25 * np.abs(speed).max(), np.sign(speed), 0).astype(int)
     direction = _sharpened(displacement_m, direction)
     smooth = displacement_m.copy()
     edges = np.flatnonzero(np.diff(direction)) + 1
     for start, stop in zip(np.r_[0, edges], np.r_[edges, n], strict=True):
         if stop - start >= _SMOOTHING_WINDOW:
-            smooth[start:stop] = savgol_filter(displacement_m[start:stop], _SMOOTHING_WINDOW, 1)
+            smooth[start:stop] = moving_line(displacement_m[start:stop], _SMOOTHING_WINDOW)[0]
     return _straight(time_s, displacement_m, direction) or ImposedMotion(smooth, direction)
+
+
+def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray]:
+    """Level and slope (a sample) of the straight line through the `window` values around each of (n,), which is odd;
+    where there are too few on one side, of the line through the outermost. The filter of Savitzky and Golay, degree 1:
+    SciPy's takes half a second to import."""
+    half = window // 2
+    around, offset = sliding_window_view(values, window), np.arange(window) - half
+    level, slope = around.mean(axis=1), around @ offset / (offset @ offset)
+    beyond = np.arange(half, 0, -1)
+    return (
+        np.r_[level[0] - slope[0] * beyond, level, level[-1] + slope[-1] * beyond[::-1]],
+        np.r_[np.full(half, slope[0]), slope, np.full(half, slope[-1])],
+    )
 
 
 def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:

@@ -10,7 +10,7 @@ from numpy.polynomial import chebyshev
 
 from bifa.data import Dataset
 from bifa.identify.static import fit_static
-from bifa.problem.motion import imposed_motion
+from bifa.problem.motion import imposed_motion, moving_line
 from bifa.problem.stiffness import UndeterminedError, fit_stiffness
 from bifa.robot import nominal
 from harness.independent_lab import IndependentLab
@@ -133,6 +133,16 @@ def test_the_imposed_motion_keeps_its_corners(rate, noise, dwell, rest_s, seed):
     clear = (np.abs(moving) > 0.9e-3 * rate) & (np.arange(len(time)) > 30) & (np.arange(len(time)) < len(time) - 30)
     turn = np.abs(time - half) < 0.3 + dwell * 0.02
     assert (direction[clear & ~turn] == np.sign(moving[clear & ~turn])).all()
+
+
+@given(window=st.integers(1, 20).map(lambda k: 2 * k + 1), more=st.integers(0, 50), seed=st.integers(0, 99))
+def test_a_line_is_moved_along_as_by_scipys_filter(window, more, seed):
+    from scipy.signal import savgol_filter
+
+    values = np.random.default_rng(seed).standard_normal(window + more).cumsum()
+    level, slope = moving_line(values, window)
+    assert level == pytest.approx(savgol_filter(values, window, 1), abs=1e-12)
+    assert slope == pytest.approx(savgol_filter(values, window, 1, deriv=1), abs=1e-12)
 
 
 def test_the_shipped_curve_and_the_fitted_one_are_the_same_form():
