@@ -1,7 +1,7 @@
 """To the edge in steps that cannot lose much, and walks are data too.
 
 First the robust gait of the completed model is walked, then the one at the edge of what is known of it. Every walk is
-fed back and the model completed anew before the next gait is sought: a walk that was predicted narrows what is known,
+fed back and the model completed again before the next gait is sought: a walk that was predicted narrows what is known,
 and so moves the edge; one that was not, or that fell off the edge, corrects it.
 """
 

@@ -71,7 +71,7 @@ class Case:
         self._answers: dict[tuple[str, Candidate], Any] = {}
 
     def ruled_by(self, policy: Policy) -> Case:
-        """The same case under other rules of decision: fits are kept, what rules decide is asked anew."""
+        """The same case under other rules of decision: fits are kept, what rules decide is asked again."""
         other = Case(self.system, self.split, policy, self.seed)
         other._answers = {asked: found for asked, found in self._answers.items() if asked[0] in _FITS}
         return other
@@ -99,7 +99,7 @@ class Case:
         suffices. What each run begins with (a nuisance) may differ by more than the noise: it is in the first floor,
         which holds the nuisances where they are expected, so that the next floor still has some of it, and nothing
         would stand out. Not where factors of parameters are among them: such a system's own scatter stays in the floor,
-        since a run has to be foreseen without knowing it (`foreseen`)."""
+        since a run has to be predicted without knowing it (`predictive`)."""
         if any(p.factor_of for parameters in candidate.fitted.problem.nuisances for p in parameters):
             return candidate
         for _ in range(_SHARPENED):
@@ -226,7 +226,7 @@ class Case:
 
     def exceeds_on_all(self, *both: tuple[Sequence[Fit], Sequence[Fit]]) -> bool:
         """Whether the first fits of any pair leave by more than is relevant more than the second; or, of every pair,
-        would have left so if a run's factors had to be foreseen, which a few runs of one pair may be by chance."""
+        would have left so if a run's factors had to be predicted, which a few runs of one pair may be by chance."""
         known = (excess_over(*pair, self.system.accuracy) for pair in both)
         unseen = (tuple([predictive(fit) for fit in fits] for fits in pair) for pair in both)
         ahead = (excess_over(mine, others, self.system.accuracy) for mine, others in unseen)

@@ -174,7 +174,7 @@ def dispersion_of(tried: Sequence[Candidate]) -> float:
 
 
 def _by_chance(one: Candidate, other: Candidate) -> float:
-    """The probability that `one` predicts as well as `other` where the conditions are drawn anew (the Bayesian
+    """The probability that `one` predicts as well as `other` where the conditions are resampled (the Bayesian
     bootstrap, Rubin 1981): what a model explains differs from condition to condition."""
     costs = _by_condition([one, other], "unseen_by_trial", mean=True)
     ahead = _drawn(costs.shape[1]) @ (costs[0] - costs[1])
@@ -240,7 +240,7 @@ def _weights(compared: Sequence[Candidate], dispersion: float) -> dict[tuple[str
     """Weight of each explanation among those compared (pseudo-BMA+; Yao and others 2018).
 
     A likelihood alone would be sure by e^1000 of a model that is wrong by something: what a wrong model explains well
-    differs from condition to condition. So the conditions are drawn anew, and an explanation's weight is the mean, over
+    differs from condition to condition. So the conditions are resampled, and an explanation's weight is the mean, over
     the draws, of its share of the likelihood in units of the dispersion.
     """
     costs = _by_condition(compared, "by_trial")

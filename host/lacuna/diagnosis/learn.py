@@ -128,7 +128,7 @@ def _coarse(problem: Problem, start: Point, cold_values: np.ndarray | None) -> S
 
 
 def _refined(coarse: Fit) -> Fit:
-    """To the end, from where the sketch stands: a curve leads the others nowhere else."""
+    """To the end, from where the coarse fit stands: a curve leads the others nowhere else."""
     return Fit(coarse.problem, solve(coarse.problem, coarse.solution.point, **_REFINED), 1, 1)
 
 

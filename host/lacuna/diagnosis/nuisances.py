@@ -1,7 +1,7 @@
-"""Do nuisances follow the condition? What differs from run to run is drawn anew in each, so repeats share none of it.
+"""Do nuisances follow the condition? What differs from run to run is independent in each, so repeats share none of it.
 
 A mechanism that shifts all runs of a condition alike, as another initial state or gain would, leaves no residual: the
-nuisance of each run takes it up. The model lacks it all the same, since no run of another condition can be foreseen.
+nuisance of each run takes it up. The model lacks it all the same, since no run of another condition can be predicted.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Followed(NamedTuple):
 
 
 def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tuple[Followed, ...]:
-    """The nuisances of which repeats share more than chance makes of it, and so much that runs foreseen without them
+    """The nuisances of which repeats share more than chance makes of it, and so much that runs predicted without them
     would be predicted worse than is relevant; those first that follow it most. `fits`: one explanation, each on trials
     of its own; the first one has derivatives.
 

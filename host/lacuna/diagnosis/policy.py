@@ -85,7 +85,7 @@ class Policy:
     doubt: float = _rule(
         0.05,
         "probability",
-        "an explanation is worse only if it is so however the conditions are drawn anew, but for this share of draws",
+        "an explanation is worse only if it is so however the conditions are resampled, but for this share of draws",
         "convention",
     )
     implausible: float = _rule(

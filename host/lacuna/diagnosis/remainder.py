@@ -1,7 +1,7 @@
 """Is there anything left in a residual but noise? Structure is what repeats of a condition have in common.
 
 The product of two repeats' residuals, averaged, is the mean square of what they share: noise averages out
-whatever its colour, because it is drawn anew in each run. How large that average gets by chance is found by
+whatever its colour, because it is another in each run. How large that average gets by chance is found by
 a bootstrap: every trial is given a stretch of pure noise, taken from the differences between repeats, in
 which all that is shared cancels. No distribution, whiteness or known noise level is assumed.
 """

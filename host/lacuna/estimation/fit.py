@@ -148,7 +148,7 @@ def converged(fitted: Fit) -> Fit:
 
 def renewed(problem: Problem, solution: Solution, *, fruitful: float = _FRUITFUL, **options: Any) -> Solution:
     """Searches that follow `solution`, for as long as one gains the share `fruitful` of the cost: with nuisances as
-    they are and, while that leads further, begun anew at their means. A nuisance and a parameter of like effect (a
+    they are and, while that leads further, restarted at their means. A nuisance and a parameter of like effect (a
     run's friction and the friction) hold one another where the model predicts a jump a little early or late; a search
     has to let go of one of them."""
     letting_go = any(problem.nuisances)
@@ -209,7 +209,7 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     if not max_iterations:
         bare = replace(fitted.solution, cost=cost_of(problem, point), normal=np.zeros((0, 0)), sensitivities=())
         return Fit(problem, bare, fitted.starts, fitted.starts_agreeing)
-    known = None  # they are taken anew
+    known = None  # they are recomputed
     if sensitivities:
         pairs = zip(problem.slopes(point), fitted.problem.slopes(point), strict=True)
         known = [s.reweighed(new / old) for s, (new, old) in zip(sensitivities, pairs, strict=True)]

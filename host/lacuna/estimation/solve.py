@@ -29,7 +29,7 @@ _STRAY_SDS = 10.0  # that a nuisance may: nearer its prior holds it, and a bound
 _ALONE_SDS = 4.0  # but where nothing else is free, or it would stand in for what the model lacks
 _REACH = 50.0  # scales that a parameter may move in one step: further the derivatives say nothing
 _LAMBDA_START, _LAMBDA_MOST = 1e-3, 1e8
-_TRUSTED = 0.25  # of what a step promised: derivatives that foretell less are taken anew
+_TRUSTED = 0.25  # of what a step promised: derivatives that predict less are recomputed
 _PREDICTED = 0.5  # of what it promised: a small step that kept so much of it ends the search with old derivatives too
 _OLDEST = 8  # steps that derivatives serve at most
 
@@ -77,7 +77,7 @@ def solve(
 ) -> Solution:
     """Minimise the cost from `start` over the parameters `free` (indices; default all) and all nuisances.
 
-    Derivatives are taken anew only where the last ones, corrected after every step by what it showed (Broyden
+    Derivatives are recomputed only where the last ones, corrected after every step by what it showed (Broyden
     1965), no longer predict what a step does. With `sensitivities` given (of `free`, from somewhere near) they are
     never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
     """
