@@ -87,6 +87,11 @@ class Settings:
     share: float = QUANTILE
     begin: tuple[Gait, ...] = ()
 
+    @property
+    def rules(self) -> Metric | Passage:
+        """What gaits are judged by: a robust search judges the model itself as it judges its draws."""
+        return self.metric.of_draws() if self.robust else self.metric
+
     def knowledge(self, model: Model) -> Knowledge:
         """From which the robots are drawn."""
         known = spread_of(model, self.spread)
@@ -139,10 +144,9 @@ def optimize(
     started = runs.count
     flat, spread = plant(model), settings.knowledge(model)
     timing = spread.scatter
-    rules = settings.metric.of_draws() if settings.robust else settings.metric
-    metric = replace(rules, clock=timing.clock, dead_time_s=timing.dead_time_s)
+    metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
     settings = replace(settings, metric=metric)
-    own = NominalSpeed(runs, flat, settings.space, metric.quicker() if settings.robust else metric)
+    own = NominalSpeed(runs, flat, settings.space, settings.rules.quicker() if settings.robust else metric)
     explored = _explore(own, settings, on_progress)
     if settings.robust and explored.best_value > 0.0:
         explored = explore_on_robots(model, runs, spread, explored, settings, on_progress)
@@ -325,7 +329,7 @@ def _at_periods(stage: RobustRound, space: SearchSpace, points: np.ndarray) -> l
 
 
 def _finely(model: Model, runs: Simulations, rows: np.ndarray, settings: Settings) -> np.ndarray:
-    return on_model(runs, plant(model), rows, settings.metric.finer())
+    return on_model(runs, plant(model), rows, settings.rules.finer())
 
 
 def _best(rows: np.ndarray, speeds: np.ndarray) -> tuple[Gait, float]:

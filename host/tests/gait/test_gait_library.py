@@ -16,7 +16,7 @@ from bifa.simulate.passing import passing
 @pytest.mark.parametrize("name", library.NAMES)
 def test_a_gait_walks_as_fast_as_its_file_says(name, runs, nominal_plant):
     entry = library.load(name)
-    metric = load_scenario(entry.name).settings.metric.finer()
+    metric = load_scenario(entry.name).settings.rules.finer()
     judged = runs.judged([nominal_plant], np.zeros(1, int), gait_rows([entry.gait]), metric)
     assert judged.counted_mm_s[0] == pytest.approx(entry.provenance["predicted_speed_mm_s"], rel=2e-3)
     assert entry.provenance["scenario"] == name

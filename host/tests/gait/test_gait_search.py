@@ -10,7 +10,7 @@ from bifa.gait.methods import Evaluated
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
 from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, best_of_finalists, explore_on_robots, on_robots
 from bifa.gait.uncertainty import spread_of
-from bifa.robot import BASELINE, nominal
+from bifa.robot import BASELINE, Gait, nominal
 from bifa.simulate import gait_rows, plant
 
 ROBUST = np.array([[2.7, 193.0, 325.0, 0.655, 0.428, 0.428]])
@@ -73,6 +73,18 @@ def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs
     assert on_robots(nominal(), runs, spread, settings, EXPLORE, 0)(fast)[0] < 2.0
     found = explore_on_robots(nominal(), runs, spread, Evaluated(fast, np.ones(1)), settings, lambda *_: None)
     assert found.best_value > 20.0
+
+
+def test_a_gait_that_never_is_periodic_to_a_thousandth_counts_in_a_robust_search(runs):
+    """A tether is longer by every cycle, and the feet slip by microns: a gait that had walked at 23.2 mm/s counted 0,
+    and the search ended at 22.7."""
+    dragging, settings = nominal().with_effects({"tether_drag": {"drag_N_m": 1.0}}), Settings()
+    row = np.array([[2.68, 213.8, 349.96, 0.6433, 0.4655, 0.4655]])
+    strict = [runs.judged([plant(dragging)], np.zeros(1, int), row, m) for m in (Metric(), Metric().finer())]
+    assert all(one.refused[0] and one.speed_mm_s[0] > 22.0 for one in strict)
+    known = Evaluated(settings.space.nearest([Gait(*row[0])]), np.ones(1))
+    _, speed = best_of_finalists(dragging, runs, spread_of(dragging, 0.001), known, known, settings, lambda *_: None)
+    assert speed > 22.0
 
 
 @pytest.mark.parametrize("robust", [False, True])
