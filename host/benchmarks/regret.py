@@ -4,9 +4,10 @@
                                [--records FILE] [--print]
 
 Robots: the nominal one and the strong push, then specimens (5 % in every parameter) with each effect of the library at
-its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model file below
-DIR. The best known of a robot is the best of all its runs: of every seed, of `--long` searches of five times the
-budget, and of the peers (differential evolution, SciPy's DIRECT and SHGO) on as many evaluations as the search took in
+its usual size in turn, every tenth in a vertical pipe and every tenth before the tunnel; and every model-last.toml
+below DIR, the completed models that campaigns leave, whose robust searches are at the edge of what is known of them.
+The best known of a robot is the best of all its runs: of every seed, of `--long` searches of five times the budget, and
+of the peers (differential evolution, SciPy's DIRECT and SHGO) on as many evaluations as the search took in
 the mean. (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust
 searches and peers take ten times as long as nominal searches: `--fully` says on how many of the robots, evenly spread,
 they are tried. FILE has a line for each robot, with which an interrupted run goes on.
@@ -28,6 +29,7 @@ from scipy.optimize import direct, shgo
 
 from benchmarks import records as lines
 from bifa import effects
+from bifa.campaign.loop import AT_EDGE
 from bifa.gait import SearchError, Settings, optimize, simulations
 from bifa.gait.library.scenarios import SCENARIOS
 from bifa.gait.objectives import NominalSpeed
@@ -46,8 +48,8 @@ _JUDGED = 60
 def robots(count: int, models: Path | None = None) -> Iterator[tuple[str, Model, Settings]]:
     """Name, model and how it is searched of each robot."""
     if models:
-        for file in sorted(models.rglob("model-*.toml")):
-            yield file.relative_to(models).with_suffix("").as_posix(), load_model(file), Settings()
+        for file in sorted(models.rglob("model-last.toml")):
+            yield file.parent.relative_to(models).as_posix(), load_model(file), Settings(share=AT_EDGE)
     names = sorted(effects.library())
     for k in range(count):
         if k < 2:
@@ -74,14 +76,15 @@ def searched(
     many evaluations a nominal one took in the mean, which the peers have as well. Not `fully`: the nominal ones only.
     """
     record: dict[str, Any] = {}
+    spread = None if model.covariance else SPREAD
     for kind, robust in (("nominal", False), ("robust", True))[: 1 + fully]:
         start = time.process_time()
-        own = [_found(model, replace(settings, robust=robust, seed=seed, spread=SPREAD), runs) for seed in seeds]
+        own = [_found(model, replace(settings, robust=robust, seed=seed, spread=spread), runs) for seed in seeds]
         record[kind] = [speed for speed, _ in own]
         record[f"{kind}_s"] = (time.process_time() - start) / len(seeds)
         if not robust:
             record["evaluations"] = round(mean(evaluations for _, evaluations in own)) or EVALUATIONS["cma"]
-        more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=SPREAD)
+        more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=spread)
         record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
     if not fully:
         return record
@@ -212,7 +215,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--long", type=int, default=LONG, help="searches of five times the budget, of each kind")
     parser.add_argument("--fully", type=int, help="of how many robots robust searches and peers as well; default: all")
-    parser.add_argument("--models", type=Path, help="folder below which model-*.toml are searched as well")
+    parser.add_argument("--models", type=Path, help="folder below which model-last.toml are searched as well")
     parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
     parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
     options = parser.parse_args()

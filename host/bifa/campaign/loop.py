@@ -32,7 +32,7 @@ from lacuna.diagnosis.next_experiment import NextExperiment
 from lacuna.diagnosis.record import as_record
 
 BENCH_NAME = "campaign: characterisation"  # of its data set
-_AT_EDGE = 0.05  # of the robots that may fall off
+AT_EDGE = 0.05  # of the robots that may fall off
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
 
@@ -139,7 +139,7 @@ def found_gait(
 ) -> Optimum:
     """The gait that 19 of 20 robots of what is known walk with (`spread` None), or nine of ten of a spread. The search
     begins from the baseline and from the other gaits `walked`, too."""
-    share = QUANTILE if spread is not None else _AT_EDGE
+    share = QUANTILE if spread is not None else AT_EDGE
     with simulations() as runs:
         settings = Settings(seed=seed, spread=spread, naive=naive, share=share, begin=(BASELINE, *walked))
         return optimize(robot, runs, settings, lambda what, share, _: on_progress(what, share))
