@@ -3,6 +3,7 @@
 import argparse
 import importlib
 import json
+import os
 import pkgutil
 import sys
 import time
@@ -22,6 +23,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make bench", description="Print every figure the project claims.")
     parser.add_argument("--only", metavar="TOPIC", choices=topics, help=f"run one: {', '.join(topics)}")
     only = parser.parse_args().only
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before: modules are compiled
 
     failed = []
     for topic in [only] if only else topics:

@@ -177,15 +177,16 @@ def run(
     known = lines.read(kept, lambda record: record["robot"]) if kept else {}
     print(HEADING)
     found: list[dict] = []
-    every = count if every is None else every
+    asked = list(robots(count, models))
+    every = len(asked) if every is None else every
     try:
         with simulations() as runs:
-            for number, (name, model, settings) in enumerate(robots(count, models)):
+            for number, (name, model, settings) in enumerate(asked):
                 record = known.get(name)
                 if record is None and only_print:
                     continue
                 if record is None:
-                    fully = number * every // count > (number - 1) * every // count
+                    fully = number * every // len(asked) > (number - 1) * every // len(asked)
                     known[name] = record = {"robot": name} | searched(model, settings, range(seeds), long, runs, fully)
                     if kept:
                         lines.write(kept, known.values())
