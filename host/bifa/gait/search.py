@@ -16,7 +16,7 @@ from bifa.gait.prediction import FINE_M, Prediction, predict_speed
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
-from bifa.robot.gait import Gait
+from bifa.robot.gait import BASELINE, Gait
 from bifa.robot.model import Model
 from bifa.simulate import gait_rows, plant
 
@@ -60,6 +60,7 @@ _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
 _CHECKING_DRAWS, _CHECK_QUANTILE = 768, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
 _BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
+_NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
 _FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
 
 
@@ -274,11 +275,20 @@ def on_robots(
 def _nominally(
     model: Model, runs: Simulations, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> tuple[Gait, float]:
-    """The fastest of the finalists by the finer metric. Many fail: the fastest gaits live at a cliff."""
-    rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=0.003)))
-    speeds = _finely(model, runs, rows, settings)
-    on_progress("verify", 0.5, float(speeds.max()))
-    return _best(rows, speeds)
+    """The fastest of the finalists by the finer metric. Many fall, since the fastest gaits live at a cliff; where none
+    reaches half of what was promised, those in other places are asked."""
+    gait, fastest = BASELINE, 0.0
+    for apart in (0.003, 0.02):
+        rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=apart)))
+        speeds = _finely(model, runs, rows, settings)
+        if speeds[best := int(np.argmax(speeds))] > fastest:
+            gait, fastest = Gait(*rows[best].tolist()), float(speeds[best])
+        on_progress("verify", 0.5, fastest)
+        if fastest > 0.5 * explored.best_value:
+            break
+    if fastest <= 0.0:
+        raise SearchError(_NONE_STANDS)
+    return gait, fastest
 
 
 def best_of_finalists(
@@ -320,7 +330,7 @@ def best_of_finalists(
                 otherwise, most = (Gait(*row.tolist()), float(speed)), speeds.mean()
         if otherwise is not None:
             return otherwise
-    raise SearchError("no candidate survives re-simulation over 20 cycles with a finer step; search longer")
+    raise SearchError(_NONE_STANDS)
 
 
 def _at_periods(stage: RobustRound, space: SearchSpace, points: np.ndarray) -> list[np.ndarray]:
@@ -330,10 +340,3 @@ def _at_periods(stage: RobustRound, space: SearchSpace, points: np.ndarray) -> l
 
 def _finely(model: Model, runs: Simulations, rows: np.ndarray, settings: Settings) -> np.ndarray:
     return on_model(runs, plant(model), rows, settings.rules.finer())
-
-
-def _best(rows: np.ndarray, speeds: np.ndarray) -> tuple[Gait, float]:
-    best = int(np.argmax(speeds))
-    if speeds[best] <= 0.0:
-        raise SearchError("no candidate survives re-simulation over 20 cycles with a finer step; search longer")
-    return Gait(*rows[best].tolist()), float(speeds[best])

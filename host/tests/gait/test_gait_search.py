@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bifa.gait import Metric, SearchError, Settings, library, optimize, paper_space, simulations
-from bifa.gait.methods import Evaluated
+from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
 from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, best_of_finalists, explore_on_robots, on_robots
 from bifa.gait.uncertainty import spread_of
@@ -112,6 +112,18 @@ def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     gait, speed = best_of_finalists(sloping, runs, spread, found, found, settings, lambda *_: None)
     after = distribution(runs, draws, gait_rows([gait]), metric)
     assert np.quantile(after, 0.1) > 0.95 * speed > 20.0
+
+
+def test_where_all_gaits_of_one_place_fall_the_others_are_asked(runs, monkeypatch):
+    """Of a viscoelastic robot one seed in four found no gait: all finalists lay beyond the same cliff, where the robot
+    creeps at best."""
+    space = Settings().space
+    fallen = space.slower(space.point(library.load("fast").gait)[None], -0.02)
+    near = 0.0035 * np.array([[0.0, row, column, 0.0, 0.0] for row in range(8) for column in range(9)])
+    points = np.vstack([fallen + near, space.point(library.load("robust").gait)])
+    found = Evaluated(points, np.r_[np.full(len(near), 25.0), 22.0])
+    monkeypatch.setitem(METHODS, "cma", lambda *_: found)
+    assert optimize(nominal(), runs, Settings(robust=False, refine=False)).nominal_mm_s > 21.0
 
 
 def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(runs):
