@@ -29,9 +29,7 @@ from bifa.simulate import lanes
 TASKS = ("fit", "robust gait", "diagnosis", "first run")  # in this order: the gait is sought on the fitted model
 _ALONE_M = 1e-6  # of derivatives: robots that do not share their steps need shorter ones
 _FORK = multiprocessing.get_context("fork")
-# As on a machine where bifa has run before.
-_IMPORT = "import sys; sys.dont_write_bytecode = False; import pandas, bifa.identify.identification, bifa.gait, "
-_IMPORT += "bifa.gait.search, lacuna.diagnosis.diagnose; "
+_IMPORT = "import pandas, bifa.identify.identification, bifa.gait.search, lacuna.diagnosis.diagnose; "
 _COMPILE = "import numpy as np; from bifa import robot, simulate; simulate.walk(robot.nominal(), robot.BASELINE, 1)"
 _COMPILE += "; t = np.arange(3) / 10; simulate.anchor_pull(robot.nominal(), t, 20.0, 8.5)"
 _COMPILE += "; simulate.step_response(robot.nominal(), 'large')"
@@ -44,6 +42,7 @@ def main() -> int:
     parser.add_argument("--only", choices=TASKS)
     parser.add_argument("--seed", type=int, default=7)
     chosen = parser.parse_args()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before: modules are compiled
     with tempfile.TemporaryDirectory() as scratch:
         day, model = Path(scratch) / "day", str(Path(scratch) / "model.toml")
         command = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(chosen.seed), "--out", str(day)]

@@ -14,7 +14,8 @@ from bifa.simulate.terrain import passed_at_m, terrain, tunnel
 
 # The body is shorter than this under any pressure: the tail's end is behind by no more when the head's has come so far.
 _LONGEST_BODY_M = 0.06
-_OF_DRAWS = 0.02  # of the advance: a robot that drags a longer tether in each cycle never is periodic to a thousandth
+# Of the advance: a robot that drags a longer tether in each cycle never is periodic to a thousandth.
+_PERIODIC_OF_DRAWS = 0.02
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class Metric:
     def of_draws(self) -> "Metric":
         """For robots that the model may be, the model itself among them: they may slip, and their cycles differ by as
         much as a camera hardly tells. A speed that is measured counts however a robot comes by it."""
-        return replace(self, slip_m=np.inf, periodic=_OF_DRAWS)
+        return replace(self, slip_m=np.inf, periodic=_PERIODIC_OF_DRAWS)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""

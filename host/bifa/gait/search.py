@@ -16,7 +16,7 @@ from bifa.gait.prediction import FINE_M, Prediction, predict_speed
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
-from bifa.robot.gait import BASELINE, Gait
+from bifa.robot.gait import Gait
 from bifa.robot.model import Model
 from bifa.simulate import gait_rows, plant
 
@@ -60,6 +60,8 @@ _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008))
 _CHECKING_DRAWS, _CHECK_QUANTILE = 768, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
 _BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
+_NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at one place, and at others
+_PROMISED = 0.5  # of the best value, that a gait has to keep when it is checked
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
 _FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
 
@@ -254,7 +256,7 @@ def _refine_on_robots(
             on_progress(f"refine {number}", min(count / budget, 1.0), best)
 
         recorder = RecordedObjective(objective, settings.space.wraps, show)
-        for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=0.02)):
+        for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=_FAR)):
             recorder(points)
         climb(recorder, recorder.found().best_point, stage.step, budget, settings.seed, _POPULATION)
         found.append(recorder.found())
@@ -277,18 +279,17 @@ def _nominally(
 ) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fall, since the fastest gaits live at a cliff; where none
     reaches half of what was promised, those in other places are asked."""
-    gait, fastest = BASELINE, 0.0
-    for apart in (0.003, 0.02):
-        rows = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=apart)))
-        speeds = _finely(model, runs, rows, settings)
-        if speeds[best := int(np.argmax(speeds))] > fastest:
-            gait, fastest = Gait(*rows[best].tolist()), float(speeds[best])
-        on_progress("verify", 0.5, fastest)
-        if fastest > 0.5 * explored.best_value:
+    rows, speeds = np.empty((0, 6)), np.empty(0)
+    for apart in (_NEAR, _FAR):
+        more = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=apart)))
+        rows, speeds = np.vstack([rows, more]), np.append(speeds, _finely(model, runs, more, settings))
+        on_progress("verify", 0.5, float(speeds.max()))
+        if speeds.max() > _PROMISED * explored.best_value:
             break
-    if fastest <= 0.0:
+    best = int(np.argmax(speeds))
+    if speeds[best] <= 0.0:
         raise SearchError(_NONE_STANDS)
-    return gait, fastest
+    return Gait(*rows[best].tolist()), float(speeds[best])
 
 
 def best_of_finalists(
@@ -302,7 +303,7 @@ def best_of_finalists(
 ) -> tuple[Gait, float]:
     """The best of the finalists, over robots that the search did not meet, that stands the check; slower copies of it
     follow, for the case that all are beyond the cliff. Where none stands, the one that walks best on average."""
-    groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=0.003))
+    groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=_NEAR))
     objective = on_robots(model, runs, spread, settings, _SHORTLIST, 3)
     shortlist = np.concatenate(groups)
     # One by one: what is worse than the best so far meets few robots, the hardest first.
@@ -313,10 +314,10 @@ def best_of_finalists(
     checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)
     metric = replace(settings.metric, tolerance_m=FINE_M)
     # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
-    least = max(0.5 * float(values.max()), STANDING_MM_S)
+    least = max(_PROMISED * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])
     # Only where none of these walks at all by the metric in full: what the method found elsewhere.
-    far = explored.finalists(_NOMINAL_FINALISTS, apart=0.02)
+    far = explored.finalists(_NOMINAL_FINALISTS, apart=_FAR)
     otherwise, most = None, -1.0
     for candidates in (near, far):
         rows = gait_rows(settings.space.gaits(candidates))

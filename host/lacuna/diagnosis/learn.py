@@ -22,9 +22,9 @@ from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 
 _MOST = 4  # curves in one correction
-_FITTED = 4  # sites where a curve is sketched, the most promising first,
+_FITTED = 4  # sites where a curve is fitted coarsely, the most promising first,
 _SOUGHT = 8  # sites where further curves are sought
-_PROMISING = 0.5  # of the best one's promise: those that promise less are not sketched
+_PROMISING = 0.5  # of the best one's promise: those that promise less are not fitted
 _COARSE: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
 _REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
 
