@@ -1,15 +1,19 @@
 """Choked flow: the chamber cannot fill or empty faster than the valve's throat lets through."""
 
+import math
+
 from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="choked_flow",
     summary="the filling rate saturates at a large pressure difference",
-    equation="dp/dt = r / (1 + (s |r|)^n)^(1/n),  r = alpha (p_d - p),  n = sharpness,"
-    "  s = saturation_s_per_psi w^by_volume / ((14.7 psi + max(p, p_d)) / 14.7 psi)^upstream,"
-    "  w = volume over the body's",
+    equation="dp/dt = (1 - throat) r / (1 + |r / m|^sharpness)^(1 / sharpness) + throat q,  r = alpha (p_d - p),"
+    "  m = (p_1 / 14.7 psi)^upstream / (s w^by_volume),  p_1 = max(p, p_d) absolute,  s = saturation_s_per_psi,"
+    "  w = volume over the body's;  q: of a throat of critical_ratio, sonic flow p_1 / (14.7 psi s w^by_volume),"
+    " in series with alpha",
     source="ISO 6358-1:2013: below the critical pressure ratio the flow through a throat is proportional to the"
-    " pressure upstream, whatever it is downstream; a pressure changes by it as 1 / the volume",
+    " pressure upstream, whatever it is downstream, above it a quarter of an ellipse; a pressure changes by it as"
+    " 1 / the volume",
     enters="eq. (2), the rate of filling",
     experiments=("step_response", "locomotion"),
     confusable_with=("valve_asymmetry", "line_lag"),
@@ -20,16 +24,61 @@ EFFECT = PhysicalEffect(
         EffectParameter("sharpness", "", 1.0, 8.0, 2.0, "how sharp the bend into saturation is"),
         EffectParameter("upstream", "", -0.5, 1.5, 0.5, "1: limit as the pressure upstream; 0: constant", omitted=0.0),
         EffectParameter("by_volume", "", -0.5, 1.5, 0.5, "1: limit as 1 / volume; 0: the same for all", omitted=0.0),
+        EffectParameter("throat", "", -0.5, 1.5, 0.5, "1: a throat by ISO 6358; 0: a smooth bend", omitted=0.0),
+        EffectParameter("critical_ratio", "", 0.05, 0.6, 0.3, "of pressures, below which the throat's flow is sonic"),
     ),
     freed_at=("filling",),
 )
 
 _ATMOSPHERE_PSI = 14.696
+_LEAST_PSI = 0.15  # absolute: a pump's vacuum is above
+_ALIKE_PSI = 1e-6  # a difference of pressure below which there is no flow to divide by
 
 
-def filling(saturation_s_per_psi, sharpness, upstream, by_volume, rate_per_s, pressure_psi, inlet_psi, volume_share):
+def filling(
+    saturation_s_per_psi,
+    sharpness,
+    upstream,
+    by_volume,
+    throat,
+    critical_ratio,
+    rate_per_s,
+    pressure_psi,
+    inlet_psi,
+    volume_share,
+):
     """The convergence factor that gives the saturated rate from this inlet into this chamber."""
-    above_vacuum = max((max(pressure_psi, inlet_psi) + _ATMOSPHERE_PSI) / _ATMOSPHERE_PSI, 0.01)
-    slowness = saturation_s_per_psi * volume_share**by_volume / above_vacuum**upstream
-    share = slowness * rate_per_s * abs(inlet_psi - pressure_psi)
-    return rate_per_s / (1.0 + share**sharpness) ** (1.0 / sharpness)
+    slowness = saturation_s_per_psi * volume_share**by_volume
+    if slowness <= 0.0:
+        return rate_per_s
+    inside_psi = max(pressure_psi + _ATMOSPHERE_PSI, _LEAST_PSI)
+    outside_psi = max(inlet_psi + _ATMOSPHERE_PSI, _LEAST_PSI)
+    atmospheres = max(inside_psi, outside_psi) / _ATMOSPHERE_PSI
+    difference_psi = abs(inlet_psi - pressure_psi)
+    share = slowness / atmospheres**upstream * rate_per_s * difference_psi
+    bent = rate_per_s / (1.0 + share**sharpness) ** (1.0 / sharpness)
+    # Conductances of alpha over that of the throat, and pressures over the one that is known upstream.
+    k = rate_per_s * slowness * _ATMOSPHERE_PSI
+    squared, steep = k * k, 1.0 / ((1.0 - critical_ratio) * (1.0 - critical_ratio))
+    if inlet_psi >= pressure_psi:
+        ratio = inside_psi / outside_psi
+        between = ratio + 1.0 / k
+        if between > critical_ratio:
+            middle = squared * ratio + steep * critical_ratio
+            rest = squared * ratio * ratio + steep * critical_ratio * critical_ratio - 1.0
+            between = middle + math.sqrt(max(middle * middle - (squared + steep) * rest, 0.0))
+            between = between / (squared + steep)
+        dropped_psi = (between - ratio) * outside_psi
+    else:
+        ratio = outside_psi / inside_psi
+        between = k / (k + 1.0)
+        if ratio > critical_ratio * between:
+            middle = squared + steep * critical_ratio * ratio
+            rest = squared + steep * ratio * ratio
+            factor = squared - 1.0 + steep * critical_ratio * critical_ratio
+            between = rest / (middle + math.sqrt(max(middle * middle - factor * rest, 0.0)))
+        dropped_psi = (1.0 - between) * inside_psi
+    throttled = rate_per_s
+    if difference_psi > _ALIKE_PSI:
+        throttled = rate_per_s * dropped_psi / difference_psi
+    return max(bent + throat * (throttled - bent), 0.0)

@@ -6,15 +6,24 @@ from bifa.effects.effect import EffectParameter, PhysicalEffect
 
 EFFECT = PhysicalEffect(
     name="line_lag",
-    summary="the pressure at the chamber's inlet follows the valve's with a lag of first order",
-    equation="time_s dp_in/dt = p_d - p_in;  eq. (2) and (3) with p_in for p_d",
-    source="lumped pneumatic line, e.g. E. Richer and Y. Hurmuzlu, J. Dyn. Sys. Meas. Control 122 (2000)",
+    summary="the pressure at the chamber's inlet follows the valve's after a delay, with a lag of first order",
+    equation="time_s dp_in/dt = p_d(t - delay_share time_s) - p_in;  eq. (2) and (3) with p_in for p_d",
+    source="lumped pneumatic line with the time that a wave takes, e.g. E. Richer and Y. Hurmuzlu, J. Dyn. Sys. Meas."
+    " Control 122 (2000); a delay with a lag stands for a line of any order",
     enters="eq. (2), between p_d and the chamber",
     experiments=("step_response", "locomotion"),
     confusable_with=("valve_latency",),
-    parameters=(EffectParameter("time_s", "s", 0.0, 0.5, 0.06, "time constant of the tube", size=True),),
+    parameters=(
+        EffectParameter("time_s", "s", 0.0, 0.5, 0.06, "time constant of the tube", size=True),
+        EffectParameter("delay_share", "", 0.0, 1.0, 0.3, "delay before it, over the time constant", omitted=0.0),
+    ),
     states=1,
 )
+
+
+def delay(time_s, delay_share):
+    """Seconds from the valve's switching to the first change at the chamber."""
+    return delay_share * time_s
 
 
 def line(time_s, source_psi, step_s, state):

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy import optimize
 
 from bifa import effects, robot, simulate
-from bifa.effects import EffectError, EffectParameter, PhysicalEffect
+from bifa.effects import EffectError, EffectParameter, PhysicalEffect, choked_flow
 from bifa.simulate import hooks, layout
 from bifa.simulate.paper import FAST
 from bifa.simulate.plant import plant as flat
@@ -72,9 +75,37 @@ def test_an_effect_shows_where_it_says_and_only_there(name, base):
                 np.testing.assert_allclose(changed[experiment][key], base[experiment][key], atol=5e-3, err_msg=key)
 
 
-def test_choked_flow_in_an_older_file_has_the_constant_limit_that_it_had():
+def test_effects_in_older_files_have_the_form_that_they_had():
     older = {"saturation_s_per_psi": 0.05, "sharpness": 2.0}
-    assert effects.complete("choked_flow", older) == older | {"upstream": 0.0, "by_volume": 0.0}
+    form = {"upstream": 0.0, "by_volume": 0.0, "throat": 0.0, "critical_ratio": 0.3}
+    assert effects.complete("choked_flow", older) == older | form
+    assert effects.complete("line_lag", {"time_s": 0.05}) == {"time_s": 0.05, "delay_share": 0.0}
+
+
+@given(
+    sonic_psi_s=st.floats(1.0, 1000.0),
+    critical=st.floats(0.05, 0.6),
+    rate_per_s=st.floats(0.5, 50.0),
+    inside=st.floats(0.1, 3.0),
+    outside=st.floats(0.1, 3.0),
+)
+def test_the_throat_and_the_resistance_after_it_pass_the_same_flow(sonic_psi_s, critical, rate_per_s, inside, outside):
+    """ISO 6358-1's flow between the pressures upstream and downstream of a throat, in atmospheres, without the closed
+    form: at the pressure between both, found by bisection, the flows agree."""
+    assume(abs(inside - outside) > 1e-3)
+
+    def sonic(between: float) -> float:
+        up, down = max(outside, between), min(outside, between)
+        over = max((down / up - critical) / (1.0 - critical), 0.0)
+        return np.sign(outside - between) * sonic_psi_s * up * np.sqrt(max(1.0 - over * over, 0.0))
+
+    atmosphere_psi = 14.696
+    between = optimize.brentq(lambda p: sonic(p) - rate_per_s * atmosphere_psi * (p - inside), inside, outside)
+    factor = choked_flow.filling(
+        1.0 / sonic_psi_s, 2.0, 0.5, 0.5, 1.0, critical, rate_per_s,
+        (inside - 1.0) * atmosphere_psi, (outside - 1.0) * atmosphere_psi, 1.0,
+    )  # fmt: skip
+    assert factor * (outside - inside) == pytest.approx(rate_per_s * (between - inside), rel=1e-5, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", sorted(effects.library()))
