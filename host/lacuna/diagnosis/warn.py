@@ -41,7 +41,7 @@ def _parameters(fitted: Fit) -> list[str]:
         f"{e.name} is at its bound ({_quantity(told(e.name, _bound(fitted, e)), e.unit)}): widen it if it is no"
         " physical limit."
         for e in known.estimates
-        if e.at_bound
+        if e.at_bound and e.determined
     ]
     found += [
         f"{e.name} = {_quantity(told(e.name, e.value), e.unit)} lies outside its plausible range."

@@ -343,6 +343,17 @@ def test_warns_of_a_direction_that_the_data_leave_open():
     assert "hardly determine a combination of gain_K_W, volts" in said
 
 
+def test_what_the_data_leave_open_is_not_told_to_be_at_its_bound():
+    def simulate(record, theta):
+        warm = heater.lag(theta.gain_K_W * record["power_W"], theta.tau_s)
+        return {"temperature_K": warm + 1e-9 * theta.idle}
+
+    parameters = (*heater.PARAMETERS, Parameter("idle", "", 1.0, 1.0, 3.0))
+    said = warned(lacuna.System(simulate, parameters), heater.records(repeats=2, seed=3))
+    assert "hardly determine idle" in said
+    assert "bound" not in said
+
+
 def test_warns_of_a_nuisance_at_its_limit():
     def simulate(record, theta):
         return {"temperature_K": heater.lag(theta.gain_K_W * record["power_W"], theta.tau_s) + theta.drift_K}
