@@ -44,6 +44,14 @@ def test_slip_below_the_tolerance_and_before_the_judged_cycles_is_forgiven():
     assert Metric().judge(progress([50] * 10, slip)).counted_mm_s == pytest.approx([25.0])
 
 
+def test_draws_may_slip_and_their_cycles_differ_and_the_mean_counts():
+    """On a supply that ripples every cycle is another; a robot that falls differs by more."""
+    rippling = progress([50] * 7 + [46, 54, 50], 30)
+    assert Metric().judge(rippling).refused
+    assert Metric().of_draws().judge(rippling).counted_mm_s == pytest.approx([25.0])
+    assert Metric().of_draws().judge(progress([50] * 7 + [50, 45, 35])).refused
+
+
 def test_the_finer_metric_wants_ten_equal_cycles():
     late = [50] * 11 + [50.2] + [50] * 8
     assert Metric().finer().cycles == 20
