@@ -20,7 +20,7 @@ EFFECT = PhysicalEffect(
             -0.5,
             1.5,
             0.5,
-            "1: as the area changes, the air keeps its force; 0: its pressure",
+            "share of the air's force, not its pressure, that stays as the area changes",
             omitted=0.0,
         ),
     ),

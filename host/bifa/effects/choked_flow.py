@@ -21,11 +21,11 @@ EFFECT = PhysicalEffect(
         EffectParameter(
             "saturation_s_per_psi", "s/psi", 0.0, 0.4, 0.045, "1 / the greatest rate, from 1 atm upstream", size=True
         ),
-        EffectParameter("sharpness", "", 1.0, 8.0, 2.0, "how sharp the bend into saturation is"),
-        EffectParameter("upstream", "", -0.5, 1.5, 0.5, "1: limit as the pressure upstream; 0: constant", omitted=0.0),
-        EffectParameter("by_volume", "", -0.5, 1.5, 0.5, "1: limit as 1 / volume; 0: the same for all", omitted=0.0),
-        EffectParameter("throat", "", -0.5, 1.5, 0.5, "1: a throat by ISO 6358; 0: a smooth bend", omitted=0.0),
-        EffectParameter("critical_ratio", "", 0.05, 0.6, 0.3, "of pressures, below which the throat's flow is sonic"),
+        EffectParameter("sharpness", "", 1.0, 8.0, 2.0, "sharpness of the bend into saturation"),
+        EffectParameter("upstream", "", -0.5, 1.5, 0.5, "power of the pressure upstream in the limit", omitted=0.0),
+        EffectParameter("by_volume", "", -0.5, 1.5, 0.5, "power of 1 / volume in the limit", omitted=0.0),
+        EffectParameter("throat", "", -0.5, 1.5, 0.5, "share of a throat by ISO 6358, not of a bend", omitted=0.0),
+        EffectParameter("critical_ratio", "", 0.05, 0.6, 0.3, "critical pressure ratio of the throat"),
     ),
     freed_at=("filling",),
 )

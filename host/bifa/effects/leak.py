@@ -13,8 +13,8 @@ EFFECT = PhysicalEffect(
     confusable_with=("sensor_calibration",),
     parameters=(
         EffectParameter("rate_per_s", "1/s", 0.0, 2.0, 0.05, "share of 8 psi lost in a second", size=True),
-        EffectParameter("exponent", "", 0.3, 1.7, 1.0, "1: lost as the pressure; 0.5: as its root"),
-        EffectParameter("inward", "", -0.5, 1.5, 1.0, "1: into vacuum as out of pressure; 0: only outwards"),
+        EffectParameter("exponent", "", 0.3, 1.7, 1.0, "power of the pressure: 1 laminar, 0.5 an orifice"),
+        EffectParameter("inward", "", -0.5, 1.5, 1.0, "into vacuum, over that out of pressure"),
     ),
     freed_at=("filling",),
 )
