@@ -82,6 +82,16 @@ def test_effects_in_older_files_have_the_form_that_they_had():
     assert effects.complete("line_lag", {"time_s": 0.05}) == {"time_s": 0.05, "delay_share": 0.0}
 
 
+def test_a_line_with_a_delay_is_one_whose_valves_are_late():
+    delayed = robot.nominal().with_effects({"line_lag": {"time_s": 0.05, "delay_share": 0.4}})
+    late = robot.nominal().with_effects(
+        {"line_lag": {"time_s": 0.05, "delay_share": 0.0}, "valve_latency": {"delay_s": 0.02}}
+    )
+    one, other = (simulate.step_response(model, "large").columns for model in (delayed, late))
+    for channel, values in one.items():
+        np.testing.assert_allclose(values, other[channel], rtol=1e-12, err_msg=channel)
+
+
 @given(
     sonic_psi_s=st.floats(1.0, 1000.0),
     critical=st.floats(0.05, 0.6),
