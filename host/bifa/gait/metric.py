@@ -73,8 +73,8 @@ class Metric:
         return replace(self, cycles=6, judged=2, periodic=max(self.periodic, 5e-3), tolerance_m=3e-5)
 
     def of_draws(self) -> "Metric":
-        """For robots that the model may be, the model itself among them: they may slip, and their cycles differ. A speed
-        that is measured counts however a robot comes by it."""
+        """For robots that the model may be, the model itself among them: they may slip, and their cycles differ. A
+        speed that is measured counts however a robot comes by it."""
         return replace(self, slip_m=np.inf, periodic=_PERIODIC_OF_DRAWS)
 
     def judge(self, progress: Advance) -> Judged:
