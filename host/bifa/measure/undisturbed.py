@@ -9,6 +9,7 @@ from bifa.link import Sample
 from bifa.link.table import CHAMBERS
 
 _CONNECTED = {0.0: "vacuum", 1.0: "positive"}
+_SUPPLIES = set(_CONNECTED.values())
 _LATE_US = 27_000  # a supply is held for 21 ms at least and a chamber then vented for 5 (lib/valves/sequencer.h)
 _SAMPLES = 3  # in that time
 
@@ -22,27 +23,31 @@ def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, s
 
     held: what each chamber is connected to in all of them; None where commands change. A chamber that is switched is
     vented for a few milliseconds first, and where it was switched just before, as a gait may at its start, keeps the
-    supply that it had until then.
+    supply that it had until then; the gait's very first switches may have passed before the first sample.
     """
     if not samples:
         raise DisturbedError("the Uno sent no sample in that state: was it stopped at once?")
     begun_s = samples[0].time_us * 1e-6
     for k, sample in enumerate(samples):
         before = [one for one in samples[max(k - _SAMPLES, 0) : k] if sample.time_us - one.time_us <= _LATE_US]
-        if wrong := _wrong(before, sample, state, held):
+        unseen = _SUPPLIES if held is None and sample.time_us - samples[0].time_us <= _LATE_US else set()
+        if wrong := _wrong(before, unseen, sample, state, held):
             after_s = sample.time_us * 1e-6 - begun_s
             raise DisturbedError(f"{after_s:.2f} s after it began {wrong}: the trial is not valid; repeat it")
 
 
-def _wrong(before: Sequence[Sample], sample: Sample, state: str, held: Mapping[str, str] | None) -> str:
-    """What is not as it should be, in words, after the samples just `before`; empty where all is."""
+def _wrong(
+    before: Sequence[Sample], unseen: set[str], sample: Sample, state: str, held: Mapping[str, str] | None
+) -> str:
+    """What is not as it should be, in words, after the samples just `before` and commands that may have been `unseen`;
+    empty where all is."""
     if sample.state != state:
         return f"the robot was {sample.state} instead of {state}"
     for i, chamber in enumerate(CHAMBERS):
         wanted = _CONNECTED.get(sample.command[i], "off")
         if held is not None and wanted != held.get(chamber, "off"):
             return f"the {chamber} was commanded to {wanted} instead of {held.get(chamber, 'off')}"
-        lately = {_CONNECTED.get(one.command[i], "off") for one in before} - {wanted}
+        lately = ({_CONNECTED.get(one.command[i], "off") for one in before} | unseen) - {wanted}
         is_late = wanted != "off" and lately and sample.connected[i] in {"off", *lately}  # it vents at once
         if sample.connected[i] != wanted and not is_late:
             return f"the valves connected the {chamber} to {sample.connected[i]} instead of {wanted}"

@@ -12,6 +12,7 @@ from bifa.measure.recording import bench_of
 from bifa.measure.session import run_session
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.rig import open_rig
+from bifa.robot.gait import Gait
 
 STEP = PlannedTrial("step_response", "small", 8.5)
 TRIALS = (
@@ -89,6 +90,25 @@ def test_valves_that_are_not_as_commanded_are_seen_and_the_dead_time_is_none():
     ):
         with pytest.raises(DisturbedError, match="body"):
             refuse_disturbed([*steady, wrong], "running")
+
+
+def test_a_gait_may_switch_before_its_first_sample():
+    """Valve latency, 800: 3 ms after its start a gait had switched the tail, which kept its first supply for 21."""
+    off = (1.0, 0.0, 0.0)
+    still, there = 0b011001, 0b101001
+    refuse_disturbed([sample(k, command=off, valves=v) for k, v in enumerate((still, still, there))], "running")
+    with pytest.raises(DisturbedError, match=r"0\.03 s after it began .* tail to positive instead of vacuum"):
+        refuse_disturbed([sample(k, command=off, valves=still) for k in range(4)], "running")
+    held = {"body": "positive", "head": "vacuum", "tail": "vacuum"}
+    with pytest.raises(DisturbedError, match=r"0\.00 s"):
+        refuse_disturbed([sample(k, command=off, valves=still) for k in range(2)], "running", held)
+
+
+@pytest.mark.uno
+def test_a_gait_whose_tail_switches_at_once_is_recorded():
+    gait = Gait(2.6197221237725294, 222.68581756593449, 359.5612358226553, 0.649377312597962, *2 * (0.4600540371539032,))
+    trial = recorded(lambda rig, uno: None, PlannedTrial("locomotion", gait=gait, cycles=2), 0.5)
+    assert trial.columns["time_s"][-1] > 2.0 * gait.period_s - 0.02
 
 
 def test_a_chamber_that_is_switched_twice_at_once_keeps_its_supply_for_a_while():
