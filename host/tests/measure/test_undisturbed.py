@@ -106,7 +106,9 @@ def test_a_gait_may_switch_before_its_first_sample():
 
 @pytest.mark.uno
 def test_a_gait_whose_tail_switches_at_once_is_recorded():
-    gait = Gait(2.6197221237725294, 222.68581756593449, 359.5612358226553, 0.649377312597962, *2 * (0.4600540371539032,))
+    gait = Gait(
+        2.6197221237725294, 222.68581756593449, 359.5612358226553, 0.649377312597962, *2 * (0.4600540371539032,)
+    )
     trial = recorded(lambda rig, uno: None, PlannedTrial("locomotion", gait=gait, cycles=2), 0.5)
     assert trial.columns["time_s"][-1] > 2.0 * gait.period_s - 0.02
 
