@@ -57,8 +57,8 @@ def filling(
     difference_psi = abs(inlet_psi - pressure_psi)
     share = slowness / atmospheres**upstream * rate_per_s * difference_psi
     bent = rate_per_s / (1.0 + share**sharpness) ** (1.0 / sharpness)
-    # The throat passes what the resistance does: at a pressure between them that solves a quadratic where the flow is not
-    # sonic. Here it is over the supply's or, emptying, the chamber's; k is alpha over the throat's sonic conductance.
+    # The throat passes what the resistance does, at a pressure between them that solves a quadratic where the flow is
+    # not sonic: here over the supply's or, emptying, the chamber's. k: alpha over the throat's sonic conductance.
     k = rate_per_s * slowness * _ATMOSPHERE_PSI
     squared, steep = k * k, 1.0 / ((1.0 - critical_ratio) * (1.0 - critical_ratio))
     if inlet_psi >= pressure_psi:
