@@ -162,7 +162,10 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        model, effects = trades.complete(dataset)
+        completed, named = trades.complete(dataset)
+        if named or not effects:
+            model, effects = completed, named
+        # Otherwise fits have lost their way: what explained the bench and foretold a walk is not given up for nothing.
         found.append(trades.optimize(model, (*began, *found)))
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)

@@ -9,7 +9,7 @@ import pytest
 from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged, read_rounds
 from bifa.campaign.stages import StageError
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
-from bifa.robot import nominal, save_model
+from bifa.robot import load_model, nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from bifa.simulate import walk
 
@@ -110,6 +110,28 @@ def test_it_ends_where_nothing_changes_any_more(folders):
     assert len(rounds) == ROUNDS, "the second round names something else"
     assert [tuple(r["effects"]) for r in rounds] == [(), ("hysteresis",), ("hysteresis",)]
     assert [r["ended"] for r in rounds] == [None, None, "unchanged"]
+
+
+def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing(folders):
+    """Choked flow, 800: with the walks among the data nothing was named, and the edge was sought of the base model."""
+    inputs, outputs = folders
+    save_model(inputs / "model-completed.toml", ROBOT)
+    searched = []
+
+    def search(model, walked):
+        searched.append(model)
+        return FASTER
+
+    def walk_into(number, model, gait, folder):
+        write_dataset(folder, walked({f"round-{number}": gait}, number))
+        return read_dataset(folder)
+
+    trades = Trades(lambda dataset: (SLIPPERY, ()), search, walk_into)
+    again(inputs, outputs, Dataset(None, "day", {}, ()), ("hysteresis",), trades)
+    rounds = json.loads((outputs / "rounds.json").read_text())
+    assert [r["effects"] for r in rounds] == [["hysteresis"], ["hysteresis"]]
+    assert searched[0]["mu_k"] == pytest.approx(ROBOT["mu_k"])
+    assert load_model(outputs / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"])
 
 
 def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
