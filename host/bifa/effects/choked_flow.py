@@ -24,7 +24,7 @@ EFFECT = PhysicalEffect(
         EffectParameter("sharpness", "", 1.0, 8.0, 2.0, "sharpness of the bend into saturation"),
         EffectParameter("upstream", "", -0.5, 1.5, 0.5, "power of the pressure upstream in the limit", omitted=0.0),
         EffectParameter("by_volume", "", -0.5, 1.5, 0.5, "power of 1 / volume in the limit", omitted=0.0),
-        EffectParameter("throat", "", -0.5, 1.5, 0.5, "share of a throat by ISO 6358, not of a bend", omitted=0.0),
+        EffectParameter("throat", "", -0.5, 1.5, 0.0, "share of a throat by ISO 6358, not of a bend"),
         EffectParameter("critical_ratio", "", 0.05, 0.6, 0.3, "critical pressure ratio of the throat"),
     ),
     freed_at=("filling",),
