@@ -163,9 +163,9 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         completed, named = trades.complete(dataset)
+        # Where nothing is named any more fits have lost their way: what explained the bench is not given up for that.
         if named or not effects:
             model, effects = completed, named
-        # Otherwise fits have lost their way: what explained the bench and foretold a walk is not given up for nothing.
         found.append(trades.optimize(model, (*began, *found)))
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)

@@ -54,7 +54,7 @@ EXPLORE = RobustRound(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
     RobustRound(32, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 400, 0.05),
-    RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 200, 0.015, True),
+    RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 200, 0.015, in_full=True),
 )
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008), in_full=True)
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail

@@ -27,13 +27,12 @@ def refuse_disturbed(samples: Sequence[Sample], state: str, held: Mapping[str, s
     """
     if not samples:
         raise DisturbedError("the Uno sent no sample in that state: was it stopped at once?")
-    begun_s = samples[0].time_us * 1e-6
     for k, sample in enumerate(samples):
         before = [one for one in samples[max(k - _SAMPLES, 0) : k] if sample.time_us - one.time_us <= _LATE_US]
-        unseen = _SUPPLIES if held is None and sample.time_us - samples[0].time_us <= _LATE_US else set()
+        after_us = sample.time_us - samples[0].time_us
+        unseen = _SUPPLIES if held is None and after_us <= _LATE_US else set()
         if wrong := _wrong(before, unseen, sample, state, held):
-            after_s = sample.time_us * 1e-6 - begun_s
-            raise DisturbedError(f"{after_s:.2f} s after it began {wrong}: the trial is not valid; repeat it")
+            raise DisturbedError(f"{1e-6 * after_us:.2f} s after it began {wrong}: the trial is not valid; repeat it")
 
 
 def _wrong(
