@@ -95,11 +95,11 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 
 @dataclass(frozen=True)
 class Trades:
-    """What a round is made of: a diagnosis of all data gives the completed model and what it names, an optimiser its
-    gait, beginning from those walked before, and the robot walks it into a data set; walk(number, model, gait, folder)
-    numbers the rounds from 2 on."""
+    """What a round is made of: a diagnosis of all data, which suspects what was named before, gives the completed model
+    and what it names, an optimiser its gait, beginning from those walked before, and the robot walks it into a data
+    set; walk(number, model, gait, folder) numbers the rounds from 2 on."""
 
-    complete: Callable[[Dataset], tuple[Model, tuple[str, ...]]]
+    complete: Callable[[Dataset, tuple[str, ...]], tuple[Model, tuple[str, ...]]]
     optimize: Callable[[Model, tuple[Gait, ...]], Gait]
     walk: Callable[[int, Model, Gait, Path], Dataset]
 
@@ -162,7 +162,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
-        completed, named = trades.complete(dataset)
+        completed, named = trades.complete(dataset, effects)
         # Where nothing is named any more fits have lost their way: what explained the bench is not given up for that.
         if named or not effects:
             model, effects = completed, named

@@ -1,6 +1,7 @@
 """The whole loop: measure, fit, walk, find what is missing, optimise with it, walk again, compare."""
 
 import json
+from collections.abc import Collection
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -165,13 +166,16 @@ def _walk(
     return Stage(name, title, needs, (walks,), run, settings, resumes=kept, by_hand=kept)
 
 
-def _diagnosed(dataset: Dataset, setup: Setup, on_progress: OnProgress) -> Diagnosis:
-    return diagnose(prepare(dataset), seed=setup.seed, on_progress=lambda what: on_progress(spoken(what), 0.0))
+def _diagnosed(dataset: Dataset, suspected: Collection[str], setup: Setup, on_progress: OnProgress) -> Diagnosis:
+    def said(what: str) -> None:
+        on_progress(spoken(what), 0.0)
+
+    return diagnose(prepare(dataset), seed=setup.seed, suspected=suspected, on_progress=said)
 
 
 def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
-    def diagnosed(dataset: Dataset) -> Diagnosis:
-        return _diagnosed(dataset, setup, on_progress)
+    def diagnosed(dataset: Dataset, suspected: Collection[str] = ()) -> Diagnosis:
+        return _diagnosed(dataset, suspected, setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -196,8 +200,8 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
 
 def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
-    def complete(dataset: Dataset) -> tuple[Model, tuple[str, ...]]:
-        found = _diagnosed(dataset, setup, on_progress)
+    def complete(dataset: Dataset, suspected: tuple[str, ...]) -> tuple[Model, tuple[str, ...]]:
+        found = _diagnosed(dataset, suspected, setup, on_progress)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +22,7 @@ SPECIMEN = ("sealed", "profile", "effects", "parameters")  # of a virtual rig: w
 _WALK_CYCLES = 4
 
 OpenRig = Callable[[int], AbstractContextManager[Rig]]
-Diagnose = Callable[[Dataset], Diagnosis]
+Diagnose = Callable[[Dataset, Collection[str]], Diagnosis]
 
 
 def resolve(
@@ -37,8 +37,9 @@ def resolve(
     """As long as `found` names an experiment that separates what it confuses, run that and diagnose again: until the
     set is one, nothing on offer separates it, or after `ROUNDS` experiments.
 
-    open_rig(n) gives the rig for experiment number n, from 1 on; its data set goes to `folder`/separate-n. Returns all
-    trials as one data set, the last diagnosis, and the experiments that were run.
+    open_rig(n) gives the rig for experiment number n, from 1 on; its data set goes to `folder`/separate-n.
+    diagnose(dataset, suspected) suspects what was named before and what it was confused with. Returns all trials as
+    one data set, the last diagnosis, and the experiments that were run.
     """
     ran: list[NextExperiment] = []
     for number in range(1, ROUNDS + 1):
@@ -58,7 +59,7 @@ def resolve(
             )
         dataset = joined(dataset, read_dataset(folder / f"separate-{number}"), f"separate-{number}_")
         ran.append(found.next)
-        found = diagnose(dataset)
+        found = diagnose(dataset, {*found.next.separates, *(effect.name for effect in found.effects)})
     return dataset, found, tuple(ran)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -121,10 +122,10 @@ def _found(
         def said(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
 
-        def diagnosed(trials: Dataset) -> Diagnosis:
+        def diagnosed(trials: Dataset, suspected: Collection[str] = ()) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
-            return diagnose(system, seed=seed, on_progress=said, executor=executor)
+            return diagnose(system, seed=seed, suspected=suspected, on_progress=said, executor=executor)
 
         with workers as (executor, _):
             found = diagnosed(measured)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import wraps
 from typing import Any, TypeVar
 
@@ -65,14 +65,14 @@ def _once(ask: Callable[[Case, Candidate], Answer]) -> Callable[[Case, Candidate
 class Case:
     """Answers what the search and the verdict ask about a candidate, each refit and each test made once."""
 
-    def __init__(self, system: System, split: Split, policy: Policy, seed: int):
-        self.system, self.split, self.policy, self.seed = system, split, policy, seed
+    def __init__(self, system: System, split: Split, policy: Policy, seed: int, suspected: Collection[str] = ()):
+        self.system, self.split, self.policy, self.seed, self.suspected = system, split, policy, seed, suspected
         self.by_turns: dict[Candidate, Candidate] = {}  # without repeats: as they predict each record from the others
         self._answers: dict[tuple[str, Candidate], Any] = {}
 
     def ruled_by(self, policy: Policy) -> Case:
         """The same case under other rules of decision: fits are kept, what rules decide is asked again."""
-        other = Case(self.system, self.split, policy, self.seed)
+        other = Case(self.system, self.split, policy, self.seed, self.suspected)
         other._answers = {asked: found for asked, found in self._answers.items() if asked[0] in _FITS}
         return other
 

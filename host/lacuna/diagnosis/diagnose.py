@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import cast
@@ -108,11 +109,13 @@ def diagnose(
     seed: int = 0,
     starts: int = 1,
     policy: Policy = POLICY,
+    suspected: Collection[str] = (),
     on_progress: OnProgress = lambda _: None,
     executor: Executor | None = None,
 ) -> Diagnosis:
-    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Explanations are tried
-    on `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves are tried ends that
+    """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Effects that are
+    `suspected`, as by a diagnosis of fewer trials, are fitted whatever they promise. Explanations are tried on
+    `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves are tried ends that
     with the best so far. Raises MisuseError before the search where the system or its trials would mislead it."""
     began = time.monotonic()
     cautions = check(system)
@@ -121,7 +124,8 @@ def diagnose(
         raise TooLittleDataError(
             "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."
         )
-    case, hand = Case(system, split, policy, seed), Stoppable(Workers(on_progress, executor, forks=system.forks))
+    case = Case(system, split, policy, seed, suspected)
+    hand = Stoppable(Workers(on_progress, executor, forks=system.forks))
     hand.on_progress("fitting the base model")
     found = explanations(case, case.fit_base(starts), hand)
     hand.on_progress("deciding what is supported")

@@ -74,14 +74,14 @@ def search(
     scores = score(first.fitted, list(case.system.effects), workers)
     tried: dict[frozenset[str], Candidate] = {frozenset(): first}
     freed: list[Candidate] = []
-    found = raced(first, _singles(scores))
+    found = raced(first, _singles(case, scores))
     if better := led_out(first, found, split):
         workers.on_progress("the base model was in a wrong minimum: from the better one")
         if enough(better):
             return Search(better, floor, (better, *found), scores.screened())
         scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), workers), better
         begun = {one.effects for one in found}  # cold: they owe nothing to the base model
-        found += raced(better, [e for e in _singles(scores) if e.problem.structure.effects not in begun])
+        found += raced(better, [e for e in _singles(case, scores) if e.problem.structure.effects not in begun])
     _keep(tried, found)
     for size in range(1, LARGEST_SET + 1):
         ranked = _ranked(tried, size)
@@ -117,10 +117,14 @@ def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate
     return sorted((c for s, c in tried.items() if len(s) == size), key=lambda c: c.cost)
 
 
-def _singles(scores: Scores) -> list[Promise]:
-    """The effects that promise most, and those of which a score says little."""
-    ranked, library = scores.singles(), scores.parent.structure.system.effects
-    return [p for k, p in enumerate(ranked) if k < _RACED[1] or _blind(library[p.effect])]
+def _singles(case: Case, scores: Scores) -> list[Promise]:
+    """The effects that promise most, those of which a score says little, and the suspected ones."""
+    library = case.system.effects
+    return [
+        promise
+        for rank, promise in enumerate(scores.singles())
+        if rank < _RACED[1] or _blind(library[promise.effect]) or promise.effect in case.suspected
+    ]
 
 
 def _blind(effect: Effect) -> bool:
@@ -132,8 +136,9 @@ def _larger(
     case: Case, tried: dict[frozenset[str], Candidate], ranked: Sequence[Candidate], workers: Workers
 ) -> list[Promise]:
     """Sets of one effect more, those first that promise to cost least: grown from the best, of the very best with what
-    a score may miss, too; and of what the best have, two and two, since a limit that another one has taken the place of
-    promises nothing beside it. None if none promises to take its share of what the best leaves away."""
+    a score may miss and what is suspected, too; and of what the best have, two and two, since a limit that another one
+    has taken the place of promises nothing beside it. None if none promises to take its share of what the best leaves
+    away."""
     base, best, library = tried[frozenset()], ranked[0], case.system.effects
     size, always, offers = len(best.effects) + 1, [], []
     for parent in ranked[:_PARENTS]:
@@ -141,7 +146,7 @@ def _larger(
         for promise in score(with_derivatives(parent).fitted, fresh, workers).singles():
             gain = best.fitted.cost - parent.fitted.cost + promise.gain
             offers.append(promise._replace(gain=gain))
-            if parent is best and library[promise.effect].apart:
+            if parent is best and (library[promise.effect].apart or promise.effect in case.suspected):
                 always.append(offers[-1])
     for one, other in combinations(ranked[:_JOINED], 2):
         if len({*one.effects, *other.effects}) == size:

@@ -58,10 +58,11 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
     """again() with a completed model `first` and diagnoses that answer `later` in turn; rounds and data they saw."""
     inputs, outputs = folders
     save_model(inputs / "model-completed.toml", first)
-    seen, answers, left, begun = [], iter(later), iter(gaits), []
+    seen, answers, left, begun, asked = [], iter(later), iter(gaits), [], []
 
-    def complete(dataset):
+    def complete(dataset, suspected):
         seen.append([trial.file for trial in dataset.trials])
+        asked.append(suspected)
         return next(answers), ("hysteresis",)
 
     def walk_into(number, model, gait, folder):
@@ -74,6 +75,7 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
 
     again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, search, walk_into))
     assert begun == [(FASTER, FAST, *gaits[:number]) for number in range(len(begun))], "from all that were walked"
+    assert asked == [(), *[("hysteresis",)] * (len(asked) - 1)], "what was named before is tried again"
     return json.loads((outputs / "rounds.json").read_text()), seen
 
 
@@ -126,7 +128,7 @@ def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing
         write_dataset(folder, walked({f"round-{number}": gait}, number))
         return read_dataset(folder)
 
-    trades = Trades(lambda dataset: (SLIPPERY, ()), search, walk_into)
+    trades = Trades(lambda dataset, suspected: (SLIPPERY, ()), search, walk_into)
     again(inputs, outputs, Dataset(None, "day", {}, ()), ("hysteresis",), trades)
     rounds = json.loads((outputs / "rounds.json").read_text())
     assert [r["effects"] for r in rounds] == [["hysteresis"], ["hysteresis"]]
@@ -140,7 +142,7 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
     save_model(inputs / "model-completed.toml", ROBOT)
     seen = []
 
-    def complete(dataset):
+    def complete(dataset, suspected):
         seen.append(sorted({trial.file.split("/")[0] for trial in dataset.trials}))
         return ROBOT, ()
 

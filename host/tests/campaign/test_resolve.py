@@ -44,16 +44,16 @@ def test_trials_measured_later_are_further_repeats_under_names_of_their_own():
 def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
     seen = []
 
-    def diagnose(dataset):
-        seen.append(dataset)
-        return SimpleNamespace(next=NextExperiment())
+    def diagnose(dataset, suspected):
+        seen.append((dataset, suspected))
+        return SimpleNamespace(next=NextExperiment(), effects=())
 
     day = Dataset(None, "day", {}, (), {})
-    found = SimpleNamespace(next=SEPARATING)
+    found = SimpleNamespace(next=SEPARATING, effects=(SimpleNamespace(name="leak"),))
     dataset, found, ran = resolve(day, found, diagnose, lambda n: open_rig("virtual", seed=n), tmp_path)
     assert ran == (SEPARATING,)
     assert found.next.experiment is None
-    assert seen == [dataset]
+    assert seen == [(dataset, {"leak", "hysteresis", "viscoelasticity"})], "what was named is tried again"
     assert [t.actuator for t in dataset.trials] == ["small"] * 3
     assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
 
@@ -61,7 +61,7 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
 @pytest.mark.uno
 def test_it_gives_up_where_experiments_do_not_help(tmp_path):
     day = Dataset(None, "day", {}, (), {})
-    confused = SimpleNamespace(next=SEPARATING)
-    _, found, ran = resolve(day, confused, lambda _: confused, lambda n: open_rig("virtual", seed=n), tmp_path)
+    confused = SimpleNamespace(next=SEPARATING, effects=())
+    _, found, ran = resolve(day, confused, lambda *_: confused, lambda n: open_rig("virtual", seed=n), tmp_path)
     assert found is confused
     assert len(ran) == ROUNDS

@@ -15,6 +15,7 @@ from lacuna.diagnosis.learn import learn_correction
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import cold, cold_starts, initial_guess, joined, race, to_the_end
 from lacuna.diagnosis.score import score
+from lacuna.diagnosis.search import search
 from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on
@@ -67,6 +68,27 @@ def test_a_secant_is_followed_only_forwards_and_not_too_far(effects):
         secant = next(k for k, one in enumerate(found.secants) if one.start is promise.start)
         assert promise.gain >= 0.0
         assert promise.gain <= -3.0 * found.push[secant] + 1e-9
+
+
+def test_what_is_suspected_is_fitted_whatever_it_promises():
+    def simulate(record, theta):
+        return {
+            "y": theta.slope * TIME_S + sum(theta[f"{name}.size"] * np.cos(k * TIME_S) for k, name in enumerate(names))
+        }
+
+    names = [f"tone_{k}" for k in range(9)]
+    effects = [Effect(name, Parameter("size", "", 0.02, -5.0, 5.0)) for name in names]
+    system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -9.0, 9.0)], effects, sensor_noise={"y": 0.1})
+    draw, tones = np.random.default_rng(5), sum(0.03 * np.cos(k * TIME_S) for k in range(8))
+    records = [
+        {"time_s": TIME_S, "k": k, "y": 2.0 * TIME_S + tones + 0.1 * draw.standard_normal(200)} for k in range(8)
+    ]
+    system = with_records(system, records)
+    for suspected in ((), ("tone_8",)):
+        case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0, suspected)
+        found = search(case, case.judge(case.fit_base(1)), enough=lambda _: False, workers=NOBODY)
+        tried = {c.effects for c in found.tried if "tone_8" in c.effects}
+        assert {len(effects) for effects in tried} >= {1, 2} if suspected else not tried
 
 
 def test_what_the_base_can_do_is_absorbed_and_says_nothing():
