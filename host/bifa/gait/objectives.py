@@ -31,7 +31,8 @@ class RobustSpeed:
 
     Draws come one round at a time. With n draws the quantile is the r-th smallest speed, r = ceil(share n), so
     the r-th smallest met so far bounds it from above: a gait whose bound is below `abandon` of the best value
-    is given up, and the bound is its value. Draws that gave up most gaits come first.
+    is given up, and the bound is its value. Draws that gave up most gaits come first, and a gait is settled where a
+    round lowers its bound no more: the rest are easier.
     """
 
     def __init__(
@@ -60,17 +61,19 @@ class RobustSpeed:
         bound = self._own(points)
         alive = np.flatnonzero(bound >= max(self._abandon * self._best, 1e-9))
         done, size = 0, _FIRST_DRAWS + self._rank
+        told = size if self._failures.any() else draws  # how many a gait meets before a round may tell of the rest
         while alive.size and done < draws:
             batch = order[done : done + size]
             gaits, which = np.repeat(alive, len(batch)), np.tile(batch, alive.size)
             met[gaits, which] = self._speeds(rows[gaits], which)
             done, size = done + len(batch), 2 * size
-            bound[alive] = np.minimum(bound[alive], np.partition(met[alive], self._rank - 1)[:, self._rank - 1])
+            slowest = np.partition(met[alive], self._rank - 1)[:, self._rank - 1]
+            settled = (slowest >= bound[alive]) & (done > told) | (done >= draws)
+            bound[alive] = np.minimum(bound[alive], slowest)
             low = met[np.ix_(alive, batch)] < self._abandon * np.maximum(bound[alive], self._best)[:, None]
             self._failures[batch] += low.mean(axis=0)
-            if done >= draws:
-                self._best = max(self._best, float(bound[alive].max()))
-            alive = alive[bound[alive] >= max(self._abandon * self._best, 1e-9)]
+            self._best = max(self._best, bound[alive[settled]].max(initial=0.0))
+            alive = alive[~settled & (bound[alive] >= max(self._abandon * self._best, 1e-9))]
         return bound
 
     def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from bifa.errors import BifaError
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import basins, climb, climb_basins
+from bifa.gait.methods.cma_es import basins, climb, climb_basins, climb_together
 from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
@@ -25,7 +25,8 @@ OnProgress = Callable[[str, float, float], None]
 
 VERIFYING_DRAWS = 1024  # robots that the chosen gait meets, all new
 _NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 6
-# Of cma the most, for a landscape with many basins: it ends when its best runs agree.
+# Of cma the most, for a landscape with many basins: it ends when its best runs agree. Half of them, where what is
+# fastest on the model is only where a search on robots begins.
 EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
 _POPULATION = 12
 
@@ -34,8 +35,9 @@ _POPULATION = 12
 class RobustRound:
     """Of a robust search: how many robots a gait meets, what quantile of the speed counts, the share of the best value
     at which a gait is given up, the integrator's tolerance; the changes of period, in parts, that the gaits of the
-    round before are tried with; and of the CMA-ES run on that: the most evaluations, its first step. `in_full`: walks
-    have the metric's own number of cycles, since the quick one's are too few for those that settle late."""
+    round before are tried with; and of the CMA-ES runs on that: the most evaluations, their first step, from how many
+    basins. `in_full`: walks have the metric's own number of cycles, since the quick one's are too few for those that
+    settle late."""
 
     draws: int
     quantile: float
@@ -44,6 +46,7 @@ class RobustRound:
     periods: tuple[float, ...] = (0.0,)
     evaluations: int = 0
     step: float = 0.0
+    climbs: int = 1
     in_full: bool = False
 
 
@@ -53,15 +56,16 @@ EXPLORE = RobustRound(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    RobustRound(32, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 400, 0.05),
+    RobustRound(32, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 1000, 0.05, climbs=3),
     RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 200, 0.015, in_full=True),
 )
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008), in_full=True)
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
 # on others. Slower by these parts if need be.
-_CHECKING_DRAWS, _CHECK_QUANTILE = 768, 0.085
+_CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
 _BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
+_APART = 0.12  # of two basins
 _NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at one place, and at others
 _PROMISED = 0.5  # of the best value, that a gait has to keep when it is checked
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
@@ -224,12 +228,16 @@ def explore_on_robots(
 
 
 def _budget(settings: Settings) -> int:
-    return settings.evaluations or EVALUATIONS[settings.method]
+    return settings.evaluations or _usual(settings)
+
+
+def _usual(settings: Settings) -> int:
+    return EVALUATIONS[settings.method] // (2 if settings.robust else 1)
 
 
 def _scaled(evaluations: int, settings: Settings) -> int:
     """As many more or fewer than usual as of the method's."""
-    return max(2 * _POPULATION, round(evaluations * _budget(settings) / EVALUATIONS[settings.method]))
+    return max(2 * _POPULATION, round(evaluations * _budget(settings) / _usual(settings)))
 
 
 def _refine(objective: Objective, explored: Evaluated, settings: Settings, on_progress: OnProgress) -> Evaluated:
@@ -247,7 +255,7 @@ def _refine(objective: Objective, explored: Evaluated, settings: Settings, on_pr
 def _refine_on_robots(
     model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> list[Evaluated]:
-    """CMA-ES in rounds of more robots each, every time from the gait of the round before that these robots like best:
+    """CMA-ES in rounds of more robots each, every time from the gaits of the round before that these robots like best:
     what was best on few robots may owe it to them."""
     found, starts = [explored], _STARTS
     for number, stage in enumerate(_REFINE, start=1):
@@ -260,7 +268,8 @@ def _refine_on_robots(
         recorder = RecordedObjective(objective, settings.space.wraps, show)
         for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=_FAR)):
             recorder(points)
-        climb(recorder, recorder.found().best_point, stage.step, budget, settings.seed, _POPULATION)
+        begun = recorder.found().finalists(stage.climbs, _APART, settings.space.wraps)
+        climb_together(recorder, begun, budget, settings.seed, _POPULATION, stage.step)
         found.append(recorder.found())
         starts = _POPULATION // 2
     return found[1:]
