@@ -41,6 +41,7 @@ def diagnose(
     n_jobs: int | None = None,
     executor: Executor | None = None,
     policy: Policy = POLICY,
+    suspected: Iterable[str] = (),
     progress: Callable[[str], None] | bool = True,
 ) -> Verdict:
     """What the model of `system` lacks, judged by `records`.
@@ -51,8 +52,9 @@ def diagnose(
     by default some of each condition. `starts`: number of initial points of the base model's fit. `n_jobs`: number of
     processes that try explanations, -1 for one per core; by default one process with a thread per core, which suits a
     `simulate` that releases the GIL (NumPy, numba). `executor`: used instead of these, any from `concurrent.futures`,
-    or dask's. `progress`: a function called with a description of each step, or False for silence; the steps are
-    logged, too (`logging`, "lacuna").
+    or dask's. `suspected`: effects that are fitted whatever they promise, since something else speaks for them, such as
+    a verdict on other records; they are judged like all others. `progress`: a function called with a description of
+    each step, or False for silence; the steps are logged, too (`logging`, "lacuna").
 
     Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
     before the search, naming trial and channel.
@@ -70,7 +72,8 @@ def diagnose(
         shown(what)
 
     system, in_steps = _in_steps(system)
-    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "on_progress": reported}
+    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "suspected": tuple(suspected)}
+    how["on_progress"] = reported
     try:
         with _workers(n_jobs, executor) as workers:
 

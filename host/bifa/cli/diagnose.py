@@ -30,6 +30,7 @@ EXAMPLES = (
     "bifa diagnose out/bench --json verdict.json",
     "bifa diagnose out/bench --out model.toml --report report.html",
     "bifa diagnose out/bench --matters displacement_mm=0.5",
+    "bifa diagnose out/bench --suspect choked_flow",
     "bifa diagnose out/bench --port virtual --resolve",
     "bifa diagnose out/bench --dask tcp://scheduler:8786",
 )
@@ -54,6 +55,14 @@ def diagnose(
         typer.Option(
             help="RMS error that is good enough, such as displacement_mm=0.5; repeatable. By default a tenth of the"
             " noise floor.",
+            show_default=False,
+        ),
+    ] = None,
+    suspect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Effect that is fitted whatever it promises, such as one that was named before; repeatable. It is"
+            " judged like all others.",
             show_default=False,
         ),
     ] = None,
@@ -88,7 +97,7 @@ def diagnose(
         refuse_leftovers(folder)
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
-    found = _found(console, measured, robot, good_enough, seed, folder, port, watch, workers)
+    found = _found(console, measured, robot, good_enough, suspect or (), seed, folder, port, watch, workers)
     _report(console, measured, found, json, out, report)
 
 
@@ -97,6 +106,7 @@ def _found(
     measured: Dataset,
     robot: Model | None,
     good_enough: dict[str, float],
+    suspected: Collection[str],
     seed: int,
     resolved: Path | None,
     port: str | None,
@@ -122,10 +132,10 @@ def _found(
         def said(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
 
-        def diagnosed(trials: Dataset, suspected: Collection[str] = ()) -> Diagnosis:
+        def diagnosed(trials: Dataset, named: Collection[str] = ()) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
-            return diagnose(system, seed=seed, suspected=suspected, on_progress=said, executor=executor)
+            return diagnose(system, seed=seed, suspected={*suspected, *named}, on_progress=said, executor=executor)
 
         with workers as (executor, _):
             found = diagnosed(measured)

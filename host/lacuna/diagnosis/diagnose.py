@@ -41,7 +41,7 @@ from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Found, Stoppable
 from lacuna.diagnosis.warn import warnings_of
 from lacuna.diagnosis.workers import OnProgress, Workers
-from lacuna.errors import TooLittleDataError
+from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
@@ -118,6 +118,8 @@ def diagnose(
     `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves are tried ends that
     with the best so far. Raises MisuseError before the search where the system or its trials would mislead it."""
     began = time.monotonic()
+    if unknown := sorted(set(suspected) - set(system.effects)):
+        raise MisuseError(f"suspected: there is no effect {unknown[0]!r}; there are {', '.join(system.effects)}.")
     cautions = check(system)
     split = split_trials(system.trials, system.spare(), system.test())
     if not split.fit or not split.judging:

@@ -18,6 +18,7 @@ from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import search
 from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Workers
+from lacuna.errors import MisuseError
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.solve import cost_of
@@ -89,6 +90,8 @@ def test_what_is_suspected_is_fitted_whatever_it_promises():
         found = search(case, case.judge(case.fit_base(1)), enough=lambda _: False, workers=NOBODY)
         tried = {c.effects for c in found.tried if "tone_8" in c.effects}
         assert {len(effects) for effects in tried} >= {1, 2} if suspected else not tried
+    with pytest.raises(MisuseError, match="suspected: there is no effect 'tone_9'; there are tone_0, tone_1"):
+        lacuna.diagnose(system, suspected=["tone_8", "tone_9"], progress=False)
 
 
 def test_what_the_base_can_do_is_absorbed_and_says_nothing():
