@@ -122,11 +122,11 @@ def _gait_of(
 ) -> tuple[Gait, dict[str, Any]]:
     """The gait found with a model, robust against `spread` or, None, against what is known, and where it comes from. A
     base model that lacks much may have none that walks, and neither may a robot whose bench shakes it: that ends no
-    campaign, and the baseline stands in."""
+    campaign, and the gait walked last stands in, or the baseline."""
     try:
         best = found_gait(robot, setup.seed, spread, on_progress, walked)
     except SearchError as error:
-        return BASELINE, {"made_by": "bifa campaign", "instead_of": f"a gait of {robot.name}: {error}"}
+        return (BASELINE, *walked)[-1], {"made_by": "bifa campaign", "instead_of": f"a gait of {robot.name}: {error}"}
     return best.gait, provenance(best, robot.name, "bifa campaign")
 
 

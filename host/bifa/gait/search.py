@@ -12,13 +12,13 @@ from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import FINE_M, Prediction, predict_speed
+from bifa.gait.prediction import FELL, FINE_M, Prediction, predict_speed
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
-from bifa.simulate import gait_rows, plant
+from bifa.simulate import Plant, gait_rows, plant
 
 # (stage, share of the stage that is done, best value so far in mm/s) -> None
 OnProgress = Callable[[str, float, float], None]
@@ -81,7 +81,8 @@ class Settings:
     """How to search. `evaluations` None: a number that suits the method. `spread` None: what is known of the model, or
     2 % where nothing was fitted; `naive`: of that the covariance alone. `share`: of the robots, how many may be slower
     than what is maximised. `refine`: follow the method with small CMA-ES runs from its best points (the paper did not).
-    `begin`: gaits that are known to walk, from which the search begins as well.
+    `begin`: gaits that are known to walk: the search begins from them as well, and of what is known of the model robots
+    that do not walk with them are left out.
     """
 
     method: str = "cma"
@@ -171,7 +172,7 @@ def optimize(
     else:
         refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
-    fresh = spread.plants(model, VERIFYING_DRAWS, settings.seed + 2_000_003)
+    fresh = possible_robots(model, runs, spread, settings, VERIFYING_DRAWS, settings.seed + 2_000_003)
     speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M))[0]
     on_progress("verify", 1.0, nominal)
     return Optimum(
@@ -279,10 +280,26 @@ def on_robots(
     model: Model, runs: Simulations, spread: Knowledge, settings: Settings, stage: RobustRound, number: int
 ) -> RobustSpeed:
     """The objective of a round, on robots of its own."""
-    draws = spread.plants(model, stage.draws, settings.seed + 500_000 * number)
+    draws = possible_robots(model, runs, spread, settings, stage.draws, settings.seed + 500_000 * number)
     metric = replace(settings.metric if stage.in_full else settings.metric.quicker(), tolerance_m=stage.tolerance_m)
     share = stage.quantile * settings.share / QUANTILE
     return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon)
+
+
+def possible_robots(
+    model: Model, runs: Simulations, spread: Knowledge, settings: Settings, count: int, seed: int
+) -> list[Plant]:
+    """`count` robots that the model may be: they walk with the gaits that it is known to walk with, which a covariance
+    does not know. Where hardly half of those drawn do, the model does not know either, and they are as drawn; so they
+    are if the spread is a guess."""
+    begin = () if spread.is_guess else settings.begin
+    drawn = spread.plants(model, 2 * count if begin else count, seed)
+    if not begin:
+        return drawn
+    speeds = distribution(runs, drawn, gait_rows(begin), settings.metric.quicker())
+    walk = (speeds >= FELL * np.median(speeds, axis=1, keepdims=True)).all(axis=0)
+    walking = [robot for robot, walks in zip(drawn, walk, strict=True) if walks]
+    return walking[:count] if len(walking) >= count else drawn[:count]
 
 
 def _nominally(
@@ -322,7 +339,7 @@ def best_of_finalists(
     on_progress("verify", 0.6, float(values.max()))
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
-    checking = spread.plants(model, _CHECKING_DRAWS, settings.seed + 2_500_000)
+    checking = possible_robots(model, runs, spread, settings, _CHECKING_DRAWS, settings.seed + 2_500_000)
     metric = replace(settings.metric, tolerance_m=FINE_M)
     # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
     least = max(_PROMISED * float(values.max()), STANDING_MM_S)

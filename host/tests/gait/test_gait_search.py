@@ -8,7 +8,14 @@ import pytest
 from bifa.gait import Metric, SearchError, Settings, library, optimize, paper_space, simulations
 from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
-from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, best_of_finalists, explore_on_robots, on_robots
+from bifa.gait.search import (
+    EXPLORE,
+    VERIFYING_DRAWS,
+    best_of_finalists,
+    explore_on_robots,
+    on_robots,
+    possible_robots,
+)
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Gait, nominal
 from bifa.simulate import gait_rows, plant
@@ -207,3 +214,19 @@ def test_no_scheduler_and_no_workers_are_named():
 
     with pytest.raises(ClusterError, match="no dask scheduler answers at"), simulations(dask="nonsense://x"):
         pass
+
+
+def test_robots_that_do_not_walk_with_a_gait_that_is_known_to_walk_are_none_of_those_it_may_be(runs):
+    """Stribeck friction, 830: by the covariance alone a fifth stood still with gaits that had been walked, and the
+    search at the edge ended at the baseline."""
+    wide, known = replace(spread_of(nominal(), 0.05), is_guess=False), gait_of(ROBUST[0])
+    metric = Metric().quicker()
+
+    def slowest(settings, count=48):
+        robots = possible_robots(nominal(), runs, wide, settings, count, 7)
+        assert len(robots) == count
+        speeds = distribution(runs, robots, gait_rows([known]), metric)[0]
+        return speeds.min() / np.median(speeds)
+
+    assert slowest(Settings()) < 0.5
+    assert slowest(Settings(begin=(known,))) >= 0.8
