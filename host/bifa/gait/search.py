@@ -292,14 +292,18 @@ def possible_robots(
     """`count` robots that the model may be: they walk with the gaits that it is known to walk with, which a covariance
     does not know. Where hardly half of those drawn do, the model does not know either, and they are as drawn; so they
     are if the spread is a guess."""
-    begin = () if spread.is_guess else settings.begin
-    drawn = spread.plants(model, 2 * count if begin else count, seed)
-    if not begin:
+    drawn = spread.plants(model, count, seed)
+    if spread.is_guess or not settings.begin:
         return drawn
-    speeds = distribution(runs, drawn, gait_rows(begin), settings.metric.quicker())
-    walk = (speeds >= FELL * np.median(speeds, axis=1, keepdims=True)).all(axis=0)
-    walking = [robot for robot, walks in zip(drawn, walk, strict=True) if walks]
-    return walking[:count] if len(walking) >= count else drawn[:count]
+    rows, metric = gait_rows(settings.begin), settings.metric.quicker()
+    speeds = distribution(runs, drawn, rows, metric)
+    least = FELL * np.median(speeds, axis=1, keepdims=True)
+    if (speeds >= least).all():
+        return drawn
+    more = spread.plants(model, 2 * count, seed)[count:]
+    walk = np.hstack([speeds, distribution(runs, more, rows, metric)]) >= least
+    walking = [robot for robot, walks in zip((*drawn, *more), walk.all(axis=0), strict=True) if walks]
+    return walking[:count] if len(walking) >= count else drawn
 
 
 def _nominally(
