@@ -310,10 +310,12 @@ def _nominally(
     model: Model, runs: Simulations, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fall, since the fastest gaits live at a cliff; where none
-    reaches half of what was promised, those in other places are asked."""
+    reaches half of what was promised, those in other places are asked, and then slower copies of all of them."""
     rows, speeds = np.empty((0, 6)), np.empty(0)
-    for apart in (_NEAR, _FAR):
-        more = gait_rows(settings.space.gaits(explored.finalists(_NOMINAL_FINALISTS, apart=apart)))
+    near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_NEAR, _FAR))
+    slower = np.concatenate([settings.space.slower(points, share) for points in (near, far) for share in _SLOWER])
+    for points in (near, far, slower):
+        more = gait_rows(settings.space.gaits(points))
         rows, speeds = np.vstack([rows, more]), np.append(speeds, _finely(model, runs, more, settings))
         on_progress("verify", 0.5, float(speeds.max()))
         if speeds.max() > _PROMISED * explored.best_value:
