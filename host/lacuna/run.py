@@ -72,8 +72,13 @@ def diagnose(
         shown(what)
 
     system, in_steps = _in_steps(system)
-    how: dict[str, Any] = {"seed": seed, "starts": starts, "policy": policy, "suspected": tuple(suspected)}
-    how["on_progress"] = reported
+    how: dict[str, Any] = {
+        "seed": seed,
+        "starts": starts,
+        "policy": policy,
+        "suspected": tuple(suspected),
+        "on_progress": reported,
+    }
     try:
         with _workers(n_jobs, executor) as workers:
 

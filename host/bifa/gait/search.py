@@ -7,7 +7,7 @@ import numpy as np
 
 from bifa.errors import BifaError
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import basins, climb, climb_basins, climb_together
+from bifa.gait.methods.cma_es import APART, basins, climb_basins, climb_together
 from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
@@ -65,7 +65,6 @@ _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008), i
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
 _BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
-_APART = 0.12  # of two basins
 _NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at one place, and at others
 _PROMISED = 0.5  # of the best value, that a gait has to keep when it is checked
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
@@ -249,7 +248,7 @@ def _refine(objective: Objective, explored: Evaluated, settings: Settings, on_pr
         settings.space.wraps,
         lambda count, best: on_progress("refine", min(count / share, 1.0), max(best, explored.best_value)),
     )
-    climb(recorder, explored.best_point, _FINAL_STEP, share, settings.seed, _POPULATION)
+    climb_together(recorder, explored.best_point[None], share, settings.seed, _POPULATION, _FINAL_STEP)
     return recorder.found()
 
 
@@ -269,7 +268,7 @@ def _refine_on_robots(
         recorder = RecordedObjective(objective, settings.space.wraps, show)
         for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=_FAR)):
             recorder(points)
-        begun = recorder.found().finalists(stage.climbs, _APART, settings.space.wraps)
+        begun = recorder.found().finalists(stage.climbs, APART, settings.space.wraps)
         climb_together(recorder, begun, budget, settings.seed, _POPULATION, stage.step)
         found.append(recorder.found())
         starts = _POPULATION // 2

@@ -11,7 +11,7 @@ from .common import Evaluated, Objective, OnEvaluated, RecordedObjective, agree
 
 _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled until enough of them walk
 _ENOUGH = 60
-_APART = 0.12  # of two starts, on some axis of the unit cube: another basin
+APART = 0.12  # of two starts, on some axis of the unit cube: another basin
 _NEIGHBORS, _COMPARED = 8, 2000
 _CLIMBS = 5  # at once, and as many in each restart
 _STEP = 0.06  # initial standard deviation, of the unit cube
@@ -70,10 +70,10 @@ def basins(seen: Evaluated, wraps: np.ndarray, count: int, tried: Sequence[np.nd
     """The best points that no other near them beats, each the top of a basin as far as was seen, and that are in none
     of the basins tried; then the best of the others. At most `count`, (m, dimensions)."""
     tops = _tops(seen, wraps)
-    first = Evaluated(seen.points[tops], seen.values[tops]).finalists(count, _APART, wraps, avoid=tried)
+    first = Evaluated(seen.points[tops], seen.values[tops]).finalists(count, APART, wraps, avoid=tried)
     if len(first) >= count:
         return np.array(first)
-    return np.array([*first, *seen.finalists(count - len(first), _APART, wraps, avoid=[*tried, *first])])
+    return np.array([*first, *seen.finalists(count - len(first), APART, wraps, avoid=[*tried, *first])])
 
 
 def _tops(seen: Evaluated, wraps: np.ndarray) -> np.ndarray:
@@ -118,13 +118,6 @@ def _is_hopeless(bests: Sequence[float], best: float) -> bool:
 
 def _has_stalled(bests: Sequence[float]) -> bool:
     return len(bests) > _STALLED and bests[-1] - bests[-1 - _STALLED] <= _GAIN * abs(bests[-1])
-
-
-def climb(
-    objective: Objective, start: np.ndarray, step: float, evaluations: int, seed: int, population: int = 12
-) -> None:
-    """One run of CMA-ES from `start` (dimensions,); what it finds is in what `objective` recorded."""
-    climb_together(objective, np.asarray(start)[None], evaluations, seed, population, step)
 
 
 def _strategy(start: np.ndarray, step: float, seed: int, population: int) -> cma.CMAEvolutionStrategy:
