@@ -11,7 +11,7 @@ import math
 from bifa.simulate import layout
 from bifa.simulate.compiled import merged
 from bifa.simulate.hooks import chains
-from bifa.simulate.learnt import AREA, DAMPING, EMPTYING, FILLING, learnt_at
+from bifa.simulate.learnt import AREA, DAMPING, EMPTYING, FILLING, IN_AREA, IN_DAMPING, IN_FILLING, learnt_at
 
 _THRESHOLD = layout.THRESHOLD
 _ALPHA_S = layout.ALPHA_S
@@ -62,7 +62,7 @@ def pressure_after(plant, rig, block, actuator, z, z_new, x, pressure, source, h
     total = rate + chains.loss(active, q, pressure)
     settled = inlet * rate / total
     after = settled + (pressure - settled) * math.exp(-total * h)
-    if plant.learnt.shape[0]:
+    if active & IN_FILLING:
         after += h * learnt_at(plant.learnt, FILLING if inlet > pressure else EMPTYING, pressure)[0]
     return after
 
@@ -73,7 +73,7 @@ def area_at(plant, block, x):
     q = plant.q
     share = (x - q[block + layout.CONTRACTED]) / q[block + layout.STROKE]
     factor = chains.area(plant.active, q, share)
-    if plant.learnt.shape[0]:
+    if plant.active & IN_AREA:
         factor *= 1.0 + learnt_at(plant.learnt, AREA, share)[0]
     return q[block + layout.AREA] * factor
 
@@ -104,7 +104,7 @@ def resistance(plant, curve, block, actuator, z, x, v, h):
         more, steeper = chains.spring(active, q, z, actuator, block == layout.SMALL, direction, h)
         force += more
         growth += steeper
-    if plant.learnt.shape[0] and block == layout.BODY:
+    if active & IN_DAMPING and block == layout.BODY:
         more, steeper = learnt_at(plant.learnt, DAMPING, v)
         force += more - steeper * v
         growth += steeper

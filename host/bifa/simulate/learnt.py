@@ -1,7 +1,7 @@
 """Curves learnt from data, where they act in the integrator: what no effect of the library explains.
 
 `Plant.learnt` has a row a term, (lower, 1 / interval, values at equal intervals); no rows: nothing was learnt. Outside
-its range a curve goes on level.
+its range a curve goes on level. A place in the integrator that has one is a bit of `Plant.active`, above the effects'.
 """
 
 from __future__ import annotations
@@ -19,6 +19,11 @@ GRIP_FORWARD, GRIP_BACKWARD, GRIP_PLACE = 6, 7, 8
 # Share of the area a beyond eq. (2), by the share of the stroke
 AREA = 9
 TERMS = 10
+
+IN_FILLING, IN_FRICTION_SPEED, IN_FRICTION_PLACE, IN_DAMPING, IN_GRIP_SPEED, IN_GRIP_PLACE, IN_AREA = (
+    1 << bit for bit in range(48, 55)
+)
+IN_FRICTION = IN_FRICTION_SPEED | IN_FRICTION_PLACE | IN_GRIP_SPEED | IN_GRIP_PLACE
 
 
 @merged

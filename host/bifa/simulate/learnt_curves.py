@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 _POINTS = 513  # of a row of `Plant.learnt`: fine enough for the lips of a pipe's joints
 _TERMS = {
-    "filling": (learnt.FILLING, learnt.EMPTYING),
-    "friction_speed": (learnt.FORWARD, learnt.BACKWARD),
-    "friction_place": (learnt.PLACE,),
-    "body_damper": (learnt.DAMPING,),
-    "grip_speed": (learnt.GRIP_FORWARD, learnt.GRIP_BACKWARD),
-    "grip_place": (learnt.GRIP_PLACE,),
-    "area_stroke": (learnt.AREA,),
+    "filling": (learnt.IN_FILLING, learnt.FILLING, learnt.EMPTYING),
+    "friction_speed": (learnt.IN_FRICTION_SPEED, learnt.FORWARD, learnt.BACKWARD),
+    "friction_place": (learnt.IN_FRICTION_PLACE, learnt.PLACE),
+    "body_damper": (learnt.IN_DAMPING, learnt.DAMPING),
+    "grip_speed": (learnt.IN_GRIP_SPEED, learnt.GRIP_FORWARD, learnt.GRIP_BACKWARD),
+    "grip_place": (learnt.IN_GRIP_PLACE, learnt.GRIP_PLACE),
+    "area_stroke": (learnt.IN_AREA, learnt.AREA),
 }
 
 
@@ -33,10 +33,11 @@ def with_curve(plant: Plant, name: str, curve: LearntCurve) -> Plant:
         return plant._replace(small_curve=_added(plant.small_curve, curve))
     filled = plant.learnt.copy() if len(plant.learnt) else np.zeros((learnt.TERMS, 2 + _POINTS))
     at = np.linspace(curve.lower, curve.upper, _POINTS)
-    for term, values in zip(_TERMS[name], curve.values, strict=True):
+    bit, *terms = _TERMS[name]
+    for term, values in zip(terms, curve.values, strict=True):
         filled[term, :2] = curve.lower, (_POINTS - 1) / (curve.upper - curve.lower)
         filled[term, 2:] = np.interp(at, _grid(curve), values)
-    return plant._replace(learnt=filled)
+    return plant._replace(active=plant.active | bit, learnt=filled)
 
 
 def _added(rows: np.ndarray, curve: LearntCurve) -> np.ndarray:

@@ -17,7 +17,7 @@ _NOTHING = np.zeros((0, 4))
 
 
 class Plant(NamedTuple):
-    """`q`: numbers as `layout` has them; `active`: a bit an effect; the curves: `bifa.simulate.tables`;
+    """`q`: numbers as `layout` has them; `active`: a bit an effect and a place of a learnt curve; the curves: `bifa.simulate.tables`;
     `learnt`: see `bifa.simulate.learnt`."""
 
     q: np.ndarray

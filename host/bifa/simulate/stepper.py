@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bifa.simulate import layout
+from bifa.simulate import layout, learnt
 from bifa.simulate.actuator import area_at, convergence, pressure_after, pressure_moved, remember, resistance
 from bifa.simulate.compiled import inner, merged
 from bifa.simulate.hooks import chains
-from bifa.simulate.learnt import BACKWARD, FORWARD, GRIP_BACKWARD, GRIP_FORWARD, GRIP_PLACE, PLACE, learnt_at
+from bifa.simulate.learnt import learnt_at
 
 # State y: positions in m, velocities in m/s, pressures in psi.
 X_HEAD, V_HEAD, X_TAIL, V_TAIL, P_BODY, X_SMALL_HEAD, V_SMALL_HEAD, P_HEAD, X_SMALL_TAIL, V_SMALL_TAIL, P_TAIL = range(
@@ -192,8 +192,9 @@ def coefficient(plant, direction, sliding):
     q, active = plant.q, plant.active
     rest = max(q[layout.MU_S], q[layout.MU_K])
     base = rest if sliding == 0.0 else q[layout.MU_K]
-    if plant.learnt.shape[0]:
-        base *= 1.0 + learnt_at(plant.learnt, GRIP_FORWARD if direction > 0.0 else GRIP_BACKWARD, sliding)[0]
+    if active & learnt.IN_GRIP_SPEED:
+        term = learnt.GRIP_FORWARD if direction > 0.0 else learnt.GRIP_BACKWARD
+        base *= 1.0 + learnt_at(plant.learnt, term, sliding)[0]
     if not active & (chains.FRICTION | chains.GRIP):
         return base
     return chains.friction(active, q, base, rest, sliding) * chains.grip(active, q, direction)
@@ -204,16 +205,19 @@ def _limit(plant, rig, end, normal, direction, sliding, y):
     """Greatest friction of an end against motion in a direction."""
     force = coefficient(plant, direction, sliding) * normal
     place = y[X_HEAD if end == 0 else X_TAIL]
-    if plant.learnt.shape[0]:
-        force *= 1.0 + learnt_at(plant.learnt, GRIP_PLACE, place)[0]
-        force += learnt_at(plant.learnt, FORWARD if direction > 0.0 else BACKWARD, sliding)[0]
-        force += learnt_at(plant.learnt, PLACE, place)[0]
+    if plant.active & learnt.IN_GRIP_PLACE:
+        force *= 1.0 + learnt_at(plant.learnt, learnt.GRIP_PLACE, place)[0]
+    if plant.active & learnt.IN_FRICTION_SPEED:
+        term = learnt.FORWARD if direction > 0.0 else learnt.BACKWARD
+        force += learnt_at(plant.learnt, term, sliding)[0]
+    if plant.active & learnt.IN_FRICTION_PLACE:
+        force += learnt_at(plant.learnt, learnt.PLACE, place)[0]
     if end == 1:
         force += chains.drag(plant.active, plant.q, place)
     if rig.terrain.shape[0]:
         row = 1 + 2 * end + (0 if direction > 0.0 else 1)
         force += squeeze(rig.terrain, row, place)
-    if plant.learnt.shape[0]:
+    if plant.active & learnt.IN_FRICTION:
         force = max(force, 0.0)
     return force
 

@@ -119,10 +119,19 @@ MERGED Four row_of(const Curve *curve, V row) {
 MERGED V learnt_entry(const Learnt *table, V row, V column) {
     const V term = v_min(v_max(splat(0.0), row), splat((double)(table->terms - 1)));
     const V place = v_min(v_max(splat(0.0), column), splat((double)(table->columns - 1)));
+#if LANES == 8 && defined(__AVX512F__)
+    const __m512i at = _mm512_cvttpd_epi64(term * splat((double)table->columns) + place);
+    return _mm512_i64gather_pd(_mm512_add_epi64(_mm512_loadu_si512(table->rows), _mm512_slli_epi64(at, 3)), NULL, 1);
+#elif LANES == 4 && defined(__AVX2__)
+    const __m256i at = _mm256_cvtepi32_epi64(_mm256_cvttpd_epi32(term * splat((double)table->columns) + place));
+    const __m256i *rows = (const __m256i *)table->rows;
+    return _mm256_i64gather_pd(NULL, _mm256_add_epi64(_mm256_loadu_si256(rows), _mm256_slli_epi64(at, 3)), 1);
+#else
     V found = splat(0.0);
     for (int i = 0; i < LANES; i++)
         set_lane(&found, i, table->rows[i][(long)at_lane(term, i) * table->columns + (long)at_lane(place, i)]);
     return found;
+#endif
 }
 
 MERGED V terrain_entry(const Terrain *table, V row, V column) {
