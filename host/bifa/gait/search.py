@@ -66,6 +66,9 @@ _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
 _BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
 _NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at one place, and at others
+# Of two climbs on robots: basins are long, with two tops or more on a ridge along which the tail's vacuum ends at the
+# same moment of the cycle, and from starts next to one another climbs end at the same top.
+_ALONG = 0.25
 _PROMISED = 0.5  # of the best value, that a gait has to keep when it is checked
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
 _FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
@@ -266,9 +269,10 @@ def _refine_on_robots(
             on_progress(f"refine {number}", min(count / budget, 1.0), best)
 
         recorder = RecordedObjective(objective, settings.space.wraps, show)
-        for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart=_FAR)):
+        wraps, apart = settings.space.wraps, APART if stage.climbs > 1 else _FAR
+        for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart, wraps)):
             recorder(points)
-        begun = recorder.found().finalists(stage.climbs, APART, settings.space.wraps)
+        begun = recorder.found().finalists(stage.climbs, _ALONG, wraps)
         climb_together(recorder, begun, budget, settings.seed, _POPULATION, stage.step)
         found.append(recorder.found())
         starts = _POPULATION // 2
