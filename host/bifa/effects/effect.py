@@ -43,7 +43,7 @@ class PhysicalEffect:
     `enters`: the equation and the place in it; `experiments`: where it can be seen at all;
     `confusable_with`: effects whose signature is alike; `states`: numbers remembered for each actuator; `freed_at`:
     where its form may differ from the formula, by the names in `bifa.problem.sites`; `apart`: parameters that it
-    needs to be above those that they cannot be below.
+    needs to be above those that they cannot be below; `unlike_cycles`: no cycle of a gait is like the one before.
     """
 
     name: str
@@ -57,6 +57,7 @@ class PhysicalEffect:
     states: int = 0
     freed_at: tuple[str, ...] = ()
     apart: tuple[str, ...] = ()
+    unlike_cycles: bool = False
 
     @property
     def sizes(self) -> tuple[EffectParameter, ...]:

@@ -19,6 +19,7 @@ EFFECT = PhysicalEffect(
             "phase_rad", "rad", -6.3, 6.3, 0.0, "phase at the trial's time 0", own=True, period=2.0 * math.pi
         ),
     ),
+    unlike_cycles=True,
 )
 
 

@@ -12,6 +12,7 @@ EFFECT = PhysicalEffect(
     confusable_with=("friction_direction", "inclination"),
     parameters=(EffectParameter("drag_N_m", "N/m", 0.0, 30.0, 2.0, "growth with distance", size=True),),
     freed_at=("friction_place", "grip_place"),
+    unlike_cycles=True,
 )
 
 

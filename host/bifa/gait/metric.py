@@ -16,7 +16,7 @@ from bifa.simulate.terrain import passed_at_m, terrain, tunnel
 _LONGEST_BODY_M = 0.06
 # Of the advance: on a supply that ripples every cycle is another, and a robot that drags a longer tether in each never
 # is periodic to a thousandth; one that falls differs by more.
-_PERIODIC_OF_DRAWS = 0.2
+_UNLIKE = 0.2
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,11 @@ class Metric:
     def of_draws(self) -> "Metric":
         """For robots that the model may be, the model itself among them: they may slip, and their cycles differ. A
         speed that is measured counts however a robot comes by it."""
-        return replace(self, slip_m=np.inf, periodic=_PERIODIC_OF_DRAWS)
+        return replace(self.of_unlike_cycles(), slip_m=np.inf)
+
+    def of_unlike_cycles(self) -> "Metric":
+        """For a robot that never walks the same cycle twice."""
+        return replace(self, periodic=_UNLIKE)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""
@@ -114,6 +118,10 @@ class Passage:
 
     def of_draws(self) -> "Passage":
         """For robots that the model may be: the same."""
+        return self
+
+    def of_unlike_cycles(self) -> "Passage":
+        """The same: no cycle is compared with another."""
         return self
 
     def judge(self, progress: Advance) -> Judged:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bifa.effects import library
 from bifa.errors import BifaError
 from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.methods.cma_es import APART, basins, climb_basins, climb_together
@@ -157,6 +158,8 @@ def optimize(
     flat, spread = plant(model), settings.knowledge(model)
     timing = spread.scatter
     metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
+    if any(library()[effect].unlike_cycles for effect in model.effects):
+        metric = metric.of_unlike_cycles()
     settings = replace(settings, metric=metric)
     own = NominalSpeed(runs, flat, settings.space, settings.rules.quicker() if settings.robust else metric)
     explored = _explore(own, settings, on_progress)

@@ -17,8 +17,8 @@ _NOTHING = np.zeros((0, 4))
 
 
 class Plant(NamedTuple):
-    """`q`: numbers as `layout` has them; `active`: a bit an effect and a place of a learnt curve; the curves: `bifa.simulate.tables`;
-    `learnt`: see `bifa.simulate.learnt`."""
+    """`q`: numbers as `layout` has them; `active`: a bit for each effect and each place of a learnt curve; the curves:
+    `bifa.simulate.tables`; `learnt`: see `bifa.simulate.learnt`."""
 
     q: np.ndarray
     active: int

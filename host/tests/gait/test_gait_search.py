@@ -139,6 +139,24 @@ def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere):
     assert optimize(nominal(), runs, Settings(robust=False, refine=False)).nominal_mm_s > 21.0
 
 
+def test_a_gait_of_which_no_cycle_is_like_the_one_before_counts_where_none_can_be(runs, monkeypatch):
+    """On a supply that ripples a search kept to the few gaits whose period the ripple divides: 18.5 mm/s, not 22.8."""
+    rippling = nominal().with_effects({"regulator_ripple": {}})
+    space = Settings().space
+    found = Evaluated(space.slower(space.point(library.load("robust").gait)[None], 0.02), np.array([22.0]))
+    monkeypatch.setitem(METHODS, "cma", lambda *_: found)
+    assert optimize(rippling, runs, Settings(robust=False, refine=False)).nominal_mm_s > 20.0
+    with pytest.raises(SearchError):
+        optimize(rippling, runs, Settings(robust=False, refine=False, metric=Strict()))
+
+
+class Strict(Metric):
+    """Cycles have to agree, whatever the robot."""
+
+    def of_unlike_cycles(self) -> Metric:
+        return self
+
+
 def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(runs):
     """Nearly all robots were as fast as the model there, which was not walking either."""
     settings, spread = Settings(spread=0.001), spread_of(nominal(), 0.001)
