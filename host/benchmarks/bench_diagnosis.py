@@ -29,9 +29,9 @@ class TimedCommand(NamedTuple):
 
 CASES = (
     TimedCommand("fit", "fit", ("--none",), 10.0),
-    TimedCommand("diagnosis_none", "diagnose", ("--none",), 15.0),
-    TimedCommand("diagnosis", "diagnose", ("--effect", "hysteresis", "--size", "0.8"), 20.0),
-    TimedCommand("diagnosis_pair", "diagnose", ("--pair",), 45.0),
+    TimedCommand("diagnosis_none", "diagnose", ("--none",), 10.0),
+    TimedCommand("diagnosis", "diagnose", ("--effect", "hysteresis", "--size", "0.8"), 15.0),
+    TimedCommand("diagnosis_pair", "diagnose", ("--pair",), 25.0),
     TimedCommand("diagnosis_unexplained", "diagnose", ("--outside",), 60.0),
 )
 
