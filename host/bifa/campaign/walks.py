@@ -9,7 +9,7 @@ import numpy as np
 
 from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, Trial
-from bifa.gait.measured import MeasuredSpeed, measured_speed
+from bifa.gait.measured import MeasuredSpeed, complete_cycles, measured_speed
 from bifa.gait.prediction import Prediction, predict_speed
 from bifa.gait.settling import LEAST, MOST_CYCLES, Walking
 from bifa.gait.uncertainty import spread_of
@@ -81,11 +81,12 @@ def walks_of(gait: Gait, dataset: Dataset) -> list[Trial]:
 
 
 def prediction_of(model: Model, trial: Trial, naive: bool = False) -> Prediction:
-    """The model's prediction of the walk in `trial`, of which only the clock's rate is used; naive: from its
-    covariance alone."""
-    known = spread_of(model)
+    """The model's prediction of the walk in `trial`, of which only the length and the clock's rate are used; naive:
+    from its covariance alone."""
+    known, gait = spread_of(model), Gait(**trial.walked)
+    cycles = complete_cycles(trial.time_s, gait.period_s)
     rate = seconds_per_uno_s(trial)
-    return predict_speed(model, known.naive if naive else known, Gait(**trial.walked), clock_rate=rate)
+    return predict_speed(model, known.naive if naive else known, gait, cycles=cycles, clock_rate=rate)
 
 
 def predict(model: Model, trial: Trial) -> dict[str, Any]:

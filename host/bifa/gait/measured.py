@@ -52,9 +52,8 @@ def measured_speed(
 
     Raises BifaError where the record does not hold the `LEAST` cycles that it takes to see whether it has settled.
     """
-    start_s = time_s[0]
-    complete = int(np.floor((time_s[-1] - start_s) / period_s + 1e-6))
-    boundaries_s = start_s + period_s * np.arange(complete + 1)
+    complete = complete_cycles(time_s, period_s)
+    boundaries_s = time_s[0] + period_s * np.arange(complete + 1)
     advance_mm = np.diff(np.interp(boundaries_s, time_s, displacement_mm))
     if complete < LEAST:
         raise BifaError(
@@ -62,6 +61,11 @@ def measured_speed(
             "settled: record a longer walk"
         )
     return speed_of_cycles(advance_mm, period_s, noise_mm)
+
+
+def complete_cycles(time_s: np.ndarray, period_s: float) -> int:
+    """How many a walk has that begins at `time_s[0]`."""
+    return int(np.floor((time_s[-1] - time_s[0]) / period_s + 1e-6))
 
 
 def speed_of_cycles(advance_mm: np.ndarray, period_s: float, noise_mm: float = CAMERA_MM) -> MeasuredSpeed:

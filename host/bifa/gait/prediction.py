@@ -101,7 +101,8 @@ class Predictor:
     def of(
         self, gait: Gait, *, cycles: int = CYCLES, clock_rate: float | None = None, workers: int | None = None
     ) -> Prediction:
-        """Walk `gait` on each robot, by the rule that measured walks are judged by.
+        """Walk `gait` on each robot, by the rule that measured walks are judged by: what never settles (a tether that
+        grows) is as fast as in the second half of its `cycles`.
 
         clock_rate: seconds per second of the Uno, if not what is known of it; speeds are those on the Uno's clock.
         """
@@ -129,10 +130,17 @@ class Predictor:
 
 
 def predict_speed(
-    model: Model, known: Knowledge, gait: Gait, *, draws: int = DRAWS, seed: int = 0, clock_rate: float | None = None
+    model: Model,
+    known: Knowledge,
+    gait: Gait,
+    *,
+    draws: int = DRAWS,
+    seed: int = 0,
+    cycles: int = CYCLES,
+    clock_rate: float | None = None,
 ) -> Prediction:
     """What is predicted of one gait: see `Predictor`."""
-    return Predictor(model, known, draws=draws, seed=seed).of(gait, clock_rate=clock_rate)
+    return Predictor(model, known, draws=draws, seed=seed).of(gait, cycles=cycles, clock_rate=clock_rate)
 
 
 def camera_mm_s(gait: Gait, cycles: int = LEAST) -> float:
