@@ -84,7 +84,7 @@ def prediction_of(model: Model, trial: Trial, naive: bool = False) -> Prediction
     """The model's prediction of the walk in `trial`, of which only the length and the clock's rate are used; naive:
     from its covariance alone."""
     known, gait = spread_of(model), Gait(**trial.walked)
-    cycles = complete_cycles(trial.time_s, gait.period_s)
+    cycles = max(complete_cycles(trial.time_s, gait.period_s), LEAST)  # fewer have no speed, as `speed_of` says
     rate = seconds_per_uno_s(trial)
     return predict_speed(model, known.naive if naive else known, gait, cycles=cycles, clock_rate=rate)
 

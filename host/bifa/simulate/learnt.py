@@ -20,6 +20,7 @@ GRIP_FORWARD, GRIP_BACKWARD, GRIP_PLACE = 6, 7, 8
 AREA = 9
 TERMS = 10
 
+# Above the bits of effects, of which there may be 48.
 IN_FILLING, IN_FRICTION_SPEED, IN_FRICTION_PLACE, IN_DAMPING, IN_GRIP_SPEED, IN_GRIP_PLACE, IN_AREA = (
     1 << bit for bit in range(48, 55)
 )

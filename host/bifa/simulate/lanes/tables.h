@@ -33,8 +33,8 @@ typedef struct {
 
 typedef struct {
     V q[NUMBERS];
-    long active[LANES], any; // bits of effects of each lane, and of all together
-    int same;                // in all lanes
+    int64_t active[LANES], any; // bits of each lane, of effects and learnt curves, and of all together
+    int same;                   // in all lanes
     Curve body_curve, small_curve;
     Learnt learnt;
 } Plant;
@@ -52,7 +52,7 @@ typedef struct {
     int together; // the lanes share their steps
 } Run;
 
-MERGED Mask having(const Plant *plant, long bits) {
+MERGED Mask having(const Plant *plant, int64_t bits) {
     if (__builtin_expect(!(plant->any & bits), 1)) return no_lanes();
     if (plant->same) return all_lanes();
     Mask found = no_lanes();
