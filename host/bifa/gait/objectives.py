@@ -12,6 +12,7 @@ from bifa.simulate import Plant, gait_rows
 
 QUANTILE = 0.10
 _FIRST_DRAWS = 3
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0  # multiples of it, without their whole parts, lie evenly however many there are
 
 
 class NominalSpeed:
@@ -33,6 +34,10 @@ class RobustSpeed:
     the r-th smallest met so far bounds it from above: a gait whose bound is below `abandon` of the best value
     is given up, and the bound is its value. Draws that gave up most gaits come first, and a gait is settled where a
     round lowers its bound no more: the rest are easier.
+
+    `jitter`: each draw has a share of its own within it by which it walks every gait slower or faster. With which
+    periods a robot walks is ragged at the cliff, and a climb ends on the first spike that it meets; over draws that
+    differ in period as well spikes narrower than that even out.
     """
 
     def __init__(
@@ -44,6 +49,7 @@ class RobustSpeed:
         metric: Metric | Passage,
         share: float = QUANTILE,
         abandon: float = 0.9,
+        jitter: float = 0.0,
     ):
         self._runs, self._space, self._draws = runs, space, draws
         self._metric = metric.of_draws()
@@ -51,6 +57,7 @@ class RobustSpeed:
         self._rank = max(1, math.ceil(share * len(draws)))
         self._failures = np.zeros(len(draws))
         self._abandon, self._best = abandon, 0.0
+        self._longer = 1.0 + jitter * (2.0 * np.mod(_GOLDEN * np.arange(len(draws)), 1.0) - 1.0)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """(n,) of points (n, dimensions) of the unit cube, in mm/s."""
@@ -77,7 +84,9 @@ class RobustSpeed:
         return bound
 
     def _speeds(self, rows: np.ndarray, which: np.ndarray) -> np.ndarray:
-        return self._runs.judged(self._draws, which, rows, self._metric).counted_mm_s
+        longer = self._longer[which]
+        jittered = np.column_stack([rows[:, 0] * longer, rows[:, 1:]])
+        return self._runs.judged(self._draws, which, jittered, self._metric).counted_mm_s * longer
 
 
 def on_model(runs: Simulations, nominal: Plant, gaits: np.ndarray, metric: Metric | Passage) -> np.ndarray:

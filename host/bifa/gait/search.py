@@ -38,7 +38,7 @@ class RobustRound:
     at which a gait is given up, the integrator's tolerance; the changes of period, in parts, that the gaits of the
     round before are tried with; and of the CMA-ES runs on that: the most evaluations, their first step, from how many
     basins. `in_full`: walks have the metric's own number of cycles, since the quick one's are too few for those that
-    settle late."""
+    settle late. `jitter`: of the period, from robot to robot, in parts."""
 
     draws: int
     quantile: float
@@ -49,6 +49,7 @@ class RobustRound:
     step: float = 0.0
     climbs: int = 1
     in_full: bool = False
+    jitter: float = 0.0
 
 
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
@@ -57,8 +58,8 @@ EXPLORE = RobustRound(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    RobustRound(32, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 1000, 0.05, climbs=3),
-    RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 200, 0.015, in_full=True),
+    RobustRound(32, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 1000, 0.05, climbs=3, jitter=0.005),
+    RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 200, 0.015, in_full=True, jitter=0.002),
 )
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008), in_full=True)
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
@@ -70,7 +71,8 @@ _NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at
 # Of two climbs on robots: basins are long, with two tops or more on a ridge along which the tail's vacuum ends at the
 # same moment of the cycle, and from starts next to one another climbs end at the same top.
 _ALONG = 0.25
-_PROMISED = 0.5  # of the best value, that a gait has to keep when it is checked
+# Of the best value, when it is checked: what a gait has to keep to be taken at once, and to be one that stands.
+_KEPT, _PROMISED = 0.993, 0.5
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
 _FINAL_STEP, _FINAL = 0.015, 600  # the same for the model's own speed
 
@@ -289,7 +291,7 @@ def on_robots(
     draws = possible_robots(model, runs, spread, settings, stage.draws, settings.seed + 500_000 * number)
     metric = replace(settings.metric if stage.in_full else settings.metric.quicker(), tolerance_m=stage.tolerance_m)
     share = stage.quantile * settings.share / QUANTILE
-    return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon)
+    return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon, stage.jitter)
 
 
 def possible_robots(
@@ -341,8 +343,9 @@ def best_of_finalists(
     settings: Settings,
     on_progress: OnProgress,
 ) -> tuple[Gait, float]:
-    """The best of the finalists, over robots that the search did not meet, that stands the check; slower copies of it
-    follow, for the case that all are beyond the cliff. Where none stands, the one that walks best on average."""
+    """The first of the finalists that keeps what the best promised, over robots that the search did not meet; slower
+    copies of it follow, for the case that all are beyond the cliff. Where none does, the best of them that stand; where
+    none stands, the one that walks best on average."""
     groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=_NEAR))
     objective = on_robots(model, runs, spread, settings, _SHORTLIST, 3)
     shortlist = np.concatenate(groups)
@@ -358,17 +361,19 @@ def best_of_finalists(
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])
     # Only where none of these walks at all by the metric in full: what the method found elsewhere.
     far = explored.finalists(_NOMINAL_FINALISTS, apart=_FAR)
-    otherwise, most = None, -1.0
+    otherwise, most = None, (False, -1.0)
     for candidates in (near, far):
         rows = gait_rows(settings.space.gaits(candidates))
         for row, speed in zip(rows, _finely(model, runs, rows, settings), strict=True):
             if speed <= 0.0:
                 continue
             speeds = distribution(runs, checking, row[None], metric)[0]
-            if np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE) > least:
+            low = float(np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE))
+            stands = low > least
+            if stands and low >= _KEPT * values.max():
                 return Gait(*row.tolist()), float(speed)
-            if speeds.mean() > most:
-                otherwise, most = (Gait(*row.tolist()), float(speed)), speeds.mean()
+            if (worth := (stands, low if stands else float(speeds.mean()))) > most:
+                otherwise, most = (Gait(*row.tolist()), float(speed)), worth
         if otherwise is not None:
             return otherwise
     raise SearchError(_NONE_STANDS)
