@@ -3,9 +3,9 @@
     python -m benchmarks.lanes_end_to_end [--only TASK] [--seed 7]
 
 The search goes by the lanes' results, so that both did the same; left to itself, a fit of a model that is wrong ends
-elsewhere after the least difference. The data set is a sealed one with a single effect of the library (`python -m
-virtual_robot.sealed --seed 7`). Processor seconds of the command and its workers: what else runs on the machine counts
-little.
+elsewhere after the least difference. The data sets are sealed ones (`python -m virtual_robot.sealed --seed 7`): one
+effect of the library, and for the other diagnoses none, a pair, and one that the library lacks. Processor seconds of
+the command and its workers: what else runs on the machine counts little.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from typing import Any
 from bifa.__main__ import main as bifa
 from bifa.simulate import lanes
 
-TASKS = ("fit", "robust gait", "diagnosis", "first run")  # in this order: the gait is sought on the fitted model
+KINDS = ("one", "none", "pair", "outside")
+DIAGNOSES = tuple(f"diagnosis, {kind}" for kind in KINDS)
+TASKS = ("fit", "robust gait", *DIAGNOSES, "first run")  # in this order: the gait is sought on the fitted model
 _ALONE_M = 1e-6  # of derivatives: robots that do not share their steps need shorter ones
 _FORK = multiprocessing.get_context("fork")
 _IMPORT = "import pandas, bifa.identify.identification, bifa.gait.search, lacuna.diagnosis.diagnose; "
@@ -44,42 +46,37 @@ def main() -> int:
     chosen = parser.parse_args()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as on a machine where bifa has run before: modules are compiled
     with tempfile.TemporaryDirectory() as scratch:
-        day, model = Path(scratch) / "day", str(Path(scratch) / "model.toml")
-        command = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(chosen.seed), "--out", str(day)]
-        subprocess.run([*command, "--kind", "one"], check=True, stdout=subprocess.DEVNULL)
+        folder, model = Path(scratch), str(Path(scratch) / "model.toml")
+        for kind in KINDS:
+            command = [sys.executable, "-m", "virtual_robot.sealed", "--seed", str(chosen.seed), "--kind", kind]
+            subprocess.run([*command, "--out", str(folder / kind)], check=True, stdout=subprocess.DEVNULL)
         subprocess.run([sys.executable, "-c", _IMPORT + _COMPILE], env=os.environ | {"BIFA_LANES": "0"}, check=True)
-        commands = {
-            "fit": ["fit", str(day), "--out", model],
-            # A margin that the work does not owe to what this fit, of a model that lacks an effect, knows.
-            "robust gait": [
-                "optimize",
-                "--model",
-                model,
-                "--spread",
-                "0.02",
-                "--out",
-                str(Path(scratch) / "gait.toml"),
-            ],
-            "diagnosis": ["diagnose", str(day), "--json", str(Path(scratch) / "verdict.json")],
+        # The margin is one that the work does not owe to what the fit, of a model that lacks an effect, knows.
+        gait = ["optimize", "--model", model, "--spread", "0.02", "--out", str(folder / "gait.toml")]
+        commands = {"fit": ["fit", str(folder / "one"), "--out", model], "robust gait": gait} | {
+            task: ["diagnose", str(folder / kind), "--json", str(folder / "verdict.json")]
+            for task, kind in zip(DIAGNOSES, KINDS, strict=True)
         }
+        needed = {"robust gait": ("fit", "robust gait"), "first run": ("fit",)}
         print("| task | with lanes, s | of it simulating | numba alone, s | of it simulating | ratio |")
         print("|---|---|---|---|---|---|")
-        for task, words in commands.items():
-            if chosen.only in (None, task) or (task == "fit" and chosen.only in ("robust gait", "first run")):
-                used, in_lanes, in_numba = _measured(words)
-                both = used - in_numba, used - in_lanes
-                _print(task, both[0], f"{in_lanes:.1f}", both[1], f"{in_numba:.1f}")
-                if task == "fit":
-                    fitted = both
+        measured: dict[str, tuple[float, float]] = {}
+        for task in commands if chosen.only is None else needed.get(chosen.only, (chosen.only,)):
+            used, in_lanes, in_numba = _measured(commands[task])
+            measured[task] = used - in_numba, used - in_lanes
+            _print(task, measured[task][0], f"{in_lanes:.1f}", measured[task][1], f"{in_numba:.1f}")
         if chosen.only in (None, "first run"):
-            compiled = [_compiling(switch) for switch in ("1", "0")]
-            first = [alone + more for alone, more in zip(fitted, compiled, strict=True)]
+            first = [alone + _compiling(switch) for alone, switch in zip(measured["fit"], ("1", "0"), strict=True)]
+            measured["first run"] = first[0], first[1]
             _print("first run (a fit, and compiling)", first[0], "", first[1], "")
+        if chosen.only is None:
+            total = [sum(both[k] for both in measured.values()) for k in (0, 1)]
+            _print("all of them", total[0], "", total[1], "")
     return 0
 
 
 def _print(task: str, with_lanes: float, simulating: str, alone: float, simulating_alone: str) -> None:
-    ratio = f"{alone / with_lanes:.1f}"
+    ratio = f"{alone / with_lanes:.2f}"
     print(f"| {task} | {with_lanes:.1f} | {simulating} | {alone:.1f} | {simulating_alone} | {ratio} |", flush=True)
 
 
