@@ -62,9 +62,7 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
 def test_a_gait_that_walks_by_a_hair_of_its_period_does_not_count_where_periods_jitter(runs, nominal_plant):
     metric, space = Metric().quicker(), paper_space()
     draws = [nominal_plant] * 16
-    exact, jittered = (
-        RobustSpeed(runs, nominal_plant, draws, space, metric, jitter=jitter) for jitter in (0.0, 0.005)
-    )
+    exact, jittered = (RobustSpeed(runs, nominal_plant, draws, space, metric, jitter=jitter) for jitter in (0.0, 0.005))
     point = space.point(library.load("fast").gait)[None]
     copies = np.concatenate([space.slower(point, share) for share in np.arange(0.02, -0.03, -0.001)])
     walks = exact(copies) > 20.0
