@@ -45,11 +45,6 @@ class SearchSpace:
         """(dimensions,) true where an axis is a full turn."""
         return np.array([axis.wraps for axis in self.axes])
 
-    @property
-    def shape(self) -> np.ndarray:
-        """(dimensions,) true where an axis is more than how fast the same gait is walked."""
-        return np.array(["period_s" not in axis.sets for axis in self.axes])
-
     def fold(self, points: np.ndarray) -> np.ndarray:
         """Points brought back into the unit cube: full turns wrap, the other axes are cut at their ends."""
         return np.where(self.wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))

@@ -91,9 +91,9 @@ def test_a_robot_that_cannot_walk_is_said_so(runs):
         optimize(slippery, runs, up)
 
 
-def test_where_the_fastest_gait_of_the_model_falls_the_search_on_robots_goes_on(runs):
-    """It is beyond the cliff of some robots, where a robust objective is 0 and nothing leads up: of a robot whose
-    valves choke a search ended at 8.5 mm/s in place of 18."""
+def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs):
+    """Most of the fast basin is beyond the cliff of some robots, where a robust objective is 0 and nothing leads up:
+    of a robot whose valves choke a search ended at 8.5 mm/s in place of 18."""
     settings, spread = Settings(), spread_of(nominal(), 0.02)
     fast = settings.space.point(library.load("fast").gait)[None]
     assert on_robots(nominal(), runs, spread, settings, EXPLORE, 0)(fast)[0] < 2.0
@@ -121,7 +121,7 @@ def test_a_search_ends_no_slower_than_the_gaits_that_it_begins_from(runs, robust
     robots = found.spread.plants(nominal(), 256, 9) if robust else [plant(nominal())]
     speeds = distribution(runs, robots, gait_rows([known, found.gait]), Metric().finer())
     before, after = np.quantile(speeds, settings.share, axis=1)
-    assert after >= 0.993 * before > 20.0, "the check takes the first finalist that keeps as much"
+    assert after >= 0.995 * before > 20.0
 
 
 @pytest.mark.slow
@@ -225,9 +225,7 @@ def test_a_search_whose_runs_do_not_agree_says_so(runs):
     apart = replace(optimum, explored=replace(optimum.explored, ends=(18.71, 10.0, 9.5)))
     assert "best two of 3 runs ended at 18.71 and 10.00 mm/s" in apart.doubt
     assert "--evaluations" in apart.doubt
-    agreed = replace(optimum, explored=replace(optimum.explored, ends=(18.71, 18.6)))
-    assert agreed.doubt == ""
-    assert "its last climb still gained 3.0%" in replace(agreed, gained=0.03).doubt
+    assert replace(optimum, explored=replace(optimum.explored, ends=(18.71, 18.6))).doubt == ""
 
 
 def test_an_unknown_method_is_refused(runs):

@@ -1,7 +1,7 @@
 """Optimisers from well-kept libraries behind one call: maximise a batched objective over the unit cube."""
 
 from .bayesian import bayesian_optimization
-from .cma_es import cma_es, sobol_sample
+from .cma_es import cma_es
 from .common import Evaluated, Objective, OnEvaluated
 from .evolution import differential_evolution
 
@@ -15,5 +15,4 @@ __all__ = [
     "bayesian_optimization",
     "cma_es",
     "differential_evolution",
-    "sobol_sample",
 ]

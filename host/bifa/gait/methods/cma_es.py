@@ -33,6 +33,19 @@ def cma_es(
     (dimensions,) marks full turns."""
     recorder = RecordedObjective(objective, wraps, on_progress)
     _sample(recorder, len(wraps), seed, evaluations)
+    return climb_basins(recorder, wraps, evaluations, seed, population)
+
+
+def climb_basins(
+    recorder: RecordedObjective,
+    wraps: np.ndarray,
+    evaluations: int,
+    seed: int,
+    population: int = 12,
+    step: float = _STEP,
+) -> Evaluated:
+    """Runs of CMA-ES from the best basins among what was recorded, until the best two agree, all basins were tried, or
+    about `evaluations` are recorded."""
     tried: list[np.ndarray] = []
     ends: list[float] = []
     while recorder.count < evaluations and not agree(ends, _SAME):
@@ -40,23 +53,14 @@ def cma_es(
         if not len(starts):
             break
         tried += list(starts)
-        ends += climb_together(recorder, starts, evaluations - recorder.count, seed + len(tried), population)
+        ends += climb_together(recorder, starts, evaluations - recorder.count, seed + len(tried), population, step)
     return recorder.found(tuple(sorted(ends, reverse=True)))
 
 
-def sobol_sample(
-    objective: Objective, wraps: np.ndarray, evaluations: int, seed: int, on_progress: OnEvaluated | None = None
-) -> Evaluated:
-    """The sample alone, of about `evaluations` points or more, where a search on another objective begins."""
-    recorder = RecordedObjective(objective, wraps, on_progress)
-    _sample(recorder, len(wraps), seed, 2 * evaluations, 1 << round(np.log2(evaluations)))
-    return recorder.found()
-
-
-def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations: int, first: int = _SAMPLE) -> None:
-    """Sobol points, `first` of them, until enough of them walk, or half of `evaluations` is spent."""
+def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations: int) -> None:
+    """Sobol points, until enough of them walk, or half of `evaluations` is spent."""
     sobol = qmc.Sobol(dimensions, rng=np.random.default_rng([seed, 2]))
-    size = min(first, 1 << max(3, int(np.log2(max(evaluations, 16) / 2))))
+    size = min(_SAMPLE, 1 << max(3, int(np.log2(max(evaluations, 16) / 2))))
     values = recorder(sobol.random(size))
     while np.count_nonzero(values > 0.0) < _ENOUGH and 2 * len(values) <= min(_SAMPLE_MOST, evaluations / 2):
         values = np.concatenate([values, recorder(sobol.random(len(values)))])

@@ -57,7 +57,7 @@ class Evaluated:
         turns = np.zeros(self.points.shape[1], dtype=bool) if wraps is None else wraps
         free = np.ones(len(self.points), dtype=bool)
         for point in avoid:
-            free &= distances(self.points, point, turns) >= apart
+            free &= _distances(self.points, point, turns) >= apart
         chosen: list[np.ndarray] = []
         for index in np.argsort(-self.values, kind="stable"):
             if not free[index]:
@@ -65,12 +65,12 @@ class Evaluated:
             chosen.append(self.points[index])
             if len(chosen) == count:
                 break
-            free &= distances(self.points, chosen[-1], turns) >= apart
+            free &= _distances(self.points, chosen[-1], turns) >= apart
         return np.array(chosen).reshape(-1, self.points.shape[1])
 
 
-def distances(points: np.ndarray, point: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """(n,) of points (n, dimensions) from one: the most on any axis, the shorter way round on full turns."""
+def _distances(points: np.ndarray, point: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """The greatest difference on any axis, the shorter way round on full turns."""
     difference = np.abs(points - point)
     return np.where(turns, np.minimum(difference, 1.0 - difference), difference).max(axis=1)
 
