@@ -1,12 +1,13 @@
 """From a model to a gait: explore, refine, verify the finalists, say how sure it is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bifa.effects import library
 from bifa.errors import BifaError
+from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.methods.cma_es import APART, basins, climb_basins, climb_together
 from bifa.gait.methods.common import Objective, RecordedObjective
@@ -26,7 +27,7 @@ OnProgress = Callable[[str, float, float], None]
 
 VERIFYING_DRAWS = 1024  # robots that the chosen gait meets, all new
 _NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 6
-# Of cma the most, for a landscape with many basins: it ends when its best runs agree. Half of them, where what is
+# Of cma the most, for a landscape with many basins: it ends when its best runs agree. A quarter of them, where what is
 # fastest on the model is only where a search on robots begins.
 EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
 _POPULATION = 12
@@ -36,8 +37,8 @@ _POPULATION = 12
 class RobustRound:
     """Of a robust search: how many robots a gait meets, what quantile of the speed counts, the share of the best value
     at which a gait is given up, the integrator's tolerance; the changes of period, in parts, that the gaits of the
-    round before are tried with; and of the CMA-ES runs on that: the most evaluations, their first step, from how many
-    basins. `in_full`: walks have the metric's own number of cycles, since the quick one's are too few for those that
+    round before are tried with; and of the CMA-ES runs on that: the most evaluations, their first step, how many there
+    are. `in_full`: walks have the metric's own number of cycles, since the quick one's are too few for those that
     settle late. `jitter`: of the period, from robot to robot, in parts."""
 
     draws: int
@@ -54,23 +55,22 @@ class RobustRound:
 
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
 # in ten of its own robots fails would fail more often on others.
-EXPLORE = RobustRound(24, 0.08, 0.9, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 600, 0.06)
+EXPLORE = RobustRound(24, 0.08, 0.95, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005)
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    RobustRound(32, 0.0625, 0.95, 3e-5, (0.0, 0.02, 0.04), 1000, 0.05, climbs=3, jitter=0.005),
-    RobustRound(128, 0.0677, 0.993, 1e-5, (0.0, 0.006, 0.012, -0.006), 200, 0.015, in_full=True, jitter=0.002),
+    RobustRound(32, 0.0625, 0.95, 3e-6, (0.0, 0.02, 0.04), 480, 0.015, climbs=3, jitter=0.005),
+    RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.006, 0.012, -0.006), 216, 0.01, climbs=2, in_full=True, jitter=0.002),
 )
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004, -0.008), in_full=True)
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
 # on others. Slower by these parts if need be.
 _CHECKING_DRAWS, _CHECK_QUANTILE = 512, 0.085
 _SLOWER = (0.005, 0.01, 0.02, 0.05)
-_BASINS, _STARTS = 24, 8  # of the explored gaits, compared on the first and the second round's robots
+_BASINS, _STARTS = 24, 8  # of the explored gaits, where climbs on robots begin; without climbs, those to refine
 _NEAR, _FAR = 0.003, 0.02  # of two finalists, on some axis of the unit cube: at one place, and at others
-# Of two climbs on robots: basins are long, with two tops or more on a ridge along which the tail's vacuum ends at the
-# same moment of the cycle, and from starts next to one another climbs end at the same top.
-_ALONG = 0.25
+# Climbs on robots: from how many families, and how near the best these and the ends of the round before have to come.
+_FAMILIES, _FAMILY_WORTH, _END_WORTH = 3, 0.9, 0.95
 # Of the best value, when it is checked: what a gait has to keep to be taken at once, and to be one that stands.
 _KEPT, _PROMISED = 0.993, 0.5
 _NONE_STANDS = "no candidate survives re-simulation over 20 cycles with a finer step; search longer"
@@ -136,11 +136,12 @@ class Optimum:
     @property
     def doubt(self) -> str:
         """A sentence where the best two independent runs of the search did not come to the same speed; else empty."""
-        if self.explored.agrees:
+        if self.explored.ends is None or self.explored.agrees:
             return ""
-        first, second = (*self.explored.ends, 0.0)[:2]
+        ends = self.explored.ends.values
+        first, second = (*ends, 0.0)[:2]
         return (
-            f"the search has not settled: its best two of {len(self.explored.ends)} runs ended at {first:.2f} and "
+            f"the search has not settled: its best two of {len(ends)} runs ended at {first:.2f} and "
             f"{second:.2f} mm/s, so a faster gait may exist; search longer with --evaluations, or try another --seed"
         )
 
@@ -220,19 +221,30 @@ def _explore(objective: Objective, settings: Settings, on_progress: OnProgress) 
 def explore_on_robots(
     model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> Evaluated:
-    """CMA-ES on a few robots from the basins of the model's own speed, and from the gaits to begin with: from slower
-    copies too, since the fastest are beyond the cliff of most robots, whose objective is 0."""
+    """CMA-ES on a few robots from families of gaits, from the basins of the model's own speed, and from the gaits to
+    begin with: from slower copies too, since the fastest are beyond the cliff of most robots, whose objective is 0."""
     objective, budget = on_robots(model, runs, spread, settings, EXPLORE, 0), _scaled(EXPLORE.evaluations, settings)
+    wraps = settings.space.wraps
     recorder = RecordedObjective(
         objective,
-        settings.space.wraps,
+        wraps,
         lambda count, best: on_progress("search on robots", min(count / budget, 1.0), best),
     )
-    starts = np.vstack([settings.space.nearest(settings.begin), basins(explored, settings.space.wraps, _BASINS)])
+    starts = np.vstack([settings.space.nearest(settings.begin), basins(explored, wraps, _BASINS)])
     recorder(np.concatenate(_at_periods(EXPLORE, settings.space, starts)))
     if not settings.refine:
         return recorder.found()
-    return climb_basins(recorder, settings.space.wraps, budget, settings.seed, _POPULATION, EXPLORE.step)
+    families = _best_periods(recorder, settings.space, settings.space.nearest(FAMILIES), PERIODS)
+    known = list(families.near_best(_FAMILY_WORTH).finalists(_FAMILIES, _NEAR, wraps))
+    return climb_basins(recorder, wraps, budget, settings.seed, _POPULATION, EXPLORE.step, known, EXPLORE.abandon)
+
+
+def _best_periods(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
+    """Of each point (n, dimensions) the copy with the best period."""
+    copies = np.array([space.slower(points, share) for share in periods])
+    values = np.array([objective(one) for one in copies])
+    best = np.argmax(values, axis=0)
+    return Evaluated(copies[best, np.arange(len(points))], values.max(axis=0))
 
 
 def _budget(settings: Settings) -> int:
@@ -240,7 +252,7 @@ def _budget(settings: Settings) -> int:
 
 
 def _usual(settings: Settings) -> int:
-    return EVALUATIONS[settings.method] // (2 if settings.robust else 1)
+    return EVALUATIONS[settings.method] // (4 if settings.robust else 1)
 
 
 def _scaled(evaluations: int, settings: Settings) -> int:
@@ -256,16 +268,18 @@ def _refine(objective: Objective, explored: Evaluated, settings: Settings, on_pr
         settings.space.wraps,
         lambda count, best: on_progress("refine", min(count / share, 1.0), max(best, explored.best_value)),
     )
-    climb_together(recorder, explored.best_point[None], share, settings.seed, _POPULATION, _FINAL_STEP)
+    climb_together(recorder, explored.best_point[None], share, settings.seed, _POPULATION, [_FINAL_STEP])
     return recorder.found()
 
 
 def _refine_on_robots(
     model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
 ) -> list[Evaluated]:
-    """CMA-ES in rounds of more robots each, every time from the gaits of the round before that these robots like best:
-    what was best on few robots may owe it to them."""
-    found, starts = [explored], _STARTS
+    """CMA-ES in rounds of more robots each, every time from where the climbs of the round before ended: those ends that
+    these robots like best, since what was best on few robots may owe it to them."""
+    wraps = settings.space.wraps
+    ended = explored.finalists(_STARTS, APART, wraps) if explored.ends is None else explored.ends.points
+    found = [explored]
     for number, stage in enumerate(_REFINE, start=1):
         objective = on_robots(model, runs, spread, settings, stage, number)
         budget = _scaled(stage.evaluations, settings)
@@ -273,14 +287,14 @@ def _refine_on_robots(
         def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
             on_progress(f"refine {number}", min(count / budget, 1.0), best)
 
-        recorder = RecordedObjective(objective, settings.space.wraps, show)
-        wraps, apart = settings.space.wraps, APART if stage.climbs > 1 else _FAR
-        for points in _at_periods(stage, settings.space, found[-1].finalists(starts, apart, wraps)):
-            recorder(points)
-        begun = recorder.found().finalists(stage.climbs, _ALONG, wraps)
-        climb_together(recorder, begun, budget, settings.seed, _POPULATION, stage.step)
+        recorder = RecordedObjective(objective, wraps, show)
+        best = _best_periods(recorder, settings.space, ended, stage.periods)
+        begun = best.near_best(_END_WORTH).finalists(stage.climbs, _FAR, wraps)
+        if not len(begun):
+            break
+        steps = [stage.step] * len(begun)
+        ended = climb_together(recorder, begun, budget, settings.seed, _POPULATION, steps, stage.abandon).points
         found.append(recorder.found())
-        starts = _POPULATION // 2
     return found[1:]
 
 

@@ -72,10 +72,12 @@ def test_runs_that_end_apart_are_not_taken_for_an_answer():
         return (heights * np.maximum(1 - away / 0.25, 0)).max(axis=1)
 
     found = METHODS["cma"](peaks, np.zeros(5, bool), 1500, 0)
-    assert len(found.ends) >= 5
-    assert found.agrees == (found.ends[1] >= 0.99 * found.ends[0])
-    assert not Evaluated(found.points, found.values, (18.7, 10.0)).agrees
-    assert Evaluated(found.points, found.values, (18.79, 18.71)).agrees
+    assert len(found.ends.values) >= 5
+    np.testing.assert_array_equal(peaks(found.ends.points), found.ends.values)
+    assert found.agrees == (found.ends.values[1] >= 0.99 * found.ends.values[0])
+    for second, agrees in ((10.0, False), (18.71, True)):
+        ends = Evaluated(found.points[:2], np.array([18.79, second]))
+        assert Evaluated(found.points, found.values, ends).agrees == agrees
 
 
 def test_climbs_begin_at_the_basins_that_were_seen():
@@ -84,8 +86,25 @@ def test_climbs_begin_at_the_basins_that_were_seen():
     recorder(np.array([[0.25] * 5, [0.7] * 5, [0.71] * 5]))
     found = climb_basins(recorder, np.zeros(5, bool), 600, 0)
     assert found.best_value > 0.99
-    assert found.ends[0] == found.best_value
+    assert found.ends.values[0] == found.best_value
+    np.testing.assert_array_equal(found.ends.points[0], found.best_point)
     assert len(found.values) < 600 + 5 * 12, "a generation of five runs more at most"
+
+
+def test_a_narrow_basin_is_climbed_from_a_point_known_to_be_near_its_top():
+    """A second family of gaits, 5 % faster on some robots, was found by one seed in four."""
+
+    def narrow(points):
+        away = np.abs(points - 0.8).max(axis=1)
+        return np.maximum(0.9 - ((points - 0.3) ** 2).sum(axis=1), np.where(away < 0.05, 1.0 - away, 0.0))
+
+    values = []
+    for known in ((), (np.full(5, 0.77),)):
+        recorder = RecordedObjective(narrow, np.zeros(5, bool))
+        recorder(np.random.default_rng(0).random((64, 5)))
+        values.append(climb_basins(recorder, np.zeros(5, bool), 1500, 0, known=known).best_value)
+    assert values[0] == pytest.approx(0.9, abs=0.01)
+    assert values[1] > 0.99
 
 
 @pytest.mark.parametrize("method", ["de", "cma", "bo"])
@@ -102,6 +121,12 @@ def test_a_seed_gives_the_same_search_again_and_progress_is_told(method):
 def test_a_plain_of_zeros_does_not_end_the_search_early():
     found = METHODS["de"](lambda p: np.zeros(len(p)), WRAPS, 500, 0)
     assert len(found.values) == 500
+
+
+def test_what_is_near_the_best_is_kept_and_of_zeros_nothing():
+    found = Evaluated(np.arange(6.0).reshape(3, 2), np.array([9.6, 10.0, 9.4]))
+    np.testing.assert_array_equal(found.near_best(0.95).values, [9.6, 10.0])
+    assert len(Evaluated(found.points, np.zeros(3)).near_best(0.95).values) == 0
 
 
 def test_finalists_are_the_best_and_apart():

@@ -222,10 +222,16 @@ def test_slower_copies_keep_to_the_space():
 
 def test_a_search_whose_runs_do_not_agree_says_so(runs):
     optimum = optimize(nominal(), runs, Settings(robust=False, evaluations=200, seed=1))
-    apart = replace(optimum, explored=replace(optimum.explored, ends=(18.71, 10.0, 9.5)))
+    explored = optimum.explored
+
+    def ended(*values):
+        ends = Evaluated(explored.points[: len(values)], np.array(values))
+        return replace(optimum, explored=replace(explored, ends=ends))
+
+    apart = ended(18.71, 10.0, 9.5)
     assert "best two of 3 runs ended at 18.71 and 10.00 mm/s" in apart.doubt
     assert "--evaluations" in apart.doubt
-    assert replace(optimum, explored=replace(optimum.explored, ends=(18.71, 18.6))).doubt == ""
+    assert ended(18.71, 18.6).doubt == ""
 
 
 def test_an_unknown_method_is_refused(runs):

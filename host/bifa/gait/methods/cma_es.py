@@ -14,9 +14,9 @@ _ENOUGH = 60
 APART = 0.12  # of two starts, on some axis of the unit cube: another basin
 _NEIGHBORS, _COMPARED = 8, 2000
 _CLIMBS = 5  # at once, and as many in each restart
-_STEP = 0.06  # initial standard deviation, of the unit cube
+_STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations, of the unit cube: of any basin, and near its top
 _TRIAL = 10  # generations after which a run far behind the best is given up
-_BEHIND = 0.9  # of the best value
+_BEHIND = 0.9  # of the best value: what is below is far behind
 _SAME = 2.5e-3  # two runs that end within this part of each other are enough
 _STALLED, _GAIN = 10, 5e-4  # generations in which a run has gained less than this part ends it
 
@@ -43,18 +43,23 @@ def climb_basins(
     seed: int,
     population: int = 12,
     step: float = _STEP,
+    known: Sequence[np.ndarray] = (),
+    behind: float = _BEHIND,
 ) -> Evaluated:
-    """Runs of CMA-ES from the best basins among what was recorded, until the best two agree, all basins were tried, or
-    about `evaluations` are recorded."""
-    tried: list[np.ndarray] = []
-    ends: list[float] = []
-    while recorder.count < evaluations and not agree(ends, _SAME):
-        starts = basins(recorder.found(), wraps, _CLIMBS, tried)
+    """Runs of CMA-ES from points `known` to be near tops and from the best basins among what was recorded, until the
+    best two agree, all basins were tried, or about `evaluations` are recorded."""
+    ends, tried = Evaluated(np.empty((0, len(wraps))), np.empty(0)), list(known)
+    while recorder.count < evaluations and not agree(ends.values, _SAME):
+        others = basins(recorder.found(), wraps, _CLIMBS - len(known), tried)
+        starts = np.array([*known, *others])
         if not len(starts):
             break
-        tried += list(starts)
-        ends += climb_together(recorder, starts, evaluations - recorder.count, seed + len(tried), population, step)
-    return recorder.found(tuple(sorted(ends, reverse=True)))
+        steps = [_NEAR_TOP] * len(known) + [step] * len(others)
+        more = climb_together(
+            recorder, starts, evaluations - recorder.count, seed + len(tried), population, steps, behind
+        )
+        ends, tried, known = ends.joined(more), [*tried, *others], ()
+    return recorder.found(ends.ranked if len(ends.values) else None)
 
 
 def _sample(recorder: RecordedObjective, dimensions: int, seed: int, evaluations: int) -> None:
@@ -90,30 +95,38 @@ def _tops(seen: Evaluated, wraps: np.ndarray) -> np.ndarray:
 
 
 def climb_together(
-    objective: Objective, starts: np.ndarray, evaluations: int, seed: int, population: int = 12, step: float = _STEP
-) -> list[float]:
-    """Runs of CMA-ES from `starts` (n, dimensions), a generation of all of them in one call; the best value of each.
-    One that after a while is far behind the best is given up."""
-    runs = [_strategy(start, step, seed + k, population) for k, start in enumerate(starts)]
+    recorder: RecordedObjective,
+    starts: np.ndarray,
+    evaluations: int,
+    seed: int,
+    population: int,
+    steps: Sequence[float],
+    behind: float = _BEHIND,
+) -> Evaluated:
+    """Runs of CMA-ES from `starts` (n, dimensions), a generation of all of them in one call; the best of each.
+    One that after a while is below `behind` of the best is given up."""
+    tops = np.array(starts, dtype=float)
+    runs = [_strategy(*start, seed + k, population) for k, start in enumerate(zip(starts, steps, strict=True))]
     bests: list[list[float]] = [[] for _ in runs]  # of each, so far, after every generation
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
         asked = [np.array(runs[k].ask()) for k in alive]
-        values = np.split(objective(np.concatenate(asked)), np.cumsum([len(a) for a in asked])[:-1])
+        values = np.split(recorder(np.concatenate(asked)), np.cumsum([len(a) for a in asked])[:-1])
         for k, points, value in zip(alive, asked, values, strict=True):
             runs[k].tell(list(points), (-value).tolist())
+            if not bests[k] or value.max() > bests[k][-1]:
+                tops[k] = recorder.fold(points[int(np.argmax(value))])
             bests[k].append(max([*bests[k][-1:], float(value.max())]))
         spent += sum(map(len, asked))
         best = max(one[-1] for one in bests)
-        alive = [k for k in alive if not (runs[k].stop() or _is_hopeless(bests[k], best) or _has_stalled(bests[k]))]
-        ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
-        if len(ended) > 1 and agree([best, ended[-2]], _SAME):  # nothing that runs is ahead of two that ended
-            break
-    return [one[-1] for one in bests]
+        alive = [
+            k for k in alive if not (runs[k].stop() or _is_hopeless(bests[k], behind * best) or _has_stalled(bests[k]))
+        ]
+    return Evaluated(tops, np.array([one[-1] if one else 0.0 for one in bests]))
 
 
-def _is_hopeless(bests: Sequence[float], best: float) -> bool:
-    return len(bests) >= _TRIAL and bests[-1] < _BEHIND * best
+def _is_hopeless(bests: Sequence[float], least: float) -> bool:
+    return len(bests) >= _TRIAL and bests[-1] < least
 
 
 def _has_stalled(bests: Sequence[float]) -> bool:

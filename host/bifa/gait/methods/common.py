@@ -1,6 +1,6 @@
 """What every optimiser takes and gives."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,12 +22,12 @@ class Evaluated:
 
     points: np.ndarray
     values: np.ndarray
-    ends: tuple[float, ...] = ()
+    ends: "Evaluated | None" = None
 
     @property
     def agrees(self) -> bool:
         """Whether the best two of the independent runs have come to the same value; true of a method that has none."""
-        return len(self.ends) == 0 or agree(self.ends)
+        return self.ends is None or agree(self.ends.values)
 
     @property
     def best_point(self) -> np.ndarray:
@@ -44,6 +44,17 @@ class Evaluated:
         parts = (self, *others)
         points, values = (np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "values"))
         return Evaluated(points, values, self.ends)
+
+    @property
+    def ranked(self) -> "Evaluated":
+        """The same, the best first."""
+        order = np.argsort(-self.values, kind="stable")
+        return Evaluated(self.points[order], self.values[order], self.ends)
+
+    def near_best(self, share: float) -> "Evaluated":
+        """What comes to `share` of the best value; nothing where that is 0."""
+        near = (self.values > 0.0) & (self.values >= share * self.values.max(initial=0.0))
+        return Evaluated(self.points[near], self.values[near])
 
     def finalists(
         self,
@@ -75,7 +86,7 @@ def _distances(points: np.ndarray, point: np.ndarray, turns: np.ndarray) -> np.n
     return np.where(turns, np.minimum(difference, 1.0 - difference), difference).max(axis=1)
 
 
-def agree(ends: Sequence[float], within: float = AGREE) -> bool:
+def agree(ends: Iterable[float], within: float = AGREE) -> bool:
     """Whether the best two of independent runs have come to the same value."""
     first, second = [*sorted(ends, reverse=True), 0.0, 0.0][:2]
     return first > 0.0 and second >= (1.0 - within) * first
@@ -92,7 +103,7 @@ class RecordedObjective:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Values (n,) of points (n, dimensions)."""
-        points = np.where(self._wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
+        points = self.fold(points)
         values = np.asarray(self._objective(points), dtype=float)
         self._points.append(points)
         self._values.append(values)
@@ -102,6 +113,10 @@ class RecordedObjective:
             self._on_progress(self.count, self.best)
         return values
 
-    def found(self, ends: tuple[float, ...] = ()) -> Evaluated:
+    def fold(self, points: np.ndarray) -> np.ndarray:
+        """Points brought back into the unit cube."""
+        return np.where(self._wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
+
+    def found(self, ends: Evaluated | None = None) -> Evaluated:
         """All of it; `ends` of independent runs."""
         return Evaluated(np.concatenate(self._points), np.concatenate(self._values), ends)
