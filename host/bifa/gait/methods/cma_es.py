@@ -47,7 +47,9 @@ def climb_basins(
     behind: float = _BEHIND,
 ) -> Evaluated:
     """Runs of CMA-ES from points `known` to be near tops and from the best basins among what was recorded, until the
-    best two agree, all basins were tried, or about `evaluations` are recorded."""
+    best two agree, all basins were tried, or about `evaluations` are recorded. Near known tops all runs go to their
+    ends: two that agree early may be in one basin, and another ahead of both in the end."""
+    same = 0.0 if len(known) else _SAME
     ends, tried = Evaluated(np.empty((0, len(wraps))), np.empty(0)), list(known)
     while recorder.count < evaluations and not agree(ends.values, _SAME):
         others = basins(recorder.found(), wraps, _CLIMBS - len(known), tried)
@@ -55,9 +57,8 @@ def climb_basins(
         if not len(starts):
             break
         steps = [_NEAR_TOP] * len(known) + [step] * len(others)
-        more = climb_together(
-            recorder, starts, evaluations - recorder.count, seed + len(tried), population, steps, behind
-        )
+        budget, run_seed = evaluations - recorder.count, seed + len(tried)
+        more = climb_together(recorder, starts, budget, run_seed, population, steps, behind, same)
         ends, tried, known = ends.joined(more), [*tried, *others], ()
     return recorder.found(ends.ranked if len(ends.values) else None)
 
@@ -102,9 +103,11 @@ def climb_together(
     population: int,
     steps: Sequence[float],
     behind: float = _BEHIND,
+    same: float = 0.0,
 ) -> Evaluated:
     """Runs of CMA-ES from `starts` (n, dimensions), a generation of all of them in one call; the best of each.
-    One that after a while is below `behind` of the best is given up."""
+    One that after a while is below `behind` of the best is given up; all are, where two that ended agree within `same`,
+    if that is not 0, and nothing that runs is ahead."""
     tops = np.array(starts, dtype=float)
     runs = [_strategy(*start, seed + k, population) for k, start in enumerate(zip(starts, steps, strict=True))]
     bests: list[list[float]] = [[] for _ in runs]  # of each, so far, after every generation
@@ -122,6 +125,9 @@ def climb_together(
         alive = [
             k for k in alive if not (runs[k].stop() or _is_hopeless(bests[k], behind * best) or _has_stalled(bests[k]))
         ]
+        ended = sorted(one[-1] for k, one in enumerate(bests) if k not in alive)
+        if same and len(ended) > 1 and agree([best, ended[-2]], same):
+            break
     return Evaluated(tops, np.array([one[-1] if one else 0.0 for one in bests]))
 
 
