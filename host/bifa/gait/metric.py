@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bifa.gait.settling import MOST_CYCLES
 from bifa.simulate import Advance
 from bifa.simulate.rigs import CLEAR
 from bifa.simulate.terrain import passed_at_m, terrain, tunnel
@@ -41,7 +42,8 @@ class Metric:
     (of the advance, which counts as at least 1 mm) and slip less than `slip_m` each. Slip is travel while both ends
     slide. tolerance_m: of the integrator, a step. direction: -1 to count backward walking. inclination_deg: of the
     pipe, uphill positive. clock: seconds that pass in one of the Uno's, by which gaits and speeds are meant.
-    dead_time_s: of the Uno's, in which a chamber is vented between the supplies.
+    dead_time_s: of the Uno's, in which a chamber is vented between the supplies. unlike: no cycle is like the one
+    before, and no walk settles.
     """
 
     cycles: int = 10
@@ -53,6 +55,7 @@ class Metric:
     inclination_deg: float = 0.0
     clock: float = 1.0
     dead_time_s: float = 0.0
+    unlike: bool = False
 
     @property
     def is_plain(self) -> bool:
@@ -66,20 +69,26 @@ class Metric:
 
     def finer(self) -> "Metric":
         """For finalists: twenty cycles, the last ten of them judged, and a far smaller step."""
-        return replace(self, cycles=20, judged=10, tolerance_m=1e-7)
+        return replace(self, cycles=20, judged=10, tolerance_m=1e-7).in_full()
+
+    def in_full(self) -> "Metric":
+        """As a walk is measured that never settles: by the second half of as many cycles as it is given. A tether lets
+        a gait fall after sixteen."""
+        return replace(self, cycles=MOST_CYCLES, judged=MOST_CYCLES // 2) if self.unlike else self
 
     def quicker(self) -> "Metric":
-        """For searches over many draws: six cycles, longer steps. What it lets through is judged again."""
-        return replace(self, cycles=6, judged=2, periodic=max(self.periodic, 5e-3), tolerance_m=3e-5)
+        """For searches over many draws: six cycles, longer steps. What it lets through is judged again. A walk that
+        never settles keeps all its cycles: by six a search goes to where all fall later."""
+        return replace(self, cycles=6, judged=2, periodic=max(self.periodic, 5e-3), tolerance_m=3e-5).in_full()
 
     def of_draws(self) -> "Metric":
         """For robots that the model may be, the model itself among them: they may slip, and their cycles differ. A
         speed that is measured counts however a robot comes by it."""
-        return replace(self.of_unlike_cycles(), slip_m=np.inf)
+        return replace(self, periodic=_UNLIKE, slip_m=np.inf)
 
     def of_unlike_cycles(self) -> "Metric":
         """For a robot that never walks the same cycle twice."""
-        return replace(self, periodic=_UNLIKE)
+        return replace(self, periodic=_UNLIKE, unlike=True)
 
     def judge(self, progress: Advance) -> Judged:
         """Apply the rules to simulated cycles of shape (n, cycles)."""
@@ -111,6 +120,10 @@ class Passage:
     def finer(self) -> "Passage":
         """For finalists: a smaller step."""
         return replace(self, tolerance_m=1e-6)
+
+    def in_full(self) -> "Passage":
+        """The same: a tunnel is passed or not."""
+        return self
 
     def quicker(self) -> "Passage":
         """As many cycles, since the tunnel has to be passed; longer steps."""

@@ -14,7 +14,7 @@ from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import FELL, FINE_M, Prediction, predict_speed
+from bifa.gait.prediction import CYCLES, FELL, FINE_M, Prediction, predict_speed
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
@@ -181,7 +181,7 @@ def optimize(
         refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
     fresh = possible_robots(model, runs, spread, settings, VERIFYING_DRAWS, settings.seed + 2_000_003)
-    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric, tolerance_m=FINE_M))[0]
+    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric.in_full(), tolerance_m=FINE_M))[0]
     on_progress("verify", 1.0, nominal)
     return Optimum(
         gait,
@@ -202,7 +202,8 @@ def _predicted(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, s
     plain = isinstance(settings.metric, Metric) and settings.metric.is_plain
     if not plain:
         return Prediction(speeds, settings.metric.cycles)
-    return predict_speed(model, known, gait, seed=settings.seed)
+    cycles = max(CYCLES, settings.metric.in_full().cycles)
+    return predict_speed(model, known, gait, seed=settings.seed, cycles=cycles)
 
 
 def _explore(objective: Objective, settings: Settings, on_progress: OnProgress) -> Evaluated:
@@ -303,7 +304,8 @@ def on_robots(
 ) -> RobustSpeed:
     """The objective of a round, on robots of its own."""
     draws = possible_robots(model, runs, spread, settings, stage.draws, settings.seed + 500_000 * number)
-    metric = replace(settings.metric if stage.in_full else settings.metric.quicker(), tolerance_m=stage.tolerance_m)
+    metric = settings.metric.in_full() if stage.in_full else settings.metric.quicker()
+    metric = replace(metric, tolerance_m=stage.tolerance_m)
     share = stage.quantile * settings.share / QUANTILE
     return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon, stage.jitter)
 
@@ -369,7 +371,7 @@ def best_of_finalists(
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
     checking = possible_robots(model, runs, spread, settings, _CHECKING_DRAWS, settings.seed + 2_500_000)
-    metric = replace(settings.metric, tolerance_m=FINE_M)
+    metric = replace(settings.metric.in_full(), tolerance_m=FINE_M)
     # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
     least = max(_PROMISED * float(values.max()), STANDING_MM_S)
     near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])

@@ -52,6 +52,16 @@ def test_draws_may_slip_and_their_cycles_differ_and_the_mean_counts():
     assert Metric().of_draws().judge(progress([50] * 7 + [50, 45, 35])).refused
 
 
+def test_what_never_settles_is_judged_in_full_by_the_second_half_of_what_is_walked():
+    """A gait that a tether lets fall after sixteen cycles was sought at 23.0 mm/s, and walked 20.5."""
+    falling = progress([50] * 16 + [44] * 8)
+    whole = Metric().of_unlike_cycles()
+    for metric in (whole.in_full(), whole.of_draws().in_full(), whole.finer(), whole.quicker()):
+        assert metric.cycles == 24
+        assert metric.judge(falling).counted_mm_s == pytest.approx([23.0])
+    assert Metric().in_full() == Metric()
+
+
 def test_the_finer_metric_wants_ten_equal_cycles():
     late = [50] * 11 + [50.2] + [50] * 8
     assert Metric().finer().cycles == 20
