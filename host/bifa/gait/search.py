@@ -232,7 +232,7 @@ def explore_on_robots(
         lambda count, best: on_progress("search on robots", min(count / budget, 1.0), best),
     )
     starts = np.vstack([settings.space.nearest(settings.begin), basins(explored, wraps, _BASINS)])
-    recorder(np.concatenate(_at_periods(EXPLORE, settings.space, starts)))
+    recorder(np.concatenate(_at_periods(settings.space, starts, EXPLORE.periods)))
     if not settings.refine:
         return recorder.found()
     families = _best_periods(recorder, settings.space, settings.space.nearest(FAMILIES), PERIODS)
@@ -242,7 +242,7 @@ def explore_on_robots(
 
 def _best_periods(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
     """Of each point (n, dimensions) the copy with the best period."""
-    copies = np.array([space.slower(points, share) for share in periods])
+    copies = np.array(_at_periods(space, points, periods))
     values = np.array([objective(one) for one in copies])
     best = np.argmax(values, axis=0)
     return Evaluated(copies[best, np.arange(len(points))], values.max(axis=0))
@@ -362,9 +362,9 @@ def best_of_finalists(
     """The first of the finalists that keeps what the best promised, over robots that the search did not meet; slower
     copies of it follow, for the case that all are beyond the cliff. Where none does, the best of them that stand; where
     none stands, the one that walks best on average."""
-    groups = _at_periods(_SHORTLIST, settings.space, refined.finalists(_ROBUST_FINALISTS, apart=_NEAR))
+    finalists = refined.finalists(_ROBUST_FINALISTS, apart=_NEAR)
     objective = on_robots(model, runs, spread, settings, _SHORTLIST, 3)
-    shortlist = np.concatenate(groups)
+    shortlist = np.concatenate(_at_periods(settings.space, finalists, _SHORTLIST.periods))
     # One by one: what is worse than the best so far meets few robots, the hardest first.
     values = np.concatenate([objective(point[None]) for point in shortlist])
     on_progress("verify", 0.6, float(values.max()))
@@ -395,9 +395,9 @@ def best_of_finalists(
     raise SearchError(_NONE_STANDS)
 
 
-def _at_periods(stage: RobustRound, space: SearchSpace, points: np.ndarray) -> list[np.ndarray]:
-    """The points, and each with its period changed a little."""
-    return [space.slower(points, share) for share in stage.periods]
+def _at_periods(space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> list[np.ndarray]:
+    """The points (n, dimensions) with their periods changed by each share of `periods`."""
+    return [space.slower(points, share) for share in periods]
 
 
 def _finely(model: Model, runs: Simulations, rows: np.ndarray, settings: Settings) -> np.ndarray:
