@@ -45,14 +45,10 @@ class SearchSpace:
         """(dimensions,) true where an axis is a full turn."""
         return np.array([axis.wraps for axis in self.axes])
 
-    def fold(self, points: np.ndarray) -> np.ndarray:
-        """Points brought back into the unit cube: full turns wrap, the other axes are cut at their ends."""
-        return np.where(self.wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
-
     def gaits(self, points: np.ndarray) -> list[Gait]:
         """The gaits of points of shape (n, dimensions)."""
         lower, width = self._box
-        values = lower + self.fold(np.atleast_2d(points)) * width
+        values = lower + folded(np.atleast_2d(points), self.wraps) * width
         return [
             Gait(**{name: value for axis, value in zip(self.axes, row, strict=True) for name in axis.sets})
             for row in values.tolist()
@@ -63,7 +59,7 @@ class SearchSpace:
         number = next(number for number, axis in enumerate(self.axes) if "period_s" in axis.sets)
         axis, slow = self.axes[number], points.copy()
         slow[:, number] += share * (axis.lower / (axis.upper - axis.lower) + points[:, number])
-        return self.fold(slow)
+        return folded(slow, self.wraps)
 
     def point(self, gait: Gait) -> np.ndarray:
         """(dimensions,) of a gait; SpaceError where the gait lies outside or breaks an axis's equality."""
@@ -78,7 +74,7 @@ class SearchSpace:
 
     def nearest(self, gaits: Sequence[Gait]) -> np.ndarray:
         """(n, dimensions) of gaits, or of what the space has nearest to them."""
-        return self.fold(np.array([self._unfolded(gait) for gait in gaits]).reshape(-1, len(self.axes)))
+        return folded(np.array([self._unfolded(gait) for gait in gaits]).reshape(-1, len(self.axes)), self.wraps)
 
     def _unfolded(self, gait: Gait) -> np.ndarray:
         values = gait.as_dict()
@@ -91,6 +87,11 @@ class SearchSpace:
         """Its lower corner and its widths, (dimensions,) each."""
         ends = np.array([(axis.lower, axis.upper) for axis in self.axes])
         return ends[:, 0], ends[:, 1] - ends[:, 0]
+
+
+def folded(points: np.ndarray, wraps: np.ndarray) -> np.ndarray:
+    """Points (n, dimensions) brought back into the unit cube: axes that are full turns wrap, the others are cut."""
+    return np.where(wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
 
 
 def paper_space(

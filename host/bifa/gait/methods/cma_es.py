@@ -7,6 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
+from bifa.gait.space import folded
+
 from .common import Evaluated, Objective, OnEvaluated, RecordedObjective, agree
 
 _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled until enough of them walk
@@ -118,7 +120,7 @@ def climb_together(
         for k, points, value in zip(alive, asked, values, strict=True):
             runs[k].tell(list(points), (-value).tolist())
             if not bests[k] or value.max() > bests[k][-1]:
-                tops[k] = recorder.fold(points[int(np.argmax(value))])
+                tops[k] = folded(points[int(np.argmax(value))], recorder.wraps)
             bests[k].append(max([*bests[k][-1:], float(value.max())]))
         spent += sum(map(len, asked))
         best = max(one[-1] for one in bests)

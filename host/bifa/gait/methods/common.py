@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bifa.gait.space import folded
+
 # (n, dimensions) points of the unit cube -> (n,) values to be maximised.
 Objective = Callable[[np.ndarray], np.ndarray]
 # (evaluations so far, best value so far) -> None
@@ -96,14 +98,14 @@ class RecordedObjective:
     """An objective that remembers what it was asked, folds points and reports progress."""
 
     def __init__(self, objective: Objective, wraps: np.ndarray, on_progress: OnEvaluated | None = None):
-        self._objective, self._wraps, self._on_progress = objective, wraps, on_progress
+        self._objective, self.wraps, self._on_progress = objective, wraps, on_progress
         self._points: list[np.ndarray] = []
         self._values: list[np.ndarray] = []
         self.count, self.best = 0, -np.inf
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Values (n,) of points (n, dimensions)."""
-        points = self.fold(points)
+        points = folded(points, self.wraps)
         values = np.asarray(self._objective(points), dtype=float)
         self._points.append(points)
         self._values.append(values)
@@ -112,10 +114,6 @@ class RecordedObjective:
         if self._on_progress is not None:
             self._on_progress(self.count, self.best)
         return values
-
-    def fold(self, points: np.ndarray) -> np.ndarray:
-        """Points brought back into the unit cube."""
-        return np.where(self._wraps, np.mod(points, 1.0), np.clip(points, 0.0, 1.0))
 
     def found(self, ends: Evaluated | None = None) -> Evaluated:
         """All of it; `ends` of independent runs."""
