@@ -17,7 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from statistics import mean
@@ -32,6 +32,7 @@ from bifa.campaign.stages import Stage, run_stages
 from bifa.campaign.walks import measure_walks, planned_cycles, prediction_of, speed_of, walks_of
 from bifa.data import read_dataset
 from bifa.gait import SearchError
+from bifa.gait.measured import complete_cycles
 from bifa.gait.prediction import FELL
 from bifa.gait.settling import STANDING_MM_S
 from bifa.robot import load_model
@@ -108,8 +109,10 @@ def walked(folder: Path, setup: Setup, effort: Effort) -> dict[str, Walked]:
     if rounds[-1]["at_edge"]:
         found["edge"] = f"rounds/walks-{len(rounds)}"
     models = dict.fromkeys(("baseline", "robust"), "model-completed.toml") | {"edge": "model-last.toml"}
+    # As long as the campaign's longest walk: where a tether grows, a short one flatters.
+    least = max(_cycles(folder / place) for place in found.values())
     for number, (name, naive) in enumerate({"naive": True, "fair": False}.items()):
-        _walk_base(folder, name, naive, setup, effort, _STAGE + number)
+        _walk_base(folder, name, naive, setup, replace(effort, cycles=least), _STAGE + number)
         found[name], models[name] = f"walks-{name}", "model-base.toml"
     return {name: _walked(folder / found[name], folder / models[name], name) for name in GAITS if name in found}
 
@@ -126,6 +129,10 @@ def _walk_base(folder: Path, name: str, naive: bool, setup: Setup, effort: Effor
     cycles = planned_cycles(model, gait, effort.cycles)
     with setup.open(stage) as rig:
         measure_walks(rig, folder / f"walks-{name}", {name: gait}, cycles, effort.repeats)
+
+
+def _cycles(walks: Path) -> int:
+    return max(complete_cycles(trial.time_s, trial.walked["period_s"]) for trial in read_dataset(walks).trials)
 
 
 def _walked(walks: Path, model: Path, name: str) -> Walked:

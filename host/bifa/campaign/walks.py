@@ -10,7 +10,7 @@ import numpy as np
 from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, Trial
 from bifa.gait.measured import MeasuredSpeed, complete_cycles, measured_speed
-from bifa.gait.prediction import Prediction, predict_speed
+from bifa.gait.prediction import Prediction, predict_speed, settles
 from bifa.gait.settling import LEAST, MOST_CYCLES, Walking
 from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
@@ -66,7 +66,9 @@ def _until_settled(rig: Rig, uno: Uno, planned: PlannedTrial, on_progress: Calla
 
 def planned_cycles(model: Model, gait: Gait, least: int) -> int:
     """How many cycles to walk, as the model predicts: near the edge a robot may hardly move for several cycles
-    before it walks, so that the first ones say nothing."""
+    before it walks, so that the first ones say nothing; one that never settles may fall after many."""
+    if not settles(model):
+        return MOST_CYCLES
     return int(np.clip(predict_speed(model, spread_of(model), gait).cycles, least, MOST_CYCLES))
 
 

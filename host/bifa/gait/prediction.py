@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bifa.effects import library
 from bifa.gait.settling import CAMERA_MM, LEAST, STANDING_MM_S, settling
 from bifa.gait.uncertainty import Knowledge
 from bifa.robot.gait import Gait
@@ -141,6 +142,11 @@ def predict_speed(
 ) -> Prediction:
     """What is predicted of one gait: see `Predictor`."""
     return Predictor(model, known, draws=draws, seed=seed).of(gait, cycles=cycles, clock_rate=clock_rate)
+
+
+def settles(model: Model) -> bool:
+    """Whether the model's walks come to be periodic, not one of its effects making each cycle unlike the one before."""
+    return not any(library()[effect].unlike_cycles for effect in model.effects)
 
 
 def camera_mm_s(gait: Gait, cycles: int = LEAST) -> float:

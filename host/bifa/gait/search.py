@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bifa.effects import library
 from bifa.errors import BifaError
 from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
@@ -14,7 +13,7 @@ from bifa.gait.methods.common import Objective, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
-from bifa.gait.prediction import CYCLES, FELL, FINE_M, Prediction, predict_speed
+from bifa.gait.prediction import CYCLES, FELL, FINE_M, Prediction, predict_speed, settles
 from bifa.gait.settling import STANDING_MM_S
 from bifa.gait.space import SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
@@ -161,7 +160,7 @@ def optimize(
     flat, spread = plant(model), settings.knowledge(model)
     timing = spread.scatter
     metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
-    if any(library()[effect].unlike_cycles for effect in model.effects):
+    if not settles(model):
         metric = metric.of_unlike_cycles()
     settings = replace(settings, metric=metric)
     own = NominalSpeed(runs, flat, settings.space, settings.rules.quicker() if settings.robust else metric)

@@ -8,7 +8,9 @@ import pytest
 
 from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged, read_rounds
 from bifa.campaign.stages import StageError
+from bifa.campaign.walks import planned_cycles
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.gait.settling import MOST_CYCLES
 from bifa.robot import Model, load_model, nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
 from bifa.simulate import walk
@@ -207,3 +209,9 @@ def test_rounds_of_an_earlier_version_are_walked_again(tmp_path):
     file.write_text('[{"effects": [], "predicted_mm_s": 20.0, "measured_mm_s": 20.1, "spread_mm_s": 0.1}]')
     with pytest.raises(StageError, match=r"rounds\.json was written by an earlier version.*--rerun again"):
         read_rounds(file)
+
+
+def test_a_robot_that_never_settles_is_given_all_cycles():
+    tethered = ROBOT.with_effects({"tether_drag": {"drag_N_m": 0.5}})
+    assert planned_cycles(ROBOT, BASELINE, 7) == 7
+    assert planned_cycles(tethered, BASELINE, 7) == MOST_CYCLES
