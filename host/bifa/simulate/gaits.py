@@ -82,10 +82,10 @@ def speeds(
         what = lanes.Experiment(
             lanes.PROGRESS, ways[first:last], switches[first:last], list(ends[first:last]), tolerance_m
         )
-        for k, rows in zip(piece, lanes.march(flats[first:last], what, together=False), strict=True):
-            start = flats[k].q[layout.BODY + layout.CONTRACTED]
-            advance[k] = np.diff(rows[0], prepend=start)
-            slip[k] = np.diff(rows[1], prepend=0.0)
+        rows = np.array(lanes.march(flats[first:last], what, together=False))
+        starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats[first:last]])
+        advance[piece] = np.diff(rows[:, 0], prepend=starts[:, None])
+        slip[piece] = np.diff(rows[:, 1], prepend=0.0)
 
     count = workers or cores()
     pieces = min(_PIECES_PER_WORKER * count, -(-n // full_lanes())) if count > 1 else 1

@@ -161,27 +161,19 @@ def gait_switches(
     edge = np.stack([np.zeros_like(duty), duty], axis=-1)[:, :, None, :]
     time = (np.arange(cycles)[None, None, :, None] + edge - phase[:, :, None, None]) * period[:, :, None, None]
     real = (time > 0.0) & (time < duration_s[:, None, None, None]) & ~(always | never)[:, :, None, None]
-    shape = time.shape[1:]
-    chamber = np.broadcast_to(np.arange(3)[:, None, None], shape).reshape(-1)
-    command = np.broadcast_to(np.array([VACUUM, POSITIVE]), shape).reshape(-1)
-    found = []
-    for one, real_one, begins in zip(time.reshape(len(gaits), -1), real.reshape(len(gaits), -1), first, strict=True):
-        kept = np.flatnonzero(real_one)
-        kept = kept[np.argsort(one[kept], kind="stable")]
-        time_s, whose, told = one[kept], chamber[kept], command[kept]
-        if dead_time_s > 0.0:
-            time_s = np.concatenate([time_s, time_s + dead_time_s])
-            order = np.argsort(time_s, kind="stable")
-            time_s, whose = time_s[order], np.tile(whose, 2)[order]
-            told = np.concatenate([np.full_like(told, OFF), told])[order]
-        found.append(
-            Timeline(
-                np.concatenate([np.zeros(3), time_s]),
-                np.concatenate([np.arange(3), whose]),
-                np.concatenate([begins.astype(np.int64), told]),
-            )
-        )
-    return found
+    n, counts = len(gaits), np.count_nonzero(real, axis=(1, 2, 3))
+    time_s = np.where(real, time, np.inf).reshape(n, -1)
+    chamber = np.broadcast_to(np.arange(3)[:, None, None], time.shape).reshape(n, -1)
+    command = np.broadcast_to(np.array([VACUUM, POSITIVE]), time.shape).reshape(n, -1)
+    if dead_time_s > 0.0:
+        counts, time_s = 2 * counts, np.hstack([time_s, time_s + dead_time_s])
+        chamber, command = np.hstack([chamber, chamber]), np.hstack([np.full_like(command, OFF), command])
+    order = np.argsort(time_s, axis=1, kind="stable")
+    time_s, chamber, command = (np.take_along_axis(one, order, axis=1) for one in (time_s, chamber, command))
+    times = np.hstack([np.zeros((n, 3)), time_s])
+    chambers = np.hstack([np.tile(np.arange(3), (n, 1)), chamber])
+    commands = np.hstack([first.astype(np.int64), command])
+    return [Timeline(times[k, :m], chambers[k, :m], commands[k, :m]) for k, m in enumerate(3 + counts)]
 
 
 @kernel
