@@ -17,6 +17,8 @@ from pathlib import Path
 from cffi import FFI
 
 HERE = Path(__file__).resolve().parent
+_COMPILE = ["-O3", "-flto", "-fvisibility=hidden", "-fno-math-errno", "-fno-trapping-math", "-std=gnu11"]
+_COMPILE += ["-Wall", "-Wextra", "-Wno-missing-field-initializers"]
 
 
 @dataclass(frozen=True)
@@ -74,17 +76,7 @@ def compile_part(part: Part, target: Path) -> None:
         sources=[str(p) for p in part.sources()],
         include_dirs=[str(part.folder), *part.include],
         libraries=list(part.libraries),
-        extra_compile_args=[
-            "-O3",
-            "-flto",
-            "-fvisibility=hidden",
-            "-fno-math-errno",
-            "-fno-trapping-math",
-            "-std=gnu11",
-            "-Wall",
-            "-Wextra",
-            "-Wno-missing-field-initializers",
-        ],
+        extra_compile_args=_COMPILE,
         extra_link_args=["-flto", "-O3"],
     )
     with tempfile.TemporaryDirectory() as scratch:
@@ -96,9 +88,7 @@ def compile_part(part: Part, target: Path) -> None:
 
 def main(names: list[str]) -> int:
     for part in PARTS:
-        if names and part.name not in names:
-            continue
-        if not part.is_fresh():
+        if (not names or part.name in names) and not part.is_fresh():
             print(f"compiling virtual_robot/{part.name}", flush=True)
             compile_part(part, part.built)
     return 0

@@ -35,14 +35,8 @@ def write_head(folder: Path, name: str, known: Mapping[str, float], entries: Ite
 
 def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     """One header line, then rows."""
-    digits = [_digits(name) for name in columns]
+    digits = [0 if name.startswith("command") else 3 if name == "force_N" else 4 for name in columns]
     line = ",".join(f"%.{n}f" for n in digits) + "\n"
     rows = np.column_stack(list(columns.values()))
     text = (line * len(rows)) % tuple(rows.ravel())
     path.write_text(",".join(columns) + "\n" + text, encoding="utf-8")
-
-
-def _digits(column: str) -> int:
-    if column.startswith("command"):
-        return 0
-    return {"time_s": 4, "force_N": 3}.get(column, 4)

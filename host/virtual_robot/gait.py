@@ -21,14 +21,12 @@ class Gait:
     duty_head: float
     duty_tail: float
 
-    def _ahead_and_duty(self) -> list[tuple[float, float]]:
-        ahead = (0.0, self.psi12_deg / 360.0, self.psi13_deg / 360.0)
-        return list(zip(ahead, (self.duty_body, self.duty_head, self.duty_tail), strict=True))
-
     def switches(self, duration_s: float) -> list[tuple[float, str, str]]:
         """(time_s, chamber, "positive" | "vacuum") in the order of time; the body's phase is 0 at time 0."""
         rows = []
-        for chamber, (ahead, duty) in zip(CHAMBERS, self._ahead_and_duty(), strict=True):
+        all_ahead = (0.0, self.psi12_deg / 360.0, self.psi13_deg / 360.0)
+        duties = (self.duty_body, self.duty_head, self.duty_tail)
+        for chamber, ahead, duty in zip(CHAMBERS, all_ahead, duties, strict=True):
             rows.append((0.0, chamber, "positive" if (ahead + 1e-12) % 1.0 >= duty else "vacuum"))
             for cycle in range(int(duration_s / self.period_s) + 2):
                 rows += [

@@ -21,7 +21,8 @@ import numpy as np
 from virtual_robot.effects import plant_parameters
 from virtual_robot.errors import FirmwareError, PortClosedError
 from virtual_robot.instruments import Instruments, Noise
-from virtual_robot.plant import Plant, profile
+from virtual_robot.plant import Plant
+from virtual_robot.plant import profile as parameters_in
 from virtual_robot.sealed import draw_effects, specimen
 from virtual_robot.uno import CLOCK_HZ, Uno
 
@@ -221,7 +222,7 @@ def open_rig(
     Raises VirtualRobotError, saying what to do.
     """
     random = np.random.default_rng([seed, 0x51D])
-    numbers, curves, inside = _profile(profile), None, dict(effects or {})
+    numbers, curves, inside = parameters_in(profile), None, dict(effects or {})
     bench = _BENCHES[profile]
     if sealed is not None:
         draw = np.random.default_rng(sealed)
@@ -249,6 +250,3 @@ def _default_image() -> Path:
     """The one built in this checkout, else one that an installed package offers as an entry point of `bifa.images`."""
     offered = () if FIRMWARE.is_file() else (entry.load()() for entry in entry_points(group="bifa.images"))
     return next((path for path in offered if path), FIRMWARE)
-
-
-_profile = profile  # open_rig has a parameter of that name

@@ -15,9 +15,8 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import tomli_w
@@ -63,42 +62,26 @@ class Label:
 
     seed: int
     kind: str
-    effects: Mapping[str, Mapping[str, float]]
     sizes: Mapping[str, float]
+    effects: Mapping[str, Mapping[str, float]]
     parameters: Mapping[str, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "format": 1,
-            "seed": self.seed,
-            "kind": self.kind,
-            "sizes": dict(self.sizes),
-            "effects": {name: dict(values) for name, values in self.effects.items()},
-            "parameters": dict(self.parameters),
-        }
 
 
 def plans() -> list[Plan]:
     """The 15 conditions of the day; each is repeated three times."""
-    static = [
-        *(("body", p, 0.002) for p in (0.0, 4.0, 8.5)),
-        ("body", 0.0, 0.008),
-        ("head", 0.0, 0.002),
-        ("head", 8.5, 0.002),
-    ]
+    static = [*(("body", psi, 2) for psi in (0.0, 4.0, 8.5)), ("body", 0.0, 8), ("head", 0.0, 2), ("head", 8.5, 2)]
     steps = [("body", 6.0), ("body", 8.5), ("head", 8.5)]
     walks = {"baseline": gait.BASELINE, "easy": gait.EASY, "leisurely": gait.LEISURELY}
-    named = []
-    for chamber, psi, rate in static:
-        size = "large" if chamber == "body" else "small"
-        name = f"static_{size}_{psi:g}psi_{rate * 1e3:g}mm_s"
-        named.append(Plan("static_loading", name, chamber, psi, rate))
-    for chamber, psi in steps:
-        size = "large" if chamber == "body" else "small"
-        named.append(Plan("step_response", f"step_{size}_{psi:g}psi", chamber, psi))
-    named += [Plan("anchor_pull", f"anchor_{psi:g}psi", "head", psi, 0.020) for psi in (0.0, 5.0, 8.5)]
-    named += [Plan("locomotion", f"walk_{name}", gait=g) for name, g in walks.items()]
-    return named
+    size = {"body": "large", "head": "small"}
+    return [
+        *(
+            Plan("static_loading", f"static_{size[chamber]}_{psi:g}psi_{mm_s}mm_s", chamber, psi, mm_s / 1e3)
+            for chamber, psi, mm_s in static
+        ),
+        *(Plan("step_response", f"step_{size[chamber]}_{psi:g}psi", chamber, psi) for chamber, psi in steps),
+        *(Plan("anchor_pull", f"anchor_{psi:g}psi", "head", psi, 0.020) for psi in (0.0, 5.0, 8.5)),
+        *(Plan("locomotion", f"walk_{name}", gait=walk) for name, walk in walks.items()),
+    ]
 
 
 def specimen(random: np.random.Generator) -> tuple[dict[str, float], tuple[Curve, Curve]]:
@@ -148,9 +131,10 @@ def generate(
         sizes = {effect: float(random.uniform(*SIZES)) if size is None else size}
         effects = {effect: EFFECTS[effect].at(sizes[effect], random)}
     lab = Lab(parameters | plant_parameters(effects), curves)
-    label = Label(seed, kind, effects, sizes, parameters)
+    label = Label(seed, kind, sizes, effects, parameters)
     write(out, f"sealed-{seed}", lab, random)
-    (label_file or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(label.as_dict()))
+    content = {"format": 1, **asdict(label)}
+    (label_file or out.with_name(out.name + ".sealed.toml")).write_text(tomli_w.dumps(content))
     return label
 
 

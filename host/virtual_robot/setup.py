@@ -20,14 +20,10 @@ class BuildWithParts(build_py):
         super().run()
         if not self.editable_mode:
             for part in PARTS:
-                self._compile(part)
-
-    def _compile(self, part) -> None:
-        target = Path(self.build_lib) / "virtual_robot" / part.built.relative_to(HERE)
-        try:
-            compile_part(part, target)
-        except Exception as error:  # cffi wraps whatever the compiler raised; the rest of the package works without
-            self.warn(f"left out, because it did not compile: {part.name} ({error})")
+                try:
+                    compile_part(part, Path(self.build_lib) / "virtual_robot" / part.built.relative_to(HERE))
+                except Exception as error:  # whatever the compiler raised, wrapped by cffi; the rest works without
+                    self.warn(f"left out, because it did not compile: {part.name} ({error})")
 
 
 class WithParts(Distribution):

@@ -12,6 +12,7 @@ import numpy as np
 from virtual_robot.gait import Gait
 from virtual_robot.instruments.sensors import Noise, converted_psi, measured
 from virtual_robot.plant import Curve, Plant
+from virtual_robot.plant.plant import CHAMBERS
 
 _STATIC_HZ, _STEP_HZ, _ANCHOR_HZ, _WALK_HZ = 50.0, 100.0, 50.0, 100.0
 _STEP_UP_S, _STEP_DOWN_S, _STEP_END_S = 0.5, 5.0, 14.0
@@ -77,9 +78,16 @@ class Lab:
     def pressure(self, rows: np.ndarray, chamber: int, random: np.random.Generator) -> np.ndarray:
         return converted_psi(rows["pressure_psi"][:, chamber], self.noise.pressure_psi, random)
 
-
-def _chamber_number(plan: Plan) -> int:
-    return 0 if plan.chamber == "body" else 1
+    def machine(
+        self, time: np.ndarray, rows: np.ndarray, plan: Plan, random: np.random.Generator
+    ) -> dict[str, np.ndarray]:
+        """The columns of an experiment with a cross-head."""
+        return {
+            "time_s": time,
+            "displacement_mm": 1e3 * measured(rows["crosshead_m"], self.noise.crosshead_m, random),
+            "force_N": measured(rows["force_N"], self.noise.force_N, random),
+            "pressure_psi": self.pressure(rows, CHAMBERS.index(plan.chamber), random),
+        }
 
 
 def _static(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
@@ -89,12 +97,7 @@ def _static(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> 
     plant.move(0.0, travel, plan.rate_m_s, there_and_back=True)
     time = np.arange(int(2.0 * travel / plan.rate_m_s * _STATIC_HZ) + 1) / _STATIC_HZ
     rows = plant.record(time)
-    return {
-        "time_s": time,
-        "displacement_mm": 1e3 * measured(rows["crosshead_m"], lab.noise.crosshead_m, random),
-        "force_N": measured(rows["force_N"], lab.noise.force_N, random),
-        "pressure_psi": lab.pressure(rows, _chamber_number(plan), random),
-    }
+    return lab.machine(time, rows, plan, random)
 
 
 def _step(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
@@ -107,7 +110,7 @@ def _step(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> di
         "time_s": time,
         "command": ((time >= _STEP_UP_S - 1e-9) & (time < _STEP_DOWN_S - 1e-9)).astype(int),
         "displacement_mm": 1e3 * measured(rows["head_m"], lab.noise.camera_m, random),
-        "pressure_psi": lab.pressure(rows, _chamber_number(plan), random),
+        "pressure_psi": lab.pressure(rows, CHAMBERS.index(plan.chamber), random),
     }
 
 
@@ -116,12 +119,7 @@ def _anchor(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> 
     plant.move(0.0, _PULL_M, plan.rate_m_s, there_and_back=False)
     time = np.arange(int(_PULL_M / plan.rate_m_s * _ANCHOR_HZ)) / _ANCHOR_HZ
     rows = plant.record(time)
-    return {
-        "time_s": time,
-        "displacement_mm": 1e3 * measured(rows["crosshead_m"], lab.noise.crosshead_m, random),
-        "force_N": measured(rows["force_N"], lab.noise.force_N, random),
-        "pressure_psi": lab.pressure(rows, 1, random),
-    }
+    return lab.machine(time, rows, plan, random)
 
 
 def _walk(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
@@ -134,10 +132,10 @@ def _walk(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> di
     rows = plant.record(time)
     return {
         "time_s": time,
-        **{f"command_{name}": commands[:, c] for c, name in enumerate(("body", "head", "tail"))},
+        **{f"command_{name}": commands[:, c] for c, name in enumerate(CHAMBERS)},
         "displacement_head_mm": 1e3 * measured(rows["head_m"], lab.noise.camera_m, random),
         "displacement_tail_mm": 1e3 * measured(rows["tail_m"], lab.noise.camera_m, random),
-        **{f"pressure_{name}_psi": lab.pressure(rows, c, random) for c, name in enumerate(("body", "head", "tail"))},
+        **{f"pressure_{name}_psi": lab.pressure(rows, c, random) for c, name in enumerate(CHAMBERS)},
     }
 
 

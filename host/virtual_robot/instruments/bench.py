@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from virtual_robot.errors import VirtualRobotError
-from virtual_robot.instruments.clock import InstrumentClock
 from virtual_robot.instruments.sensors import Noise, measured
 from virtual_robot.plant import Plant
 
@@ -29,6 +29,28 @@ class StandError(VirtualRobotError, ValueError):
     """The stand cannot do what was asked."""
 
 
+@dataclass(frozen=True)
+class InstrumentClock:
+    """An instrument's own clock: own = offset_s + (1 + drift) (true - start_s), in steps of `resolution_s`, if any."""
+
+    start_s: float
+    offset_s: float
+    drift: float
+    resolution_s: float
+
+    @classmethod
+    def draw(cls, start_s: float, random: np.random.Generator, resolution_s: float) -> InstrumentClock:
+        """Switched on at some earlier moment; crystal oscillators differ by some 30 ppm."""
+        return cls(start_s, float(random.uniform(0.0, 100.0)), float(3e-5 * random.standard_normal()), resolution_s)
+
+    def own(self, true_s: np.ndarray) -> np.ndarray:
+        reading = self.offset_s + (1.0 + self.drift) * (np.asarray(true_s) - self.start_s)
+        return np.floor(reading / self.resolution_s) * self.resolution_s if self.resolution_s > 0 else reading
+
+    def true_period(self, own_period_s: float) -> float:
+        return own_period_s / (1.0 + self.drift)
+
+
 class Instruments:
     """Instruments around one plant that is wired to a board. `world` tells the time and the board's cycle."""
 
@@ -39,7 +61,7 @@ class Instruments:
         noise: Noise,
         wobble: float,
         random: np.random.Generator,
-        clock_resolution_s: float = 0.0,
+        clock_resolution_s: float,
     ) -> None:
         self._world = world
         self._plant = plant
@@ -75,7 +97,7 @@ class Instruments:
         """Begin a record: camera at 100 Hz, machines at 50 Hz, by the instrument's own clock."""
         self._plant.advance(self._now_s)
         self._plant.take_strobes()
-        self.clock = InstrumentClock.draw(self._now_s, self._random, resolution_s=self._clock_resolution_s)
+        self.clock = InstrumentClock.draw(self._now_s, self._random, self._clock_resolution_s)
         period_s = self.clock.true_period(1.0 / self._rate_hz)
         self._plant.watch(period_s, self._now_s + float(self._random.uniform(0.0, period_s)))
 

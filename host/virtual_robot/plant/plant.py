@@ -119,25 +119,14 @@ class Plant:
     def energy_joule(self) -> float:
         return lib.plant_energy(self._plant)
 
-    @property
-    def time_s(self) -> float:
-        return lib.plant_time(self._plant)
-
     # --- wired to the Uno -------------------------------------------------------------------------------
 
     def wire(self, uno: Any, clock_hz: float, noise_seed: int, noise_psi: float, noise_memory_s: float = 0.0) -> None:
         """Connect valves, strobe, sensors and DAC to a board; from now on the board's cycles are time."""
         lib.plant_wire(self._plant, uno.cycle, clock_hz, noise_seed, noise_psi, noise_memory_s)
-        address = [
-            int(ffi.cast("uintptr_t", pointer))
-            for pointer in (
-                self._plant,
-                lib.plant_pin_changed_address(),
-                lib.plant_analog_volts_address(),
-                lib.plant_dac_changed_address(),
-            )
-        ]
-        uno.connect(*address)
+        callbacks = (lib.plant_pin_changed_address, lib.plant_analog_volts_address, lib.plant_dac_changed_address)
+        pointers = (self._plant, *(callback() for callback in callbacks))
+        uno.connect(*(int(ffi.cast("uintptr_t", pointer)) for pointer in pointers))
 
     def remount(self, experiment: str, chamber: str, cycle: int) -> None:
         """Put another experiment on the stand while the board goes on; time is 0 at `cycle`."""
@@ -163,11 +152,7 @@ class Plant:
 
     def take_strobes(self) -> np.ndarray:
         """Rising edges of the sampling strobe since the last call [s]."""
-        times = np.zeros(4096)
-        parts = []
-        while count := lib.plant_strobes(self._plant, ffi.cast("double *", times.ctypes.data), len(times)):
-            parts.append(times[:count].copy())
-        return np.concatenate(parts) if parts else np.zeros(0)
+        return self._taken(lib.plant_strobes, "double *", np.dtype(float))
 
     def watch(self, period_s: float, offset_s: float) -> None:
         """Have an instrument sample at offset_s + n period_s from now on; period 0 stops."""
@@ -175,11 +160,14 @@ class Plant:
 
     def take_watched(self) -> np.ndarray:
         """What the instrument has seen since the last call; dtype SAMPLE."""
-        rows = np.zeros(4096, SAMPLE)
-        parts = []
-        while count := lib.plant_watched(self._plant, ffi.cast("PlantSample *", rows.ctypes.data), len(rows)):
-            parts.append(rows[:count].copy())
-        return np.concatenate(parts) if parts else np.zeros(0, SAMPLE)
+        return self._taken(lib.plant_watched, "PlantSample *", SAMPLE)
+
+    def _taken(self, take: Any, pointer: str, dtype: np.dtype) -> np.ndarray:
+        """All that `take` has, block by block."""
+        block, parts = np.zeros(4096, dtype), [np.zeros(0, dtype)]
+        while count := take(self._plant, ffi.cast(pointer, block.ctypes.data), len(block)):
+            parts.append(block[:count].copy())
+        return np.concatenate(parts)
 
 
 def _table(curve: Curve) -> tuple[Any, int, float, float]:

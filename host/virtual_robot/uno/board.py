@@ -279,17 +279,14 @@ class Uno:
 
     # --- end --------------------------------------------------------------------------------------------
 
-    def save_eeprom(self) -> None:
-        """Write the EEPROM file at once or not at all."""
-        if self._eeprom_file is None:
-            return
-        handle, name = tempfile.mkstemp(dir=self._eeprom_file.parent, prefix=".eeprom-")
-        with os.fdopen(handle, "wb") as file:
-            file.write(self.eeprom)
-        os.replace(name, self._eeprom_file)
-
     def close(self) -> None:
-        if self._uno is not None:
-            self.save_eeprom()
-            lib.uno_free(self._uno)
-            self._uno = None
+        """Write the EEPROM file, at once or not at all; a second call does nothing."""
+        if self._uno is None:
+            return
+        if self._eeprom_file is not None:
+            handle, name = tempfile.mkstemp(dir=self._eeprom_file.parent, prefix=".eeprom-")
+            with os.fdopen(handle, "wb") as file:
+                file.write(self.eeprom)
+            os.replace(name, self._eeprom_file)
+        lib.uno_free(self._uno)
+        self._uno = None

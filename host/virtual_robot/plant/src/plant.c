@@ -160,4 +160,3 @@ double plant_energy(const Plant *plant) {
   return kinetic + stored;
 }
 
-double plant_time(const Plant *plant) { return plant->time; }

@@ -97,7 +97,6 @@ void plant_sample(const Plant *plant, PlantSample *sample);
 // Samples at start_s + i * period_s for i < count.
 void plant_record(Plant *plant, double start_s, double period_s, int count, PlantSample *samples);
 double plant_energy(const Plant *plant);  // kinetic + spring, J
-double plant_time(const Plant *plant);
 
 // --- wired to the Uno: addresses of these go into UnoWorld ---
 // `clock_hz` is what the board's 16 MHz really are. The sensors' noise is correlated over `noise_memory_s`; 0 = white.
