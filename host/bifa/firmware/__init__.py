@@ -1,6 +1,95 @@
 """The firmware's image in an installed package: put there by the release (tools/wheels.py), absent in a checkout, which
-builds its own."""
+builds its own. It is in Intel's HEX format; it says what it is, and so whether this host belongs to it."""
 
-from bifa.firmware.image import FOLDER, Image, ImageError, carried_image, carried_path, image_of, write_image
+import hashlib
+import re
+import shutil
+import tomllib
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-__all__ = ["FOLDER", "Image", "ImageError", "carried_image", "carried_path", "image_of", "write_image"]
+import tomli_w
+
+from bifa.errors import BifaError
+from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
+
+FOLDER = Path(__file__).parent
+HEX, HEAD = "uno.hex", "uno.toml"
+# What `version` answers, as it lies in flash.
+_SAYS = re.compile(rb"bifa ([\d.]+), protocol (\d+), table ([0-9a-f]{8})")
+
+
+class ImageError(BifaError):
+    """No image, a damaged one, or one of another version."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """What identifies an image; `sha256` is that of its file."""
+
+    version: str
+    protocol: int
+    table: str
+    sha256: str
+
+
+def carried_path() -> Path | None:
+    """Where this package's image is, or None in a checkout."""
+    return FOLDER / HEX if (FOLDER / HEX).is_file() else None
+
+
+def carried_image(folder: Path = FOLDER) -> Path:
+    """The package's image, checked: undamaged, and of the tables that this host speaks."""
+    try:
+        noted = Image(**tomllib.loads((folder / HEAD).read_text("utf-8")))
+        found = image_of(folder / HEX)
+    except FileNotFoundError as error:
+        raise ImageError(
+            "this installation carries no firmware: install a wheel of a release, or work in a clone of the repository"
+        ) from error
+    if found != noted:
+        raise ImageError(f"{folder / HEX} is damaged: reinstall the wheel of bifa")
+    _check_tables(found, folder / HEX)
+    return folder / HEX
+
+
+def write_image(built: Path, folder: Path = FOLDER) -> Image:
+    """Put the image that was built into the package, if it is of this host's tables."""
+    image = image_of(built)
+    _check_tables(image, built)
+    shutil.copyfile(built, folder / HEX)
+    (folder / HEAD).write_text(tomli_w.dumps(asdict(image)), "utf-8")
+    return image
+
+
+def image_of(path: Path) -> Image:
+    """Read what an image says of itself."""
+    text = path.read_bytes()
+    says = _SAYS.search(_decoded(text.decode("ascii", "replace"), path))
+    if says is None:
+        raise ImageError(f"{path} is not a bifa firmware image")
+    version, protocol, table = (group.decode() for group in says.groups())
+    return Image(version, int(protocol), table, hashlib.sha256(text).hexdigest())
+
+
+def _check_tables(image: Image, path: Path) -> None:
+    if (image.protocol, image.table) != (PROTOCOL_VERSION, f"{TABLE_HASH:08x}"):
+        raise ImageError(
+            f"{path} has protocol {image.protocol}, table {image.table}; "
+            f"this host speaks protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}: rebuild the firmware"
+        )
+
+
+def _decoded(text: str, path: Path) -> bytes:
+    """The bytes of the data records, in the file's order, which is that of their addresses."""
+    found = bytearray()
+    for number, line in enumerate(text.split(), 1):
+        try:
+            record = bytes.fromhex(line.removeprefix(":"))
+        except ValueError:
+            record = b""
+        if not line.startswith(":") or len(record) < 5 or len(record) != record[0] + 5 or sum(record) % 256:
+            raise ImageError(f"{path}, line {number}: damaged, or not in Intel's HEX format")
+        if record[3] == 0:
+            found += record[4:-1]
+    return bytes(found)

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from bifa import __version__
 from bifa.errors import BifaError
@@ -16,10 +15,11 @@ from bifa.link import Uno
 from bifa.link.table import PROTOCOL_VERSION, TABLE_HASH
 from bifa.rig import open_rig
 from bifa.rig.ports import serial_ports
-from bifa.toolchain.avrdude import avrdude_program
+from bifa.toolchain.flash import avrdude_program
 from bifa.toolchain.project import find_project, image_path, platformio_program, project_folder
 
 OK, MISSING, OPTIONAL = "ok", "missing", "optional"
+OPTIONAL_TOOLS = {"clang-format": "make lint", "cppcheck": "make lint", "clang++": "the fuzzers of make soak"}
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,11 @@ def run_checks(port: str | None) -> Iterator[Check]:
         yield guarded("firmware image", _carried)
     yield guarded("virtual robot", _virtual_rig)
     yield guarded("serial ports", _ports)
-    for program, purpose in OPTIONAL_TOOLS:
-        yield _optional_tool(program, purpose)
+    for program, purpose in OPTIONAL_TOOLS.items():
+        if found := shutil.which(program):
+            yield Check(program, OK, found)
+        else:
+            yield Check(program, OPTIONAL, "not installed", f"needed by {purpose}, which installs it")
     yield guarded("firmware on the board", lambda what: check_board(what, port))
 
 
@@ -80,17 +83,14 @@ def check_image(what: str) -> Check:
     image = image_path(project)
     if not image.is_file():
         return Check(what, MISSING, "not built", "run `pio run -e uno` or `make setup`")
-    if _newest(project / "firmware", project / "lib") > image.stat().st_mtime:
+    sources = [path for folder in ("firmware", "lib") for path in (project / folder).rglob("*.[ch]*")]
+    if any(path.stat().st_mtime > image.stat().st_mtime for path in sources):
         return Check(what, OPTIONAL, "older than its sources", "run `pio run -e uno`")
     return Check(what, OK, str(image.relative_to(project)))
 
 
 def _carried(what: str) -> Check:
     return Check(what, OK, f"version {image_of(carried_image()).version}, carried by this installation")
-
-
-def _newest(*folders: Path) -> float:
-    return max((path.stat().st_mtime for folder in folders for path in folder.rglob("*.[ch]*")), default=0.0)
 
 
 def _virtual_rig(what: str) -> Check:
@@ -109,20 +109,6 @@ def _ports(what: str) -> Check:
         return Check(what, OPTIONAL, "none", "plug the Uno in; without one, use `--port virtual`")
     listed = ", ".join(f"{port.device} ({port.board or port.description})" for port in ports)
     return Check(what, OK, listed)
-
-
-OPTIONAL_TOOLS = (
-    ("clang-format", "make lint"),
-    ("cppcheck", "make lint"),
-    ("clang++", "the fuzzers of make soak"),
-)
-
-
-def _optional_tool(program: str, purpose: str) -> Check:
-    found = shutil.which(program)
-    if found:
-        return Check(program, OK, found)
-    return Check(program, OPTIONAL, "not installed", f"needed by {purpose}, which installs it")
 
 
 def check_board(what: str, port: str | None) -> Check:

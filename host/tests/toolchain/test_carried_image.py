@@ -11,7 +11,7 @@ from bifa import firmware
 from bifa.cli import app
 from bifa.firmware import ImageError, carried_image, image_of, write_image
 from bifa.link.table import TABLE_HASH
-from bifa.toolchain import ToolchainError, avrdude
+from bifa.toolchain import ToolchainError, flash
 from virtual_robot.rig import open_rig
 
 BUILT = Path(__file__).parents[3] / ".pio" / "build" / "uno" / "firmware.hex"
@@ -66,14 +66,14 @@ def test_a_failing_avrdude_ends_in_a_sentence(no_checkout, writes):
 def test_without_avrdude_the_sentence_says_how_to_get_it(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ToolchainError, match="avrdude"):
-        avrdude.avrdude_program()
+        flash.avrdude_program()
 
 
 @pytest.mark.skipif(not shutil.which("avrdude"), reason="no avrdude to ask")
 def test_avrdude_itself_understands_the_command(package, tmp_path):
     """It gets as far as opening the port, which is not there."""
     with pytest.raises(ToolchainError, match=r"not-there|can't open"):
-        avrdude.write_with_avrdude(carried_image(package), os.fspath(tmp_path / "not-there"), lambda line: None)
+        flash.write_with_avrdude(carried_image(package), os.fspath(tmp_path / "not-there"), lambda line: None)
 
 
 def test_an_image_knows_itself():
@@ -98,7 +98,7 @@ def test_another_image_in_its_place_is_not_written(package):
 
 
 def test_an_image_of_other_tables_is_neither_taken_up_nor_written(package, monkeypatch, tmp_path):
-    monkeypatch.setattr("bifa.firmware.image.TABLE_HASH", TABLE_HASH ^ 1)
+    monkeypatch.setattr("bifa.firmware.TABLE_HASH", TABLE_HASH ^ 1)
     with pytest.raises(ImageError, match="rebuild the firmware"):
         carried_image(package)
     with pytest.raises(ImageError, match="rebuild the firmware"):
