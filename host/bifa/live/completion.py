@@ -30,7 +30,8 @@ class Known:
 
 def words_after(words: list[str], known: Known) -> dict[str, str]:
     """What may follow the complete words of a line, and what is worth knowing about each."""
-    parameters = {p.name: f"{_range_and_value(p.name, known)}; {p.help}" for p in PARAMETERS}
+    now = {name: f", now {value:.10g}" for name, value in known.parameters.items()}
+    parameters = {p.name: f"{range_text(p)}{now.get(p.name, '')}; {p.help}" for p in PARAMETERS}
     commands = {name: text for name, _, text in CONSOLE_COMMANDS}
     presets = {name: "saved" if is_saved else "factory" for name, is_saved in known.presets.items()}
     match words:
@@ -52,11 +53,6 @@ def words_after(words: list[str], known: Known) -> dict[str, str]:
             return SECOND.get(command, {})
         case _:
             return {}
-
-
-def _range_and_value(name: str, known: Known) -> str:
-    value = f", now {known.parameters[name]:.10g}" if name in known.parameters else ""
-    return range_text(BY_NAME[name]) + value
 
 
 class LineCompleter(Completer):

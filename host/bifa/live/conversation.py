@@ -92,7 +92,9 @@ class Conversation:
             if line:
                 self._carry_out(line)
             self.latest.take(self.uno.samples(WAIT_S))
-            self._pass_on()
+            if lines := list(self.uno.session.lines):
+                self.uno.session.lines.clear()
+                print("\n".join(lines))
         except RestartedError:
             self.uno.connect()
             settle(self.uno, self._clock)
@@ -108,12 +110,6 @@ class Conversation:
         try:
             self._learn()  # first, so that who reads the answer finds completion up to date
         finally:
-            print("\n".join(lines))
-
-    def _pass_on(self) -> None:
-        lines = list(self.uno.session.lines)
-        self.uno.session.lines.clear()
-        if lines:
             print("\n".join(lines))
 
     def _look(self) -> None:

@@ -208,7 +208,8 @@ class LivePage:
         except (WebSocketDisconnect, RuntimeError):
             pass
         except (AskedWrongError, KeyError) as error:  # KeyError: bytes instead of text
-            await _refused(socket, str(error))
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                await socket.close(1007, str(error))
         finally:
             sending.cancel()
             self.pages.discard(page)
@@ -241,8 +242,8 @@ class LivePage:
         acts: dict[str, Callable[[], Awaitable[str] | str]] = {
             "run": lambda: _waited(self.pilot.ask(lambda uno: uno.run()), "walking"),
             "clear": lambda: _waited(self.pilot.ask(lambda uno: uno.clear()), "released: it may walk again"),
-            "apply": lambda: self._apply(_gait(asked)),
-            "save": lambda: self._save(_gait(asked), str(asked.get("preset", ""))),
+            "apply": lambda: self._upload(_gait(asked)),
+            "save": lambda: self._upload(_gait(asked), str(asked.get("preset", ""))),
             "load": lambda: self._load(str(asked.get("preset", ""))),
             "draft": lambda: self._draft(_gait(asked).as_dict(), page.number),
             "closing": lambda: self._closing(asked),
@@ -267,14 +268,9 @@ class LivePage:
         page.answers.add(task)
         task.add_done_callback(page.answers.discard)
 
-    def _apply(self, gait: Gait) -> Awaitable[str]:
-        done = self.pilot.ask(lambda uno: uno.upload(gait.as_dict()), changes=True)
-        return _waited(done, "applied; a walking robot adopts it at its next cycle")
-
-    def _save(self, gait: Gait, name: str) -> Awaitable[str]:
-        return _waited(
-            self.pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=name), changes=True), f"saved as {name}"
-        )
+    def _upload(self, gait: Gait, preset: str | None = None) -> Awaitable[str]:
+        said = f"saved as {preset}" if preset is not None else "applied; a walking robot adopts it at its next cycle"
+        return _waited(self.pilot.ask(lambda uno: uno.upload(gait.as_dict(), save=preset), changes=True), said)
 
     def _load(self, preset: str) -> Awaitable[str]:
         def load(uno: Uno) -> dict[str, float]:
@@ -319,11 +315,6 @@ async def _in_pieces(content: bytes) -> AsyncIterator[bytes]:
     for begin in range(0, len(content), _PIECE):
         yield content[begin : begin + _PIECE]
         await asyncio.sleep(0)
-
-
-async def _refused(socket: WebSocket, reason: str) -> None:
-    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-        await socket.close(1007, reason)
 
 
 async def _send(socket: WebSocket, page: OpenPage) -> None:

@@ -19,17 +19,14 @@ class LiveState:
         """Take over `changes`; the message that tells the pages, with the samples that are new."""
         self.version += 1
         self.content |= changes
-        self._keep(samples or [])
-        return {"version": self.version, "state": self.content, "samples": samples or []}
-
-    def whole(self) -> dict[str, Any]:
-        """The message for a page that knows nothing yet, or whose samples are void."""
-        return {"version": self.version, "state": self.content, "samples": list(self.samples), "whole": True}
-
-    def _keep(self, samples: list[dict[str, Any]]) -> None:
-        for sample in samples:
+        for sample in samples or []:
             if self.samples and sample["t"] < self.samples[-1]["t"]:  # the Uno has restarted
                 self.samples.clear()
             self.samples.append(sample)
         while self.samples and self.samples[-1]["t"] - self.samples[0]["t"] > SHOWN_S:
             self.samples.popleft()
+        return {"version": self.version, "state": self.content, "samples": samples or []}
+
+    def whole(self) -> dict[str, Any]:
+        """The message for a page that knows nothing yet, or whose samples are void."""
+        return {"version": self.version, "state": self.content, "samples": list(self.samples), "whole": True}
