@@ -46,6 +46,11 @@ def _check_eeprom(file: Path) -> None:
         )
 
 
+def _of_status(name: str) -> property:
+    """A number that the chip's status tells."""
+    return property(lambda uno: getattr(uno._status(), name))
+
+
 class Uno:
     """One board. `eeprom` names a file that keeps the EEPROM between boards (written on `close`)."""
 
@@ -208,28 +213,14 @@ class Uno:
         return bool(self._status().crashed)
 
     @property
-    def resets(self) -> int:
-        return self._status().resets
-
-    @property
     def last_reset_cause(self) -> str:
         return _RESET_CAUSES[self._status().last_reset_cause]
 
-    @property
-    def dac_code(self) -> int:
-        return self._status().dac_code
-
-    @property
-    def dac_eeprom_writes(self) -> int:
-        return self._status().dac_eeprom_writes
-
-    @property
-    def eeprom_writes(self) -> int:
-        return self._status().eeprom_writes
-
-    @property
-    def rx_overruns(self) -> int:
-        return self._status().rx_overruns
+    resets = _of_status("resets")
+    dac_code = _of_status("dac_code")
+    dac_eeprom_writes = _of_status("dac_eeprom_writes")
+    eeprom_writes = _of_status("eeprom_writes")
+    rx_overruns = _of_status("rx_overruns")
 
     def span(self, symbol: str) -> tuple[int, int]:
         """Data-space or flash addresses of a symbol of the image: where it begins, where it has ended."""
