@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -96,7 +97,7 @@ def record_telemetry(
         raise RecordingError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
-    log = _TelemetryLog(open_rig, port, parameters, end_s, console)
+    log = _TelemetryLog(SameBoard(port, open_rig), parameters, end_s, console, Desk(console.print))
     waiting = "recording resumes when that Uno is back" + (
         "; you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
     )
@@ -119,21 +120,16 @@ def record_telemetry(
     console.print(f"{out} holds the telemetry; a data set also needs the displacement from your own instrument")
 
 
+@dataclass
 class _TelemetryLog:
     """Records from one board and no other, which walks by itself only the first time."""
 
-    def __init__(
-        self,
-        open_rig: Callable[..., Any],
-        port: str | None,
-        parameters: dict[str, float],
-        end_s: float,
-        console: Console,
-    ) -> None:
-        self._board, self._parameters, self._end_s = SameBoard(port, open_rig), parameters, end_s
-        self._console = console
-        self._nonce: int | None = None  # of the start that was seen last; None before the first
-        self._desk = Desk(console.print)
+    _board: SameBoard
+    _parameters: dict[str, float]
+    _end_s: float
+    _console: Console
+    _desk: Desk
+    _nonce: int | None = None  # of the start that was seen last; None before the first
 
     @property
     def has_begun(self) -> bool:
