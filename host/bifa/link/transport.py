@@ -20,9 +20,6 @@ class Transport(Protocol):
     def read(self, timeout_s: float) -> bytes:
         """Whatever has arrived, waiting at most `timeout_s` for the first byte; b"" on time-out."""
 
-    def reset(self) -> None:
-        """Reset the Uno, as opening the port (DTR) does."""
-
     def close(self) -> None:
         """Let go of the port once what was written has left, as far as it goes; a second call does nothing."""
 

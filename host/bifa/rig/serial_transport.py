@@ -9,7 +9,6 @@ from bifa.link.transport import PortGoneError
 from bifa.rig.unopened import why_unopened
 
 BAUD = 250_000
-RESET_PULSE_S = 0.05
 LONGEST_DRAIN_S = 0.5  # 12 kB at this baud rate
 
 
@@ -38,16 +37,6 @@ class SerialTransport:
             return first + self._port.read(self._port.in_waiting) if first else b""
         except (serial.SerialException, OSError, TypeError) as error:  # pyserial: TypeError when closed meanwhile
             raise self._gone() from error
-
-    def reset(self) -> None:
-        """Pulse DTR, which is wired to the Uno's reset; where there is no DTR (a pty), do nothing."""
-        try:
-            self._port.dtr = False
-            time.sleep(RESET_PULSE_S)
-            self._port.reset_input_buffer()
-            self._port.dtr = True
-        except OSError:
-            return
 
     def close(self) -> None:
         """See Transport."""
