@@ -176,29 +176,9 @@ def test_values_at_and_beyond_the_bounds(board, parameter):
     assert board.type("show") == before
 
 
-BAD_LINES = [
-    "fly",
-    "run fast",
-    "set",
-    "set period_s",
-    "set speed 3",
-    "set period_s 3 4",
-    "show x y",
-    "hold",
-    "hold neck vacuum",
-    "hold body suck",
-    "stream",
-    "stream maybe",
-    "load",
-    "load x",
-    "defaults",
-    "defaults yes",
-    "Run",
-    "run\x01",
-    "x" * 64,
-    "save " + "n" * 13,
-    "save B",
-]
+BAD_LINES = ["fly", "run fast", "set", "set period_s", "set speed 3", "set period_s 3 4", "show x y"]
+BAD_LINES += ["hold", "hold neck vacuum", "hold body suck", "stream", "stream maybe", "load", "load x"]
+BAD_LINES += ["defaults", "defaults yes", "Run", "run\x01", "x" * 64, "save " + "n" * 13, "save B"]
 
 
 @pytest.mark.parametrize("line", BAD_LINES)

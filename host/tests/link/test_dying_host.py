@@ -129,28 +129,17 @@ def is_stopped(uno: PtyUno, within_s: float) -> bool:
     return (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
-@pytest.fixture
-def uno():
-    uno = PtyUno()
-    yield uno
-    uno.unplug()
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
-def test_sigkill_of_whoever_started_it_stops_the_robot(uno):
-    with started_by_another(uno, "SIG_DFL", "main") as between:
-        between.kill()
-        assert is_stopped(uno, 20)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
-def test_under_nohup_it_walks_on_without_an_owner(uno):
-    with started_by_another(uno, "SIG_IGN", "main") as between:
-        between.kill()
-        assert not is_stopped(uno, 1.0)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
-def test_the_end_of_a_thread_of_whoever_started_it_stops_nothing(uno):
-    with started_by_another(uno, "SIG_DFL", "thread"):
-        assert not is_stopped(uno, 1.0)
+@pytest.mark.parametrize(
+    ("hang_up", "where", "is_killed", "stops"),
+    [
+        pytest.param("SIG_DFL", "main", True, True, id="killed: stops"),
+        pytest.param("SIG_IGN", "main", True, False, id="killed under nohup: walks on without an owner"),
+        pytest.param("SIG_DFL", "thread", False, False, id="only its thread has ended: walks on"),
+    ],
+)
+def test_the_end_of_whoever_started_it(uno, hang_up, where, is_killed, stops):
+    with started_by_another(uno, hang_up, where) as between:
+        if is_killed:
+            between.kill()
+        assert is_stopped(uno, 20 if stops else 1.0) == stops

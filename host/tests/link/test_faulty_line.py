@@ -82,9 +82,7 @@ def upload_many(board, rate: float, uploads: int, seed: int, restarts: float = 0
                 uno.upload(parameters)
                 finished = True
                 break
-            except RestartedError:
-                connected = False
-            except NoAnswerError:
+            except (RestartedError, NoAnswerError):
                 connected = False
             except LinkError:
                 break

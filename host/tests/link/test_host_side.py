@@ -63,22 +63,6 @@ def test_what_the_uno_says_by_itself_outlasts_the_next_line_typed():
             "[stopped: all valves off until clear", "[period_s 5.7 s (0.5 to 60 s, default 5.7 s)", "ok"]  # fmt: skip
 
 
-def test_leaving_turns_the_valves_off():
-    board = Board()
-
-    def interrupted() -> None:
-        with Uno(board, board) as uno:
-            uno.connect()
-            uno.run()
-            board.sleep(0.1)
-            assert board.valves != 0
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert (board.valves, board.state) == (0, "stopped")
-
-
 SAMPLE = {"state": 0, "pressure_mpsi": (0, 0, 0), "phase": (0, 0, 0), "command": 0b100100, "valves": 0}
 
 

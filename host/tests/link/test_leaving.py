@@ -203,7 +203,8 @@ def test_ctrl_z_stops_the_robot_before_it_suspends(board, monkeypatch):
 
 @pytest.mark.parametrize("ending", [KeyboardInterrupt, ValueError, SystemExit, None])
 def test_every_end_waits_for_the_confirmation(board, ending):
-    with contextlib.suppress(KeyboardInterrupt, ValueError, SystemExit), Uno(board, board) as uno:
+    ended = pytest.raises(ending) if ending else contextlib.nullcontext()
+    with ended, Uno(board, board) as uno:
         walk(uno, board)
         if ending:
             raise ending

@@ -28,11 +28,7 @@ class Scripted(Board):
         super().__init__()
         self.alter = lambda name, values: values
         self.interrupt_in = -1
-        self.key = 0
         self._splitter = frames.Splitter()
-
-    def write(self, data: bytes) -> None:
-        super().write(data)
 
     def read(self, timeout_s: float) -> bytes:
         data = super().read(timeout_s)
@@ -138,7 +134,7 @@ def test_an_interrupted_call_does_not_leave_its_answer_to_the_next(board, interr
     assert uno.samples(1.0)  # telemetry goes on
 
 
-def test_an_interrupted_run_is_not_carried_out_later(board):
+def test_an_interrupted_run_is_not_carried_out_later():
     class Cut(Scripted):
         def write(self, data: bytes) -> None:
             if self.interrupt_in == 1:

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -89,6 +90,19 @@ def lost(recorded: list[dict]) -> int:
     return int(recorded[-1]["sequence"]) - int(recorded[0]["sequence"]) + 1 - len(recorded)
 
 
+def unplugged_then_ended(uno: PtyUno, out: Path, count: int) -> None:
+    """Somebody pulls the cable of the first Uno, and presses Ctrl-C while the second records: after so many rows."""
+
+    def person() -> None:
+        for number, act in ((1, uno.unplug), (2, _thread.interrupt_main)):
+            path = out / f"telemetry_{number}.csv"
+            while not path.exists() or len(rows(path)) < count:
+                time.sleep(0.1)
+            act()
+
+    threading.Thread(target=person, daemon=True).start()
+
+
 def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
     unos, refusals, told = [PtyUno(), PtyUno()], [RigError("no Uno is plugged in")], io.StringIO()
     files = [tmp_path / f"out/telemetry_{n}.csv" for n in (1, 2)]
@@ -100,14 +114,7 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
         opened.append(unos[len(opened)])
         return SerialRig(opened[-1].device)
 
-    def person() -> None:
-        """Pulls the cable of the first Uno, and presses Ctrl-C while the second records."""
-        for path, act in zip(files, (unos[0].unplug, _thread.interrupt_main), strict=True):
-            while not path.exists() or len(rows(path)) < 50:
-                time.sleep(0.1)
-            act()
-
-    threading.Thread(target=person, daemon=True).start()
+    unplugged_then_ended(unos[0], tmp_path / "out", 50)
     record_telemetry(open_rig, "the port", tmp_path / "out", None, 120.0, Console(file=told, width=200))
     text = told.getvalue()
     assert f"{unos[0].device} is gone; plug the Uno in again" in text
@@ -148,14 +155,7 @@ def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, mo
         opened.append(unos[len(opened)])
         return SerialRig(opened[-1].device)
 
-    def person() -> None:
-        for number, act in ((1, unos[0].unplug), (2, _thread.interrupt_main)):
-            path = tmp_path / f"out/telemetry_{number}.csv"
-            while not path.exists() or len(rows(path)) < 100:
-                time.sleep(0.1)
-            act()
-
-    threading.Thread(target=person, daemon=True).start()
+    unplugged_then_ended(unos[0], tmp_path / "out", 100)
     record_telemetry(open_rig, None, tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
     assert unos[0].driven_s > 0
     assert unos[1].driven_s == 0, "another board, or the same one anew: it does not walk by itself"
@@ -182,23 +182,13 @@ def test_another_uno_is_not_taken_for_the_one_that_was_recorded(monkeypatch):
 def test_a_recorder_opens_only_the_board_that_it_began_with(tmp_path, monkeypatch):
     plugged, opened = [usb("/dev/ttyACM0", "A1")], []
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: plugged)
-
     board = Board()
     monkeypatch.setattr("bifa.live.record.RETRY_S", 0.01)
-
-    class Rig:
-        transport, clock = Away(board), board
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
 
     def open_once(port):
         opened.append(port)
         plugged[:] = [usb("/dev/ttyACM0", "B2")]
-        return Rig()
+        return nullcontext(SimpleNamespace(transport=Away(board), clock=board))
 
     record_telemetry(open_once, None, tmp_path / "out", None, 3.0, Console(file=io.StringIO()))
     assert opened == [None]

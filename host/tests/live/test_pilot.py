@@ -10,9 +10,9 @@ from bifa.live.web.pilot import BusyError, NobodyThereError, Pilot
 from harness.board import Board
 
 
-def flown(during, seconds=0.5, begin=lambda uno: None):
+def flown(during, seconds=0.5, begin=lambda uno: None, board=None):
     """A flight of the Uno's own code; `during(pilot, report)` is called with every report. Reports, and the board."""
-    board, reports = Board(), []
+    board, reports = board or Board(), []
     pilot = Pilot()
 
     def tell(report, samples):
@@ -157,15 +157,17 @@ def test_a_stop_that_is_not_confirmed_ends_the_flight_loudly_where_nobody_watche
     pilot = Pilot()
     pilot.is_watched = lambda: is_watched
 
-    def during(report, samples):
+    def tell(report, samples):
         reports.append(report)
         if report.get("robot") == "running" and not asked:
             line.is_deaf = True
             asked.append(pilot.stop("the last page was closed"))
+        if is_watched and report.get("stopped") and report["stopped"]["is_confirmed"] is False:
+            line.is_deaf = False  # its deafness has been told, and it can be landed
 
     flying = nullcontext() if is_watched else pytest.raises(StillMovingError, match="MAY STILL BE MOVING")
     with flying:
-        pilot.fly(Uno(line, board), board, _hearing_again(during, line, is_watched), 12.0, lambda uno: uno.run())
+        pilot.fly(Uno(line, board), board, tell, 12.0, lambda uno: uno.run())
     assert isinstance(asked[0].exception(0), StillMovingError)
     if is_watched:
         assert any(report.get("stopped") and report["stopped"]["is_confirmed"] is False for report in reports)
@@ -174,31 +176,13 @@ def test_a_stop_that_is_not_confirmed_ends_the_flight_loudly_where_nobody_watche
         assert "MAY STILL BE MOVING" in reports[-1]["gone"]
 
 
-def _hearing_again(during, line, is_watched):
-    """A robot that is watched hears again once its deafness has been told, so that it can be landed."""
-
-    def tell(report, samples):
-        during(report, samples)
-        if is_watched and report.get("stopped") and report["stopped"]["is_confirmed"] is False:
-            line.is_deaf = False
-
-    return tell
-
-
 def test_why_a_robot_stopped_that_nobody_here_stopped_is_told():
+    board = Board()
+
     def during(pilot, report):
         if report.get("robot") == "running":
-            boards[0].write(b"!")
+            board.write(b"!")
 
-    boards = []
-    board, reports = Board(), []
-    boards.append(board)
-    pilot = Pilot()
-
-    def tell(report, samples):
-        reports.append(report)
-        during(pilot, report)
-
-    pilot.fly(Uno(board, board), board, tell, 0.6, lambda uno: uno.run())
+    _, reports, _ = flown(during, 0.6, lambda uno: uno.run(), board)
     assert reports[-1]["robot"] == "stopped"
     assert "at the Uno" in reports[-1]["stopped"]["why"]

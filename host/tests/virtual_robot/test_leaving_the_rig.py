@@ -13,13 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from virtual_robot.rig import FIRMWARE, open_rig
+from virtual_robot.rig import open_rig
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 
 PATIENCE_S = 60  # other tests may keep the computer busy
 SETTLED_S = 0.3  # of the rig's time: what was under way has arrived
-GAIT = "period_s = 2\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
 RAISING = """
 import sys
 from bifa.link import Uno
@@ -35,9 +34,8 @@ with SerialRig(sys.argv[1]) as rig, Uno(rig.transport, rig.clock) as uno:
 class Bench:
     """The virtual robot on a pty in a thread of its own, watched from outside."""
 
-    def __init__(self, folder: Path) -> None:
-        self.port, self.folder = str(folder / "uno"), folder
-        (folder / "gait.toml").write_text(GAIT)
+    def __init__(self, folder: Path, gait: str) -> None:
+        self.port, self.folder, self.gait = str(folder / "uno"), folder, gait
         self._rig = open_rig(keep_events=False)
         self._now: dict = {}
         ready, self._end = threading.Event(), threading.Event()
@@ -93,10 +91,8 @@ def as_from_a_terminal() -> Iterator[None]:
 
 
 @pytest.fixture
-def bench(tmp_path, as_from_a_terminal) -> Iterator[Bench]:
-    if not FIRMWARE.is_file():
-        pytest.fail(f"{FIRMWARE} is missing: run `make test`, or `pio run -e uno` first")
-    bench = Bench(tmp_path)
+def bench(tmp_path, gait, as_from_a_terminal) -> Iterator[Bench]:
+    bench = Bench(tmp_path, gait)
     yield bench
     bench.close()
 
@@ -149,7 +145,7 @@ def signalled(number: int, command: str) -> Callable[[Bench, random.Random], sub
     def leave(bench: Bench, rng: random.Random) -> subprocess.Popen:
         recording = ["record", "--out", str(bench.folder / f"out{time.monotonic_ns()}"), "--gait"]
         arguments = {"monitor": ["monitor", "--run"], "record": recording, "upload": ["upload", "--run"]}[command]
-        program = bench.start(*arguments, *([str(bench.folder / "gait.toml")] if command != "monitor" else []))
+        program = bench.start(*arguments, *([bench.gait] if command != "monitor" else []))
         if rng.random() < 0.5:
             bench.until_it_walks()
             time.sleep(rng.random())

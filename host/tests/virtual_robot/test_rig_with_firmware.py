@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 
-from virtual_robot.rig import FIRMWARE, open_rig
+from virtual_robot.rig import open_rig
 
 pytestmark = pytest.mark.uno
 
 
 @pytest.fixture
 def rig():
-    if not FIRMWARE.is_file():
-        pytest.fail(f"{FIRMWARE} is missing: run `make test`, or `pio run -e uno` first")
     with open_rig() as rig:
         rig.clock.sleep(0.5)
         rig.transport.read(0)
