@@ -8,7 +8,7 @@ Telemetry and lines of text arrive in between; they are handed on as they come.
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from bifa import __version__
@@ -86,7 +86,7 @@ class _Request:
     sequence: int
     first_sent_s: float
     answer: "Answer | None" = None
-    sent_s: float = field(default=-1e9)
+    sent_s: float = -1e9
 
 
 @dataclass(frozen=True)
@@ -220,11 +220,7 @@ class Session:
 
     def call(self, name: str, *values: Any, timeout_s: float = 5.0) -> frames.Report:
         """Carry out one command; raises RefusedError, NoAnswerError or RestartedError."""
-        return self.call_timed(name, *values, timeout_s=timeout_s).report
-
-    def call_timed(self, name: str, *values: Any, timeout_s: float = 5.0) -> Answer:
-        """call(), with the times between which the Uno carried the command out."""
-        return self.call_all([(name, values)], timeout_s)[0]
+        return self.call_all([(name, values)], timeout_s)[0].report
 
     def call_all(self, commands: Sequence[tuple[str, tuple[Any, ...]]], timeout_s: float = 5.0) -> list[Answer]:
         """Carry out commands in order, several under way at once.

@@ -143,7 +143,7 @@ class Uno:
 
     def exchange_clocks(self) -> None:
         """One more measurement for `clock_relation`."""
-        answer = self.session.call_timed("read_clock")
+        [answer] = self.session.call_all([("read_clock", ())])
         uno_s = self._unwrap(answer.report["time_us"]) / 1e6
         self.clock_relation.add(answer.sent_s - CLOCK_TICK_S, uno_s, answer.received_s)
         self._next_exchange_s = self._clock.now() + self._exchange_every_s
