@@ -34,7 +34,9 @@ class CycleSpeed:
         self.path.append((self._cycles, time_s, position_mm))
         if before is not None and math.floor(self._cycles) > math.floor(before[0]):
             self._ends.append(_between(before, self.path[-1], float(math.floor(self._cycles))))
-            self.settled = self._judged()
+            if len(self._ends) > LEAST:
+                lasts_s, advance_mm = np.diff(np.array(self._ends), axis=0).T
+                self.settled = speed_of_cycles(advance_mm, float(lasts_s.mean())).text
         while len(self.path) > 2 and self.path[1][0] <= self._cycles - 1.0:
             self.path.popleft()
 
@@ -46,12 +48,6 @@ class CycleSpeed:
         then_s, then_mm = _between(self.path[0], self.path[1], began)
         _, now_s, now_mm = self.path[-1]
         return (now_mm - then_mm) / (now_s - then_s) if now_s > then_s else None
-
-    def _judged(self) -> str:
-        if len(self._ends) <= LEAST:
-            return ""
-        lasts_s, advance_mm = np.diff(np.array(self._ends), axis=0).T
-        return speed_of_cycles(advance_mm, float(lasts_s.mean())).text
 
 
 def _between(early: tuple[float, float, float], late: tuple[float, float, float], cycles: float) -> tuple[float, float]:

@@ -65,9 +65,7 @@ class Monitor:
         return Panel(Group(head, table, link), title="bifa monitor")
 
 
-def watch(
-    uno: Uno, clock: Clock, console: Console, duration_s: float | None, begin: Callable[[Uno], None] = lambda uno: None
-) -> None:
+def watch(uno: Uno, clock: Clock, console: Console, duration_s: float | None, begin: Callable[[Uno], None]) -> None:
     """Connect, `begin(uno)`, and draw until Ctrl-C or for `duration_s`; the last picture stays, the robot stands."""
     monitor = Monitor(uno)
     try:

@@ -27,14 +27,9 @@ def writable() -> Iterator[None]:
     except OSError as error:
         if error.errno is None or error.errno not in _FULL:
             raise
-        _drop_the_rest()
+        with contextlib.suppress(OSError, ValueError):  # what is not written yet would fail once more as Python exits
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
         reason = os.strerror(error.errno)
         raise OutputError(f"the output cannot be written ({reason}); free some space, or redirect it") from None
-
-
-def _drop_the_rest() -> None:
-    """Output not written yet would fail once more as Python exits."""
-    with contextlib.suppress(OSError, ValueError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)

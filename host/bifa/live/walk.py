@@ -14,9 +14,7 @@ from bifa.live.rounds import Pace
 LOOK_EVERY_S = 0.5
 
 
-def walk(
-    uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable[[str], None] = lambda said: None
-) -> None:
+def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable[[str], None]) -> None:
     """Walk for `duration_s`, or until an exception; `on_progress` is told time, cycle and pressures.
 
     Raises LinkError if the Uno stops by itself, with its reason, and BrokenPipeError once nobody can read any more what
@@ -24,7 +22,7 @@ def walk(
     """
     period_s = uno.parameters()["period_s"]
     uno.run()
-    began_s = clock.now()
+    began_s, until = clock.now(), "" if duration_s is None else f" of {duration_s:g}"
     pace, end_s = Pace(clock), math.inf if duration_s is None else began_s + duration_s
     while (left_s := end_s - clock.now()) > 0:
         uno.samples(min(left_s, LOOK_EVERY_S))
@@ -34,16 +32,10 @@ def walk(
             raise LinkError(
                 f"the robot stopped walking: it is {status.state} (fault: {status.fault}); see bifa console"
             )
-        on_progress(_in_words(clock.now() - began_s, duration_s, period_s, status.pressure_psi))
+        walked_s = clock.now() - began_s
+        pressures = "  ".join(f"{name} {psi:+.1f}" for name, psi in zip(CHAMBERS, status.pressure_psi, strict=True))
+        on_progress(f"walking: {walked_s:.0f}{until} s, cycle {int(walked_s / period_s) + 1}, psi: {pressures}")
         pace.wait()
-
-
-def _in_words(
-    walked_s: float, duration_s: float | None, period_s: float, pressure_psi: tuple[float, float, float]
-) -> str:
-    until = "" if duration_s is None else f" of {duration_s:g}"
-    pressures = "  ".join(f"{name} {psi:+.1f}" for name, psi in zip(CHAMBERS, pressure_psi, strict=True))
-    return f"walking: {walked_s:.0f}{until} s, cycle {int(walked_s / period_s) + 1}, psi: {pressures}"
 
 
 def _look_for_a_reader() -> None:

@@ -47,7 +47,7 @@ def test_the_monitor_says_that_the_port_is_gone(uno, tmp_path):
 
 def test_the_trace_is_as_long_as_it_says():
     board, shown = Board(), io.StringIO()
-    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0)
+    watch(Uno(board, board), board, Console(file=shown, width=80), 1.0, lambda uno: None)
     body = next(line for line in shown.getvalue().splitlines() if "body" in line)
     assert "last 0.9 s" in shown.getvalue()
     assert body.count("▄") == 10  # one block, at 0 psi, each tenth of a second

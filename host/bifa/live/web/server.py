@@ -97,7 +97,7 @@ class LivePage:
         self.gate = Gate()
         self.pages: set[OpenPage] = set()
         self._numbers = itertools.count(1)
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self.loop: asyncio.AbstractEventLoop | None = None  # in which the pages are told
         self._predictor = ThreadPoolExecutor(1, "predictor", step_back)
         self._predictor.submit(lambda: self._model.predictor)  # drawn before anybody asks
         self._prediction: asyncio.Task[None] | None = None
@@ -111,19 +111,15 @@ class LivePage:
             prediction=None,
         )
 
-    def attach(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The loop in which the pages are told."""
-        self._loop = loop
-
     def is_watched(self) -> bool:
         """Whether a page is open whose owner would see what it shows; from any thread."""
         return any(page.is_owner for page in list(self.pages))
 
     def tell(self, changes: dict[str, Any], samples: list[dict[str, Any]]) -> None:
         """Send to every page; from any thread."""
-        if self._loop is not None:
+        if self.loop is not None:
             with contextlib.suppress(RuntimeError):  # the server has just ended
-                self._loop.call_soon_threadsafe(self._heard, changes, samples)
+                self.loop.call_soon_threadsafe(self._heard, changes, samples)
 
     def flush(self, timeout_s: float = 1.0) -> None:
         """Wait until every page has been told everything, or `timeout_s`."""
@@ -406,7 +402,7 @@ def served(live: LivePage, port: int = 0) -> Iterator[Address]:
     started = threading.Event()
 
     async def serve() -> None:
-        live.attach(asyncio.get_running_loop())
+        live.loop = asyncio.get_running_loop()
         started.set()
         await server.serve([listener])
 
