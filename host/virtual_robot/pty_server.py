@@ -80,11 +80,11 @@ class _Pump:
 
     def run(self, on_status: Callable[[dict[str, Any]], None], stop: Callable[[], bool]) -> None:
         world = self._rig.world
-        wall_start, virtual_start = time.monotonic(), world.now_s
+        wall_start, virtual_start = time.monotonic(), world.now()
         next_status = 0.0
         while not stop():
             wall = time.monotonic() - wall_start
-            behind = wall - (world.now_s - virtual_start)
+            behind = wall - (world.now() - virtual_start)
             if behind > _MAX_LAG_S:
                 wall_start += behind
                 behind = _SLICE_S
@@ -126,9 +126,9 @@ class _Pump:
 
     def _status(self) -> dict[str, Any]:
         rig = self._rig
-        sample = rig.plant.sample(rig.world.now_s - rig.instruments.mounted_s)
+        sample = rig.plant.sample(rig.world.now() - rig.instruments.mounted_s)
         return {
-            "time_s": rig.world.now_s,
+            "time_s": rig.world.now(),
             "open": self._is_open,
             "displacement_mm": 1e3 * float(sample["head_m"]),
             "pressure_psi": [float(p) for p in sample["pressure_psi"]],

@@ -49,7 +49,7 @@ _BENCHES = {"ideal": _BenchProfile(), "realistic": _REAL, "worn": _REAL}
 
 
 class World:
-    """Time of the bench: the board's cycles, at what its 16 MHz really are."""
+    """Time of the bench (bifa's Clock): the board's cycles, at what its 16 MHz really are."""
 
     def __init__(self, uno: Uno, clock_hz: float) -> None:
         self.uno = uno
@@ -62,9 +62,11 @@ class World:
     def cycle(self) -> int:
         return self.uno.cycle
 
-    @property
-    def now_s(self) -> float:
+    def now(self) -> float:
         return (self.uno.cycle - self._start_cycle) / self.clock_hz
+
+    def sleep(self, duration_s: float) -> None:
+        self.run(duration_s)
 
     def run(self, duration_s: float, stop_on_output: bool = False) -> bool:
         """Let time pass; True if it stopped early because the board sent a byte."""
@@ -113,19 +115,6 @@ class VirtualTransport:
             raise PortClosedError("the board has lost its power, and its port with it")
 
 
-class VirtualClock:
-    """Virtual time (bifa's Clock)."""
-
-    def __init__(self, world: World) -> None:
-        self._world = world
-
-    def now(self) -> float:
-        return self._world.now_s
-
-    def sleep(self, duration_s: float) -> None:
-        self._world.run(duration_s)
-
-
 class VirtualRig:
     """A bench with everything on it; a context manager.
 
@@ -147,9 +136,8 @@ class VirtualRig:
         self._session_seeds = itertools.count(1000 * seed)
         self.uno = uno
         self.plant = plant
-        self.world = world
+        self.world = self.clock = world
         self.transport = VirtualTransport(world, bootloader_s)
-        self.clock = VirtualClock(world)
         self.instruments = instruments
 
     @property

@@ -87,11 +87,11 @@ class Instruments:
             friction_factor=float(1.0 + self._wobble * self._random.standard_normal()),
             inclination_deg=self._settings.get("inclination_deg", 0.0),
             ripple_phase_rad=float(self._random.uniform(0.0, 2.0 * np.pi)),
-            session_share=min(self._world.now_s / _DAY_S, 1.0),
+            session_share=min(self._world.now() / _DAY_S, 1.0),
         )
         chamber = _CHAMBERS.get(self._settings.get("actuator", "large"), "body")
         self._plant.remount(experiment, chamber, self._world.cycle)
-        self.mounted_s = self._world.now_s
+        self.mounted_s = self._world.now()
 
     def start(self) -> None:
         """Begin a record: camera at 100 Hz, machines at 50 Hz, by the instrument's own clock."""
@@ -155,7 +155,7 @@ class Instruments:
 
     @property
     def _now_s(self) -> float:
-        return self._world.now_s - self.mounted_s
+        return self._world.now() - self.mounted_s
 
     @property
     def _rate_hz(self) -> float:

@@ -137,9 +137,7 @@ class Plant:
 
     def sample(self, time_s: float) -> np.ndarray:
         """One row of dtype SAMPLE at `time_s`."""
-        row = np.zeros(1, SAMPLE)
-        lib.plant_record(self._plant, time_s, 0.0, 1, ffi.cast("PlantSample *", row.ctypes.data))
-        return row[0]
+        return self.record([time_s])[0]
 
     def break_sensor(self, channel: int, volts: float | None) -> None:
         """Fix a sensor's (0-2) or the regulator monitor's (3) output; None = in order again."""
