@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -115,6 +115,7 @@ class VirtualTransport:
             raise PortClosedError("the board has lost its power, and its port with it")
 
 
+@dataclass(eq=False)
 class VirtualRig:
     """A bench with everything on it; a context manager.
 
@@ -122,23 +123,17 @@ class VirtualRig:
     stop, break a sensor, cut the power or look inside. `truth` are the plant's parameters.
     """
 
-    def __init__(
-        self,
-        uno: Uno,
-        plant: Plant,
-        world: World,
-        instruments: Instruments,
-        bootloader_s: float,
-        effects: Mapping[str, Mapping[str, float]],
-        seed: int,
-    ) -> None:
-        self._effects = effects
-        self._session_seeds = itertools.count(1000 * seed)
-        self.uno = uno
-        self.plant = plant
-        self.world = self.clock = world
-        self.transport = VirtualTransport(world, bootloader_s)
-        self.instruments = instruments
+    uno: Uno
+    plant: Plant
+    world: World
+    transport: VirtualTransport
+    instruments: Instruments
+    _effects: Mapping[str, Mapping[str, float]]
+    _session_seeds: Iterator[int]
+
+    @property
+    def clock(self) -> World:
+        return self.world
 
     @property
     def truth(self) -> dict[str, float]:
@@ -231,7 +226,8 @@ def open_rig(
     world = World(uno, clock_hz)
     instruments = Instruments(world, plant, bench.noise, bench.wobble, random, bench.clock_resolution_s)
     instruments.mount("locomotion")
-    return VirtualRig(uno, plant, world, instruments, bench.bootloader_s, inside, seed)
+    transport = VirtualTransport(world, bench.bootloader_s)
+    return VirtualRig(uno, plant, world, transport, instruments, inside, itertools.count(1000 * seed))
 
 
 def _default_image() -> Path:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -51,28 +51,20 @@ class InstrumentClock:
         return own_period_s / (1.0 + self.drift)
 
 
+@dataclass(eq=False)
 class Instruments:
     """Instruments around one plant that is wired to a board. `world` tells the time and the board's cycle."""
 
-    def __init__(
-        self,
-        world: Any,
-        plant: Plant,
-        noise: Noise,
-        wobble: float,
-        random: np.random.Generator,
-        clock_resolution_s: float,
-    ) -> None:
-        self._world = world
-        self._plant = plant
-        self._noise = noise
-        self._wobble = wobble
-        self._random = random
-        self._clock_resolution_s = clock_resolution_s
-        self.mounted_s = 0.0
-        self.clock: InstrumentClock | None = None
-        self._experiment = "locomotion"
-        self._settings = dict(_SETTINGS["locomotion"])
+    _world: Any
+    _plant: Plant
+    _noise: Noise
+    _wobble: float  # of the friction, from run to run
+    _random: np.random.Generator
+    _clock_resolution_s: float
+    mounted_s: float = 0.0
+    clock: InstrumentClock | None = None
+    _experiment: str = "locomotion"
+    _settings: dict[str, Any] = field(default_factory=lambda: dict(_SETTINGS["locomotion"]))
 
     def mount(self, experiment: str, **settings: Any) -> None:
         """Put `experiment` on the stand, vented, contracted and at rest; an unfinished record is dropped.
