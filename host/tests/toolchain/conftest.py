@@ -1,5 +1,6 @@
 """A machine that has the tools which the stand-ins are made of."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,15 +14,26 @@ def project() -> Path:
 
 
 @pytest.fixture
-def programs(tmp_path, monkeypatch) -> Path:
+def program() -> Callable[[Path, str], Path]:
+    """program(path, script): a shell script in a program's place."""
+
+    def write(path: Path, script: str) -> Path:
+        path.write_text(f"#!/bin/sh\n{script}\n", "utf-8")
+        path.chmod(0o755)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def programs(program, tmp_path, monkeypatch) -> Path:
     """A folder with an empty program for every tool of the AVR tool chain, alone on PATH."""
     from provision.system import AVR_TOOLS
 
     folder = tmp_path / "programs"
     folder.mkdir()
     for name in (*(f"avr-{tool}" for tool in AVR_TOOLS), "avrdude", "simavr"):
-        (folder / name).write_text("#!/bin/sh\n")
-        (folder / name).chmod(0o755)
+        program(folder / name, "")
     monkeypatch.setenv("PATH", str(folder))
     return folder
 

@@ -27,13 +27,11 @@ def package(tmp_path) -> Path:
 
 
 @pytest.fixture
-def writes(tmp_path, monkeypatch) -> Path:
+def writes(program, tmp_path, monkeypatch) -> Path:
     """A program in avrdude's place, alone on PATH: it keeps its arguments and the file that it is given to write."""
     folder = tmp_path / "programs"
     folder.mkdir()
-    program = folder / "avrdude"
-    program.write_text(f'#!/bin/sh\necho "$@" > {folder}/arguments\n/bin/cp uno.hex {folder}/written.hex\n')
-    program.chmod(0o755)
+    program(folder / "avrdude", f'echo "$@" > {folder}/arguments\n/bin/cp uno.hex {folder}/written.hex')
     monkeypatch.setenv("PATH", str(folder))
     return folder
 
@@ -56,8 +54,8 @@ def test_the_image_that_is_written_runs_in_the_chip_and_answers(monkeypatch, no_
     )
 
 
-def test_a_failing_avrdude_ends_in_a_sentence(no_checkout, writes):
-    (writes / "avrdude").write_text("#!/bin/sh\necho 'stk500_recv(): programmer is not responding'\nexit 1\n")
+def test_a_failing_avrdude_ends_in_a_sentence(program, no_checkout, writes):
+    program(writes / "avrdude", "echo 'stk500_recv(): programmer is not responding'\nexit 1")
     done = CliRunner().invoke(app, ["flash", "--port", "/dev/ttyACM0"])
     assert isinstance(done.exception, ToolchainError)
     assert "no bootloader answers on /dev/ttyACM0" in str(done.exception)

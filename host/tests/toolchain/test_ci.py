@@ -8,10 +8,8 @@ import pytest
 
 
 @pytest.mark.parametrize("failing", [(), ("lint",), ("portability",), ("test",), ("lint", "test")])
-def test_each_is_run_and_each_can_fail_it(project, tmp_path, failing):
-    fake = tmp_path / "make"
-    fake.write_text(f'#!/bin/sh\necho "ran $*"\ncase " {" ".join(failing)} " in *" $1 "*) exit 2;; esac\n')
-    fake.chmod(0o755)
+def test_each_is_run_and_each_can_fail_it(project, program, tmp_path, failing):
+    program(tmp_path / "make", f'echo "ran $*"\ncase " {" ".join(failing)} " in *" $1 "*) exit 2;; esac')
     done = subprocess.run(
         [project / ".ci" / "run"],
         env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
@@ -24,13 +22,11 @@ def test_each_is_run_and_each_can_fail_it(project, tmp_path, failing):
 
 
 @pytest.mark.parametrize("ran", [True, False])
-def test_the_estimation_is_tested_once(project, tmp_path, ran):
+def test_the_estimation_is_tested_once(project, program, tmp_path, ran):
     """Not again on this machine where it has been tested as on another; here where it could not be."""
     shutil.copytree(project / ".ci", tmp_path / ".ci")
-    fake = tmp_path / "make"
     touch = "mkdir -p build/portability; touch build/portability/ran" if ran else "true"
-    fake.write_text(f'#!/bin/sh\ncase $1 in portability) {touch};; test) echo "$2";; esac\n')
-    fake.chmod(0o755)
+    program(tmp_path / "make", f'case $1 in portability) {touch};; test) echo "$2";; esac')
     (tmp_path / "build" / "portability").mkdir(parents=True)
     (tmp_path / "build" / "portability" / "ran").touch()  # of an earlier run, which says nothing
     environment = {"PATH": f"{tmp_path}:/usr/bin:/bin"}

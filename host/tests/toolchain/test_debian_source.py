@@ -64,11 +64,9 @@ def test_no_archive_at_all_is_said(apt, tmp_path):
         fetch_source("cjson", tmp_path / "scratch", apt)
 
 
-def test_apt_gets_only_private_folders_and_its_complaint_is_passed_on(apt, tmp_path, monkeypatch):
+def test_apt_gets_only_private_folders_and_its_complaint_is_passed_on(apt, program, tmp_path, monkeypatch):
     (apt / "sources.list").write_text("deb http://archive.example/debian stable main\n")
-    fake = tmp_path / "apt-get"
-    fake.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/calls\necho "E: no such archive" >&2\nexit 100\n')
-    fake.chmod(0o755)
+    program(tmp_path / "apt-get", f'echo "$@" >> {tmp_path}/calls\necho "E: no such archive" >&2\nexit 100')
     monkeypatch.setenv("PATH", str(tmp_path))
     scratch = tmp_path / "scratch"
     with pytest.raises(ProvisionError, match="could not fetch the source package cjson: E: no such archive"):

@@ -14,14 +14,13 @@ from bifa.toolchain import ToolchainError, flash, project
 
 
 @pytest.fixture
-def platformio(tmp_path, monkeypatch):
+def platformio(program, tmp_path, monkeypatch):
     """A program in PlatformIO's place: it notes its arguments, says something, and ends with a status."""
 
     def pretend(says: str = "", status: int = 0):
-        program = tmp_path / "pio"
-        program.write_text(f'#!/bin/sh\necho "$@" >> {tmp_path}/calls\ncat <<END\n{says}\nEND\nexit {status}\n')
-        program.chmod(0o755)
-        monkeypatch.setattr(flash, "platformio_program", lambda: program)
+        script = f'echo "$@" >> {tmp_path}/calls\ncat <<END\n{says}\nEND\nexit {status}'
+        pio = program(tmp_path / "pio", script)
+        monkeypatch.setattr(flash, "platformio_program", lambda: pio)
 
     pretend.calls = lambda: (tmp_path / "calls").read_text()
     return pretend

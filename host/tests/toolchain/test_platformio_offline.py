@@ -52,12 +52,11 @@ def pio(project: Path, *words: str) -> subprocess.CompletedProcess:
 
 
 @pytest.fixture
-def upload(small_project, tmp_path):
+def upload(small_project, program, tmp_path):
     """Runs the upload with a program in avrdude's place; returns what that was called with, after {port}."""
     avrdude = own_stand_ins(small_project) / "packages" / "tool-avrdude" / "bin" / "avrdude"
     avrdude.unlink()
-    avrdude.write_text(f'#!/bin/sh\necho "$@" > {tmp_path}/call\n')
-    avrdude.chmod(0o755)
+    program(avrdude, f'echo "$@" > {tmp_path}/call')
 
     def run() -> str:
         host_end, board_end = pty.openpty()

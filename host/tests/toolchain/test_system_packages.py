@@ -9,25 +9,21 @@ NEEDED = ("sh", "cut", "sed", "env", "dirname", "mktemp", "rm", "tail")
 
 
 @pytest.fixture
-def machine(tmp_path, project):
+def machine(program, tmp_path, project):
     """A machine with a shell, apt-get and nothing else; `run(*groups)` runs the script on it."""
     bin_folder = tmp_path / "bin"
     bin_folder.mkdir()
     for name in NEEDED:
         (bin_folder / name).symlink_to(shutil.which(name))
 
-    def program(name: str, script: str) -> None:
-        (bin_folder / name).write_text(f"#!/bin/sh\n{script}\n")
-        (bin_folder / name).chmod(0o755)
-
-    program("apt-get", f'echo "$@" >> {tmp_path}/apt')
+    program(bin_folder / "apt-get", f'echo "$@" >> {tmp_path}/apt')
 
     def run(*groups: str) -> subprocess.CompletedProcess:
         script = project / "tools" / "system-packages.sh"
         environment = {"PATH": str(bin_folder)}
         return subprocess.run(["sh", script, *groups], env=environment, capture_output=True, text=True, check=False)
 
-    run.program = program
+    run.program = lambda name, script: program(bin_folder / name, script)
     run.apt_calls = lambda: (tmp_path / "apt").read_text() if (tmp_path / "apt").exists() else ""
     return run
 
