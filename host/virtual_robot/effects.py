@@ -23,7 +23,6 @@ class Effect:
     sizes: Mapping[str, float]
     drawn: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     signed: bool = False
-    in_library: bool = True
 
     def at(self, factor: float, random: np.random.Generator) -> dict[str, float]:
         """The effect's parameters at `factor` times its size, the rest drawn."""
@@ -39,46 +38,40 @@ class Effect:
 _LOOP = {"displacement_m": (0.001, 0.004), "small_share": (0.18, 0.28)}
 _MAXWELL = {"time_s": (2.0, 8.0), "small_share": (0.3, 0.5)}
 
-EFFECTS: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
-        Effect("hysteresis", {"force_N": 4.0}, _LOOP),
-        Effect("viscoelasticity", {"stiffness_N_m": 150.0}, _MAXWELL),
-        Effect("backlash", {"gap_m": 0.001}),
-        Effect("area_variation", {"slope": 0.10}, signed=True),
-        Effect("valve_latency", {"delay_s": 0.030}),
-        Effect("valve_asymmetry", {"difference_s": 0.030}, signed=True),
-        Effect("line_lag", {"time_s": 0.060}),
-        Effect("choked_flow", {"saturation_s_per_psi": 0.045}, {"sharpness": (1.6, 2.6)}),
-        Effect("leak", {"rate_per_s": 0.05}),
-        Effect("supply_sag", {"resistance_s": 0.03}, {"vacuum_share": (0.8, 1.25)}),
-        Effect("regulator_ripple", {"amplitude_psi": 0.3}, {"frequency_Hz": (0.3, 0.9)}),
-        Effect("sensor_lag", {"time_s": 0.05}),
-        Effect("sensor_position", {"share": 0.05}),
-        Effect("sensor_calibration", {"gain": 0.03, "offset_psi": 0.2}, signed=True),
-        Effect("stribeck", {"speed_m_s": 0.01}),
-        Effect("friction_direction", {"asymmetry": 0.15}, signed=True),
-        Effect("inclination", {"angle_deg": 10.0}, signed=True),
-        Effect("tether_drag", {"drag_N_m": 2.0}),
-        # In no library.
-        Effect("pipe_joint", {"rise": 0.4}, {"spacing_m": (0.08, 0.12), "width_m": (0.004, 0.008)}, in_library=False),
-        Effect("area_drift", {"share": 0.06}, signed=True, in_library=False),
-        Effect(
-            "mount_resonance",
-            {"share": 1.0},
-            {"frequency_Hz": (6.0, 12.0), "damping": (0.03, 0.06)},
-            in_library=False,
-        ),
-        Effect("viscous_drag", {"Ns_m": 25.0}, in_library=False),
-        Effect("leak_cracking", {"rate_per_s": 0.25}, {"pressure_psi": (3.0, 5.0)}, in_library=False),
-        Effect("camera_scale", {"gain": 0.03}, signed=True, in_library=False),
-        Effect("pump_fade", {"psi": 1.0}, in_library=False),
-        Effect("quadratic_damping", {"Ns2_m2": 250.0}, in_library=False),
-        Effect("sensor_crosstalk", {"share": 0.04}, in_library=False),
-    )
-}
-LIBRARY = tuple(name for name, effect in EFFECTS.items() if effect.in_library)
-OUTSIDE = tuple(name for name, effect in EFFECTS.items() if not effect.in_library)
+_IN_LIBRARY = (
+    Effect("hysteresis", {"force_N": 4.0}, _LOOP),
+    Effect("viscoelasticity", {"stiffness_N_m": 150.0}, _MAXWELL),
+    Effect("backlash", {"gap_m": 0.001}),
+    Effect("area_variation", {"slope": 0.10}, signed=True),
+    Effect("valve_latency", {"delay_s": 0.030}),
+    Effect("valve_asymmetry", {"difference_s": 0.030}, signed=True),
+    Effect("line_lag", {"time_s": 0.060}),
+    Effect("choked_flow", {"saturation_s_per_psi": 0.045}, {"sharpness": (1.6, 2.6)}),
+    Effect("leak", {"rate_per_s": 0.05}),
+    Effect("supply_sag", {"resistance_s": 0.03}, {"vacuum_share": (0.8, 1.25)}),
+    Effect("regulator_ripple", {"amplitude_psi": 0.3}, {"frequency_Hz": (0.3, 0.9)}),
+    Effect("sensor_lag", {"time_s": 0.05}),
+    Effect("sensor_position", {"share": 0.05}),
+    Effect("sensor_calibration", {"gain": 0.03, "offset_psi": 0.2}, signed=True),
+    Effect("stribeck", {"speed_m_s": 0.01}),
+    Effect("friction_direction", {"asymmetry": 0.15}, signed=True),
+    Effect("inclination", {"angle_deg": 10.0}, signed=True),
+    Effect("tether_drag", {"drag_N_m": 2.0}),
+)
+_IN_NONE = (
+    Effect("pipe_joint", {"rise": 0.4}, {"spacing_m": (0.08, 0.12), "width_m": (0.004, 0.008)}),
+    Effect("area_drift", {"share": 0.06}, signed=True),
+    Effect("mount_resonance", {"share": 1.0}, {"frequency_Hz": (6.0, 12.0), "damping": (0.03, 0.06)}),
+    Effect("viscous_drag", {"Ns_m": 25.0}),
+    Effect("leak_cracking", {"rate_per_s": 0.25}, {"pressure_psi": (3.0, 5.0)}),
+    Effect("camera_scale", {"gain": 0.03}, signed=True),
+    Effect("pump_fade", {"psi": 1.0}),
+    Effect("quadratic_damping", {"Ns2_m2": 250.0}),
+    Effect("sensor_crosstalk", {"share": 0.04}),
+)
+LIBRARY = tuple(effect.name for effect in _IN_LIBRARY)
+OUTSIDE = tuple(effect.name for effect in _IN_NONE)
+EFFECTS = {effect.name: effect for effect in (*_IN_LIBRARY, *_IN_NONE)}
 
 
 def plant_parameters(effects: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
