@@ -42,7 +42,7 @@ def record(
     from bifa.live.record import record_telemetry, record_walks
     from bifa.report.terminal import plain_spaces
     from bifa.report.words import gait_words
-    from bifa.rig import open_rig
+    from bifa.rig import SameBoard, open_rig
     from bifa.robot.gait import BASELINE, read_gait_file
     from bifa.screen import Console
 
@@ -56,4 +56,4 @@ def record(
                 record_walks(rig, port, out, gait, cycles, repeats, console)
     if not has_instruments:
         console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking")
-        record_telemetry(open_rig, port, out, gait, seconds, console)
+        record_telemetry(SameBoard(port), out, gait, seconds, console)

@@ -5,7 +5,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,12 +84,7 @@ def record_walks(
 
 
 def record_telemetry(
-    open_rig: Callable[..., Any],
-    port: str | None,
-    out: Path,
-    gait_file: Path | None,
-    duration_s: float | None,
-    console: Console,
+    board: SameBoard, out: Path, gait_file: Path | None, duration_s: float | None, console: Console
 ) -> None:
     """Telemetry of a bare Uno into `out`/telemetry_<n>.csv, one file for each time that the port was there."""
     parameters = read_gait_file(gait_file).parameters if gait_file else {}
@@ -97,7 +92,7 @@ def record_telemetry(
         raise RecordingError(f"{out} contains other files; choose a new folder")
     out.mkdir(parents=True, exist_ok=True)
     end_s = math.inf if duration_s is None else time.monotonic() + duration_s
-    log = _TelemetryLog(SameBoard(port, open_rig), parameters, end_s, console, Desk(console.print))
+    log = _TelemetryLog(board, parameters, end_s, console, Desk(console.print))
     waiting = "recording resumes when that Uno is back" + (
         "; you are asked before it walks (Ctrl-C ends)" if parameters else " (Ctrl-C ends)"
     )

@@ -115,7 +115,7 @@ def test_a_recording_survives_the_port_and_goes_on_when_it_is_back(tmp_path):
         return SerialRig(opened[-1].device)
 
     unplugged_then_ended(unos[0], tmp_path / "out", 50)
-    record_telemetry(open_rig, "the port", tmp_path / "out", None, 120.0, Console(file=told, width=200))
+    record_telemetry(SameBoard("the port", open_rig), tmp_path / "out", None, 120.0, Console(file=told, width=200))
     text = told.getvalue()
     assert f"{unos[0].device} is gone; plug the Uno in again" in text
     assert f"what was recorded is in {tmp_path / 'out'}; recording resumes when that Uno is back" in text
@@ -156,7 +156,7 @@ def test_where_nobody_can_be_asked_it_records_without_walking(tmp_path, gait, mo
         return SerialRig(opened[-1].device)
 
     unplugged_then_ended(unos[0], tmp_path / "out", 100)
-    record_telemetry(open_rig, None, tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
+    record_telemetry(SameBoard(None, open_rig), tmp_path / "out", Path(gait), 120.0, Console(file=told, width=200))
     assert unos[0].driven_s > 0
     assert unos[1].driven_s == 0, "another board, or the same one anew: it does not walk by itself"
     assert "recording without walking, since no one can be asked" in told.getvalue()
@@ -190,7 +190,7 @@ def test_a_recorder_opens_only_the_board_that_it_began_with(tmp_path, monkeypatc
         plugged[:] = [usb("/dev/ttyACM0", "B2")]
         return nullcontext(SimpleNamespace(transport=Away(board), clock=board))
 
-    record_telemetry(open_once, None, tmp_path / "out", None, 3.0, Console(file=io.StringIO()))
+    record_telemetry(SameBoard(None, open_once), tmp_path / "out", None, 3.0, Console(file=io.StringIO()))
     assert opened == [None]
 
 
