@@ -1,7 +1,7 @@
 """The tools around the firmware, as the host uses them: PlatformIO, the built image, the board's port."""
 
 from bifa.toolchain.flash import build_image, choose_port, upload_image, write_with_avrdude
-from bifa.toolchain.project import find_project, image_path, platformio_program, project_folder
+from bifa.toolchain.project import find_project, project_folder
 from bifa.toolchain.run import ToolchainError
 
 __all__ = [
@@ -9,8 +9,6 @@ __all__ = [
     "build_image",
     "choose_port",
     "find_project",
-    "image_path",
-    "platformio_program",
     "project_folder",
     "upload_image",
     "write_with_avrdude",
