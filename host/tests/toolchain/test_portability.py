@@ -21,24 +21,6 @@ def out_of_the_tree(tmp_path, monkeypatch):
     monkeypatch.setattr(portability, "BUILD", tmp_path / "build")
 
 
-@pytest.fixture
-def spawned(monkeypatch):
-    """The commands that would run, each answering `status`."""
-    commands = []
-
-    def run(command, **_):
-        commands.append([str(word) for word in command])
-        return subprocess.CompletedProcess(command, spawned.status)
-
-    def spawned():
-        monkeypatch.setattr(portability, "settings", lambda environment: ({}, {0}))
-        monkeypatch.setattr(portability.subprocess, "run", run)
-        return commands
-
-    spawned.status = 0
-    return spawned
-
-
 @pytest.mark.parametrize("environment", ENVIRONMENTS, ids=lambda e: e.name)
 def test_every_environment_is_what_it_says_or_this_machine_cannot_be_it(environment):
     try:
@@ -69,9 +51,15 @@ def test_another_blas_is_not_this_machines_own_nor_its_twin(own, monkeypatch):
 
 
 @pytest.mark.parametrize(("status", "said"), [(0, "passed"), (1, "FAILED")])
-def test_the_last_line_says_what_came_of_it(spawned, capfd, status, said):
-    commands = spawned()
-    spawned.status = status
+def test_the_last_line_says_what_came_of_it(monkeypatch, capfd, status, said):
+    commands = []
+
+    def run(command, **_):
+        commands.append([str(word) for word in command])
+        return subprocess.CompletedProcess(command, status)
+
+    monkeypatch.setattr(portability, "settings", lambda environment: ({}, {0}))
+    monkeypatch.setattr(portability.subprocess, "run", run)
     assert portability.main(["--only", "server", "--", "-k", "settle"]) == status
     assert said in "".join(capfd.readouterr()).splitlines()[-1]
     assert "tests/lacuna" in commands[0]

@@ -50,8 +50,10 @@ def bench(image):
         rig.close()
 
 
-def psi(rig) -> np.ndarray:
-    """The last reading that has been sent, three chambers."""
+def psi(rig, after_s: float) -> np.ndarray:
+    """The last reading that has been sent by then, three chambers."""
+    rig.clock.sleep(after_s)
+    rig.transport.read(0)
     data = rig.transport.read(0.05)
     while len(data) < 6:
         data += rig.transport.read(0.05)
@@ -94,20 +96,13 @@ def test_waiting_for_a_fraction_of_a_cycle_gets_there(bench):
 
 def test_valves_fill_chambers_and_sensors_tell(bench):
     rig = bench()
-    rig.clock.sleep(0.05)
-    assert psi(rig) == pytest.approx([0, 0, 0], abs=0.3)
+    assert psi(rig, 0.05) == pytest.approx([0, 0, 0], abs=0.3)
     rig.transport.write(BODY_UP)
-    rig.clock.sleep(3.0)
-    rig.transport.read(0)
-    assert psi(rig) == pytest.approx([8.5, 0, 0], abs=0.3)
+    assert psi(rig, 3.0) == pytest.approx([8.5, 0, 0], abs=0.3)
     rig.transport.write(BODY_DOWN)
-    rig.clock.sleep(9.0)
-    rig.transport.read(0)
-    assert psi(rig) == pytest.approx([-13, 0, 0], abs=0.4)
+    assert psi(rig, 9.0) == pytest.approx([-13, 0, 0], abs=0.4)
     rig.transport.reset()  # the valves fall with the reset
-    rig.clock.sleep(4.0)
-    rig.transport.read(0)
-    assert psi(rig) == pytest.approx([0, 0, 0], abs=0.3)
+    assert psi(rig, 4.0) == pytest.approx([0, 0, 0], abs=0.3)
     assert rig.plant.both_valves == 0
 
 
@@ -121,13 +116,9 @@ def test_both_valves_of_a_chamber_are_counted(bench):
 def test_a_broken_sensor_and_its_repair(bench):
     rig = bench()
     rig.break_sensor("head", 0.0)
-    rig.clock.sleep(0.1)
-    rig.transport.read(0)
-    assert psi(rig)[1] < -18
+    assert psi(rig, 0.1)[1] < -18
     rig.break_sensor("head", None)
-    rig.clock.sleep(0.1)
-    rig.transport.read(0)
-    assert psi(rig)[1] == pytest.approx(0, abs=0.3)
+    assert psi(rig, 0.1)[1] == pytest.approx(0, abs=0.3)
 
 
 def test_the_same_calls_give_the_same_bytes(bench):
