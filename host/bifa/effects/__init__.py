@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import math
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
@@ -41,7 +40,7 @@ def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:
     full = {key: values.get(key, p.typical if p.omitted is None else p.omitted) for key, p in known.items()}
     for key, value in full.items():
         lower, upper, unit = known[key].lower, known[key].upper, known[key].unit
-        number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        if not number or not lower <= value <= upper:
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not lower <= value <= upper:  # NaN is not
             raise EffectError(f"{name}.{key} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
     return {key: float(value) for key, value in full.items()}
