@@ -1,26 +1,94 @@
-"""The model with what a diagnosis added to it, as `bifa simulate` and `bifa optimize` take it."""
+"""The identified model: how well its values are known, where each comes from, and what a diagnosis added to it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
 
-from bifa.identify.robust import labeled, with_uncertainty
-from bifa.identify.scatter import with_scatter
+import numpy as np
+
+from bifa.identify.scatter import scatter_of
 from bifa.problem.sites import learnt_curves
 from bifa.problem.system import RobotSystem
 from bifa.robot import Model
+from bifa.robot.model import LEARNT, Covariance
 from bifa.simulate import plant
+from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit
-from lacuna.estimation.uncertainty import uncertainty
+from lacuna.estimation.uncertainty import Uncertainty, uncertainty
 
 
 def completed_model(fit: Fit, date: str = "") -> Model:
     """The fitted values, effects and a curve learnt in the robot's equations included, with the covariance of what the
-    data determine and with the scatter beyond it. `date`: of the fit, for its provenance."""
+    data determine and with the scatter beyond it, as `bifa simulate` and `bifa optimize` take it. `date`: of the fit,
+    for its provenance."""
+    structure = fit.structure
+    model = cast(RobotSystem, structure.system).model_at(fit.theta, structure.effects)
+    model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
+    return described(model, fit, uncertainty(fit), "bifa diagnose", date)
+
+
+def described(
+    model: Model, fit: Fit, known: Uncertainty, command: str, date: str = "", sd: Mapping[str, float] | None = None
+) -> Model:
+    """`model`, fitted by `fit`, with how well its values are known, how walks differ from it beyond that, and labels.
+    `sd`: standard deviations that come before those of `known`."""
+    model = replace(_with_uncertainty(model, fit, known, sd or {}), scatter=scatter_of(fit))
+    return labeled(model, cast(RobotSystem, fit.structure.system), command, date)
+
+
+def _with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[str, float]) -> Model:
+    """`model`, fitted by `fit`, with standard deviations and the covariance of all its values that the data determine,
+    the curves' too, correlated as `known`: each by `sd`, else by how well it is known and by what the conditions of the
+    data contradict one another, whichever is more."""
+    moves, between = _moves(model, fit), np.sqrt(np.diag(clustered_covariance(fit)))
+    chosen = [k for k, e in enumerate(known.estimates) if e.determined and e.name in moves]
+    if not chosen:
+        return model
+    widths = {known.estimates[k].name: max(known.estimates[k].sd, float(between[k])) for k in chosen} | dict(sd)
+    fitted = [known.estimates[k].name for k in chosen]
+    matrix = known.covariance[np.ix_(chosen, chosen)]
+    stretch = np.array([widths[name] for name in fitted]) / np.sqrt(np.diag(matrix))
+    names = tuple(dict.fromkeys(value for name in fitted for value in moves[name]))
+    ways = np.array([[moves[name].get(value, 0.0) for name in fitted] for value in names]) * stretch
+    parameters = {name: replace(p, sd=widths[name]) if name in widths else p for name, p in model.parameters.items()}
+    return replace(model, parameters=parameters, covariance=Covariance(names, ways @ matrix @ ways.T))
+
+
+def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
+    """For each of the fit's parameters the values of `model` that it moves, and by how much: itself, or those of a
+    curve."""
     structure = fit.structure
     system = cast(RobotSystem, structure.system)
-    model = system.model_at(fit.theta, structure.effects)
-    model = replace(model, learnt=learnt_curves(plant(model), structure.corrections(fit.theta)))
-    model = with_scatter(with_uncertainty(model, fit, uncertainty(fit)), fit)
-    return labeled(model, system, "bifa diagnose", date)
+    own = {*system.fitted, *(name for name in structure.names if name.split(".")[0] in structure.effects)}
+    found = {name: {name: 1.0} for name in own}
+    for curve in system.curves.values():
+        found |= curve.changes
+    for site, learnt in model.learnt.items():
+        knots = system.correction_sites[site].knots
+        each = (learnt.values.shape[1] - 1) // (knots - 1)
+        for row in range(len(learnt.values)):
+            for knot in range(knots):
+                found[f"{LEARNT}.{site}.{row}_{knot}"] = {f"{LEARNT}.{site}.{row}.{knot * each}": 1.0}
+    return found
+
+
+def labeled(model: Model, system: RobotSystem, command: str, date: str = "") -> Model:
+    """`model`, fitted to the data set of `system`, with its name, its provenance and the source of each value.
+
+    date: of the fit; left out where the same data have to give the same bytes.
+    """
+    dataset = system.dataset
+    sources = dict.fromkeys(dataset.known, f"[known] of {dataset.name}")
+    sources |= dict.fromkeys(system.fitted, f"fitted to {dataset.name}")
+    parameters = {name: replace(p, source=sources.get(name, p.source)) for name, p in model.parameters.items()}
+    added = " and ".join((*model.effects, *(f"learnt {name}" for name in model.learnt))).replace("_", " ")
+    on = f" on {date}" if date else ""
+    return replace(
+        model,
+        name=f"{dataset.name} with {added}" if added else dataset.name,
+        parameters=parameters,
+        provenance=f"{command}{on}: fitted to {len(dataset.trials)} trials of {dataset.name}"
+        + (f", completed by {added}" if added else ""),
+    )

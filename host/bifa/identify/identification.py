@@ -9,11 +9,9 @@ from statistics import NormalDist
 import numpy as np
 
 from bifa.data import Dataset
-from bifa.identify.estimate import IntervalEstimate
-from bifa.identify.robust import labeled, with_uncertainty
-from bifa.identify.scatter import with_scatter
+from bifa.identify.completed import described
 from bifa.identify.start import fit_statics, prepare
-from bifa.identify.static import StaticFit
+from bifa.identify.static import CONFIDENCE, IntervalEstimate, StaticFit
 from bifa.problem.inputs import ANCHOR
 from bifa.problem.system import RobotSystem
 from bifa.robot import Model
@@ -24,7 +22,6 @@ from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import one_thread, solve
 from lacuna.estimation.uncertainty import Uncertainty, profile_interval, uncertainty
 
-CONFIDENCE = 0.9
 _NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # standard deviations on either side
 # mu_s shows in one sample of a pull, its threshold: there the cost is no parabola.
 _PROFILED = ("mu_s",)
@@ -103,9 +100,10 @@ def identify(
     known = uncertainty(fit, confidence=CONFIDENCE)
     intervals = _intervals(system, fit, known)
     intervals |= _profiles(fit, intervals)
+    sd = {name: interval.sd for name, interval in intervals.items()}
     return Identification(
         system=system,
-        model=_model(system, fit, known, intervals, date),
+        model=described(system.model_at(fit.theta), fit, known, "bifa fit", date, sd),
         fit=fit,
         uncertainty=known,
         intervals=intervals,
@@ -125,7 +123,7 @@ def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, I
             low, high = estimate.value - _NORMAL_HALF * sd, estimate.value + _NORMAL_HALF * sd
             parameter = system.model.parameters[estimate.name]
             low, high = max(low, parameter.lower), min(high, parameter.upper)
-            found[estimate.name] = IntervalEstimate(estimate.value, sd, low, high, CONFIDENCE)
+            found[estimate.name] = IntervalEstimate(estimate.value, sd, low, high)
     return found
 
 
@@ -143,17 +141,8 @@ def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, 
         old = intervals[name]
         low, high = profile_interval(local, name, confidence=CONFIDENCE)
         low, high = min(low, old.lower), max(high, old.upper)
-        found[name] = IntervalEstimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high, CONFIDENCE)
+        found[name] = IntervalEstimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high)
     return found
-
-
-def _model(
-    system: RobotSystem, fit: Fit, known: Uncertainty, intervals: Mapping[str, IntervalEstimate], date: str
-) -> Model:
-    """The identified model: fitted values with their sd, and the covariance of what is determined."""
-    sd = {name: interval.sd for name, interval in intervals.items()}
-    model = with_scatter(with_uncertainty(system.model_at(fit.theta), fit, known, sd), fit)
-    return labeled(model, system, "bifa fit", date)
 
 
 _SETTLED = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before

@@ -13,27 +13,22 @@ from scipy.special import ndtri, stdtrit
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.problem.switches import seconds_per_uno_s
 from bifa.problem.system import FRICTION_WOBBLE, RobotSystem
-from bifa.robot import Model
 from bifa.robot.model import Scatter
 from lacuna.estimation.fit import Fit
-from lacuna.system import Channels
+from lacuna.system import Channels, Record
 
 _AS_EXPECTED = 5  # runs that count as having varied by what is expected beforehand
 _SIDE = 0.95  # of a distribution is below the upper end of its 90 % interval
 _LAST = 50  # samples of a walk, over which its end is averaged
 
 
-def with_scatter(model: Model, fit: Fit) -> Model:
-    """`model`, fitted by `fit`, with the scatter that its residuals and its runs' friction show."""
-    return replace(model, scatter=scatter_of(fit))
-
-
 def scatter_of(fit: Fit) -> Scatter:
-    """Measured on the trials that were fitted; rounded, since it is an estimate from some tens of runs."""
+    """What residuals and the runs' friction show on the trials that were fitted; rounded, since it is an estimate from
+    some tens of runs."""
     found = {
         "friction": _between_runs(fit),
-        "pressure_psi": _unexplained(fit, (STEP, WALK), lambda residual: _joined(residual, "pressure")),
-        "force_N": _unexplained(fit, (STATIC, ANCHOR), lambda residual: _joined(residual, "force")),
+        "pressure_psi": _unexplained(fit, (STEP, WALK), "pressure"),
+        "force_N": _unexplained(fit, (STATIC, ANCHOR), "force"),
         "speed": _speed(fit),
     }
     for name, drift in session_drifts(fit).items():
@@ -46,17 +41,14 @@ def session_drifts(fit: Fit) -> dict[str, float]:
     """RMS over the session of what was learnt to drift, by the scatter that it adds to: the next walk is at a place in
     another session, which nobody knows."""
     learnt = {c.site: float(np.sqrt(np.mean(c.table**2))) for c in fit.structure.corrections(fit.theta)}
-    push_N = fit.theta.get("body_area_N_psi", 0.0) * _supply_psi(fit)
+    usual_psi = cast(RobotSystem, fit.structure.system).model["supply_positive_psi"]
+    push_N = fit.theta.get("body_area_N_psi", 0.0) * fit.theta.get("supply_positive_psi", usual_psi)
     found = {
         "friction": learnt.get("friction_of_the_day", 0.0),
         "pressure_psi": learnt.get("vacuum_of_the_day", 0.0),
         "force_N": learnt.get("area_of_the_day", 0.0) * push_N,
     }
     return {name: drift for name, drift in found.items() if drift > 0.0}
-
-
-def _supply_psi(fit: Fit) -> float:
-    return fit.theta.get("supply_positive_psi", cast(RobotSystem, fit.structure.system).model["supply_positive_psi"])
 
 
 def switch_timing(system: RobotSystem) -> Scatter:
@@ -85,15 +77,21 @@ def _between_runs(fit: Fit) -> float:
     return float(np.sqrt(square / (len(factors) + _AS_EXPECTED)))
 
 
-def _unexplained(fit: Fit, experiments: Sequence[str], part: Callable[[Channels], np.ndarray]) -> float:
-    """RMS of what the repeats of a condition share in their residuals, over the conditions of `experiments`."""
+def _unexplained(fit: Fit, experiments: Sequence[str], quantity: str) -> float:
+    """RMS of what the repeats of a condition share in their residuals of a quantity, over those of `experiments`."""
+    shared = _shared(fit, experiments, lambda _, residual: _joined(residual, quantity))
+    return float(np.sqrt(max(float(np.mean(shared)), 0.0))) if shared else 0.0
+
+
+def _shared(fit: Fit, experiments: Sequence[str], part: Callable[[Record, Channels], np.ndarray]) -> list[float]:
+    """What the repeats of each condition of `experiments` share in the `part` of a trial's residuals, where there is
+    one."""
     residuals = fit.residuals()
     conditions: dict[object, list[np.ndarray]] = {}
     for trial in fit.problem.trials:
-        if trial.experiment in experiments and (values := part(residuals[trial.name])).size:
+        if trial.experiment in experiments and (values := part(trial, residuals[trial.name])).size:
             conditions.setdefault((trial.experiment, trial.condition), []).append(values)
-    shared = [shared_square(repeats) for repeats in conditions.values()]
-    return float(np.sqrt(max(float(np.mean(shared)), 0.0))) if shared else 0.0
+    return [shared_square(repeats) for repeats in conditions.values()]
 
 
 def shared_square(repeats: Sequence[np.ndarray]) -> float:
@@ -107,22 +105,19 @@ def shared_square(repeats: Sequence[np.ndarray]) -> float:
 
 
 def _joined(residual: Channels, quantity: str) -> np.ndarray:
-    values = [v for name, v in residual.items() if name.startswith(quantity)]
-    joined = np.concatenate(values) if values else np.zeros(0)
+    joined = np.concatenate([np.zeros(0), *(v for name, v in residual.items() if name.startswith(quantity))])
     return joined[np.isfinite(joined)]
 
 
 def _speed(fit: Fit) -> float:
     """By what share walks end ahead of or behind the model, alike in every repeat."""
-    ways = {w.name: _end(w.channels) for w in fit.problem.trials if w.experiment == WALK}
-    residuals = fit.residuals()
-    conditions: dict[object, list[np.ndarray]] = {}
-    for trial in fit.problem.trials:
-        if trial.experiment == WALK and abs(ways[trial.name]) > 1.0:
-            off = np.array([_end(residuals[trial.name]) / ways[trial.name]])
-            if np.isfinite(off).all():
-                conditions.setdefault(trial.condition, []).append(off)
-    return of_few([shared_square(repeats) for repeats in conditions.values()])
+
+    def off(walk: Record, residual: Channels) -> np.ndarray:
+        way_mm = _end(walk.channels)
+        share = np.array([_end(residual) / way_mm] if abs(way_mm) > 1.0 else [])
+        return share[np.isfinite(share)]
+
+    return of_few(_shared(fit, (WALK,), off))
 
 
 def of_few(squares: Sequence[float]) -> float:

@@ -8,27 +8,31 @@ all experiments, graduated (`lacuna.estimation.graduated`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from bifa import robot
-from bifa.data import Dataset
-from bifa.identify.equilibria import PRESSURE_SD_PSI, reach_m, rests
+from bifa.data import Dataset, Trial
 from bifa.identify.static import StaticFit, fit_static
 from bifa.problem.curves import FittedCurve
 from bifa.problem.stiffness import UndeterminedError
+from bifa.problem.switches import step_timeline
 from bifa.problem.system import RobotSystem, fittable
 from bifa.robot import Model, ModelParameterError
 from lacuna.estimation.solve import one_thread
 
 _ACTUATORS = {"large": "body", "small": "small"}
 _SUPPLY_SETTLED = 0.98  # quantile of a walk's pressure that stands for its supply
-
-OnProgress = Callable[[str], None]
+_SETTLED_MM_S = 0.5  # slower than this an actuator is at rest
+_SAMPLES = 20  # that say whether it is
+_PRESSURE_SD_PSI = 0.05  # of a mean reading: a count is 0.037 psi
 
 
 @one_thread
-def prepare(dataset: Dataset, model: Model | None = None, on_progress: OnProgress = lambda stage: None) -> RobotSystem:
+def prepare(
+    dataset: Dataset, model: Model | None = None, on_progress: Callable[[str], None] = lambda stage: None
+) -> RobotSystem:
     """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
     stand where the static stage leaves them, and the rest is as in `model` (default: nominal).
 
@@ -54,7 +58,7 @@ def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
     found = {}
     for actuator in _ACTUATORS:
         try:
-            found[actuator] = fit_static(dataset, actuator, reach_m(dataset, actuator))
+            found[actuator] = fit_static(dataset, actuator, _reach_m(dataset, actuator))
         except UndeterminedError:
             continue  # the model's own curve stands in; the report says so
     return found
@@ -65,11 +69,11 @@ def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model:
     prefix = _ACTUATORS[fit.actuator]
     name = f"{prefix}_area_N_psi"
     area = values.get(name, model.parameters[name].value)
-    seen = rests(dataset, fit.actuator)
+    seen = _rests(dataset, fit.actuator)
     moves = bool(seen or dataset.of("locomotion"))
     if not seen:
         return FittedCurve(prefix, fit.stiffness, moves)
-    sd = np.full(len(seen), area * PRESSURE_SD_PSI)
+    sd = np.full(len(seen), area * _PRESSURE_SD_PSI)
     pinned = fit.stiffness.with_equilibria(
         [rest.displacement_m for rest in seen], [area * rest.pressure_psi for rest in seen], sd
     )
@@ -89,14 +93,48 @@ def _known(dataset: Dataset, model: Model) -> dict[str, float]:
 def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
     """Supplies that the lab did not measure, read off the sensors; the joint refinement has the last word."""
     found = {}
-    vacuum = [r.pressure_psi for a in _ACTUATORS for r in rests(dataset, a) if r.pressure_psi < 0]
+    vacuum = [r.pressure_psi for a in _ACTUATORS for r in _rests(dataset, a) if r.pressure_psi < 0]
     if "supply_negative_psi" not in dataset.known and vacuum:
         found["supply_negative_psi"] = float(np.median(vacuum))
     walks = [t.columns["pressure_body_psi"] for t in dataset.of("locomotion") if t.pressure_psi is None]
     if "supply_positive_psi" not in dataset.known and walks:
         found["supply_positive_psi"] = float(np.median([np.quantile(p, _SUPPLY_SETTLED) for p in walks]))
-    return {name: float(np.clip(v, *_bounds(model, name))) for name, v in found.items()}
+    bounds = {name: (model.parameters[name].lower, model.parameters[name].upper) for name in found}
+    return {name: float(np.clip(value, *bounds[name])) for name, value in found.items()}
 
 
-def _bounds(model: Model, name: str) -> tuple[float, float]:
-    return model.parameters[name].lower, model.parameters[name].upper
+@dataclass(frozen=True)
+class _Rest:
+    """A displacement [m] held at a pressure [psi] as it was read."""
+
+    displacement_m: float
+    pressure_psi: float
+
+
+def _rests(dataset: Dataset, actuator: str) -> list[_Rest]:
+    """Under vacuum before the step, and extended before the pressure goes, of every step response of the actuator."""
+    return [rest for trial in dataset.of("step_response", actuator) for rest in _rests_of(trial)]
+
+
+def _reach_m(dataset: Dataset, actuator: str) -> tuple[float, float] | None:
+    """The least and greatest displacement of the actuator's step responses [m], without the noise's outliers."""
+    trials = dataset.of("step_response", actuator)
+    if not trials:
+        return None
+    limits = [np.percentile(trial.columns["displacement_mm"], (0.5, 99.5)) for trial in trials]
+    return float(min(low for low, _ in limits)) * 1e-3, float(max(high for _, high in limits)) * 1e-3
+
+
+def _rests_of(trial: Trial) -> list[_Rest]:
+    time_s = trial.time_s - trial.time_s[0]
+    ends = [*(t for t in step_timeline(trial).time_s if t > 0.0), time_s[-1] + 1.0]
+    found = []
+    for end in ends:
+        last = np.flatnonzero(time_s < end - 1e-9)[-_SAMPLES:]
+        if len(last) < _SAMPLES:
+            continue
+        x = trial.columns["displacement_mm"][last]
+        slope = np.polyfit(time_s[last], x, 1)[0]
+        if abs(slope) < _SETTLED_MM_S:
+            found.append(_Rest(float(x.mean()) * 1e-3, float(trial.columns["pressure_psi"][last].mean())))
+    return found

@@ -5,13 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from bifa.data import Dataset, Trial
-from bifa.identify.estimate import IntervalEstimate, weighted_mean
 from bifa.problem.motion import imposed_motion
 from bifa.problem.stiffness import StiffnessFit, UndeterminedError, fit_stiffness
 
+CONFIDENCE = 0.9  # of every interval
 UNPRESSURISED_PSI = 0.05  # below this commanded pressure a trial counts as one at 0 psi
+
+
+@dataclass(frozen=True)
+class IntervalEstimate:
+    """`value` with the interval `lower` to `upper` of `CONFIDENCE`; `sd` is its standard deviation."""
+
+    value: float
+    sd: float
+    lower: float
+    upper: float
 
 
 @dataclass(frozen=True)
@@ -20,14 +31,12 @@ class StaticFit:
 
     area_N_psi: None where every trial was at 0 psi.
     hysteresis_N: half of the mean distance between the loading and the unloading branch at 0 psi.
-    residual_N: RMS of force - (K(x) - a p) of every trial, by file.
     """
 
     actuator: str
     stiffness: StiffnessFit
     area_N_psi: IntervalEstimate | None
     hysteresis_N: float
-    residual_N: dict[str, float]
 
 
 def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | None = None) -> StaticFit:
@@ -48,8 +57,7 @@ def fit_static(dataset: Dataset, actuator: str, reach_m: tuple[float, float] | N
     stiffness = fit_stiffness(x, force, loading, reach_m=reach_m)
     pressurised = [trial for trial in trials if trial not in unloaded]
     area = _area(stiffness, pressurised) if pressurised else None
-    residual = {t.file: _residual_rms(stiffness, area.value if area else 0.0, t) for t in trials}
-    return StaticFit(actuator, stiffness, area, _half_width(x, force, loading, stiffness), residual)
+    return StaticFit(actuator, stiffness, area, _half_width(x, force, loading, stiffness))
 
 
 def _branches(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -70,12 +78,24 @@ def _area(stiffness: StiffnessFit, trials: list[Trial]) -> IntervalEstimate:
     x = np.linspace(*stiffness.covered_m, 50)
     mean_pressure = np.average([trial.commanded_psi for trial in trials], weights=weights)
     common_sd = stiffness.mean_force_sd(x) / abs(mean_pressure)
-    return weighted_mean(np.array(areas), np.array(weights), common_sd)
+    return _weighted_mean(np.array(areas), np.array(weights), common_sd)
 
 
-def _residual_rms(stiffness: StiffnessFit, area: float, trial: Trial) -> float:
-    x, force, _ = _branches(trial)
-    return float(np.sqrt(np.mean((force - stiffness.force(x) + area * trial.commanded_psi) ** 2)))
+def _weighted_mean(values: np.ndarray, weights: np.ndarray, common_sd: float) -> IntervalEstimate:
+    """The mean of repeated measurements whose variances go as 1/weights, with an interval from their scatter.
+
+    `common_sd`: what shifts all of them alike and therefore does not show in the scatter. The degrees of freedom are
+    Welch's and Satterthwaite's. A single measurement has an infinite interval: nothing says how well it repeats.
+    """
+    mean = float(np.average(values, weights=weights))
+    n = len(values)
+    if n < 2:
+        return IntervalEstimate(mean, np.inf, -np.inf, np.inf)
+    scatter = float(np.sqrt(np.sum(weights * (values - mean) ** 2) / (n - 1) / weights.sum()))
+    sd = float(np.hypot(scatter, common_sd))
+    freedom = (n - 1) * (sd / scatter) ** 4 if scatter > 0 else np.inf
+    half = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * sd
+    return IntervalEstimate(mean, sd, mean - half, mean + half)
 
 
 def _half_width(x: np.ndarray, force: np.ndarray, loading: np.ndarray, stiffness: StiffnessFit) -> float:

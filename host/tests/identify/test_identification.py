@@ -10,8 +10,8 @@ from rich.console import Console
 from scipy.stats import binom
 
 from bifa.data import Dataset
-from bifa.identify.estimate import IntervalEstimate
 from bifa.identify.identification import identify
+from bifa.identify.static import IntervalEstimate
 from bifa.problem.unmeasured import PRIOR_SD
 from bifa.report.fit import draw_curves, errors_table, fit_page, parameters_and_remarks, remarks
 from bifa.report.page import render

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from bifa.data import Dataset
-from bifa.identify.robust import labeled
+from bifa.identify.completed import labeled
 from bifa.identify.start import prepare
 from harness.independent_lab import IndependentLab
 
