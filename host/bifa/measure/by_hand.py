@@ -79,7 +79,7 @@ class ByHand:
                 raise
             except BifaError as error:
                 uno.halt()
-                self._review(bench, uno, turn, f"Not usable: {error}.", "Enter tries again", keep=False)
+                self._review(bench, uno, turn, f"Not usable: {error}.", "Enter tries again")
                 uno.clear()  # it may have been stopped; the next thing asked is whether valves may switch
                 continue
             if self._accepted(bench, uno, turn, trial, writer):
@@ -93,25 +93,15 @@ class ByHand:
         if misfit := misfit_of(trial, writer.trials):
             wrong.append(misfit)
         seen = "\n".join(f"Looks wrong: {text}" for text in wrong) or "Nothing looks wrong."
-        return self._review(bench, uno, turn, seen, "Enter keeps it, r repeats it", keep=True, findings=wrong)
+        return self._review(bench, uno, turn, seen, "Enter keeps it, r repeats it", wrong)
 
-    def _review(
-        self,
-        bench: Bench,
-        uno: Uno,
-        turn: Turn,
-        seen: str,
-        choice: str,
-        *,
-        keep: bool,
-        findings: Sequence[str] = (),
-    ) -> bool:
-        self._desk.ask(
-            "review", f"{seen} {choice}, q discards it and stops.", turn.as_dict() | {"findings": list(findings)}
-        )
+    def _review(self, bench: Bench, uno: Uno, turn: Turn, seen: str, choice: str, findings: Sequence[str] = ()) -> bool:
+        """Whether the answer is Enter; the other is to repeat."""
+        about = turn.as_dict() | {"findings": list(findings)}
+        self._desk.ask("review", f"{seen} {choice}, q discards it and stops.", about)
         while True:
             while (answer := self._desk.answer()) is None:
                 idle(bench, uno, _LOOK_S)
             if not answer or answer.lower() in _REPEAT:
-                return keep and not answer
+                return not answer
             self._desk.again(answer, choice)

@@ -15,12 +15,15 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from bifa.errors import BifaError
 from bifa.files import write_text
+
+if TYPE_CHECKING:
+    from bifa.screen import Countdown
 
 ASKS, ANSWER = "next.toml", "answer"
 _LONGEST = 4096  # of an answer in a file
@@ -32,34 +35,15 @@ class NobodyError(BifaError):
     """There is nobody who could answer."""
 
 
-class CountdownDisplay(Protocol):
-    """Shows how long something takes still (`bifa.screen.Countdown`)."""
-
-    def show(self, what: str, left_s: float) -> None:
-        """`what` goes on for `left_s` more."""
-
-    def close(self) -> None:
-        """Stop counting; a second call does nothing."""
-
-
-class _Unseen:
-    def show(self, what: str, left_s: float) -> None:
-        """See Countdown."""
-
-    def close(self) -> None:
-        """See Countdown."""
-
-
 class Desk:
     """`say(text)` shows a line to the person, `countdown` what they wait for; `watch` is the folder for scripts, if
     there is one. `is_asking`: a question has not been answered yet."""
 
     def __init__(
-        self, say: Callable[[str], None], watch: Path | None = None, countdown: CountdownDisplay | None = None
+        self, say: Callable[[str], None], watch: Path | None = None, countdown: Countdown | None = None
     ) -> None:
         self.say = say
-        self._watch = watch
-        self._countdown: CountdownDisplay = countdown or _Unseen()
+        self._watch, self._countdown = watch, countdown
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._is_listening = False
         self.is_asking = False
@@ -70,7 +54,7 @@ class Desk:
 
         `about`: what else a script needs to know, plain values.
         """
-        self._countdown.close()
+        self._close_countdown()
         self._listen()
         self._forget()
         self.is_asking = True
@@ -105,7 +89,8 @@ class Desk:
 
     def count_down(self, what: str, left_s: float) -> None:
         """While nothing is asked: `what` the robot does, for `left_s` still."""
-        self._countdown.show(what, left_s)
+        if self._countdown is not None:
+            self._countdown.show(what, left_s)
 
     def _taken(self) -> str | None:
         if self._watch is not None and (text := _from_file(self._watch / ANSWER)) is not None:
@@ -125,9 +110,13 @@ class Desk:
 
     def clear(self) -> None:
         """No question and no countdown stands any more."""
-        self._countdown.close()
+        self._close_countdown()
         if self._watch is not None:
             (self._watch / ASKS).unlink(missing_ok=True)
+
+    def _close_countdown(self) -> None:
+        if self._countdown is not None:
+            self._countdown.close()
 
     def _forget(self) -> None:
         """What was typed ahead must not start anything; lines from a pipe were meant for what is to come."""

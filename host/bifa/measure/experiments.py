@@ -1,4 +1,4 @@
-"""The paper's characterisation experiments (section IV), run on a bench through the real firmware and link."""
+"""The paper's characterisation experiments (section IV) and walks, on a bench through the real firmware and link."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ import numpy as np
 from bifa.data import Trial
 from bifa.errors import BifaError
 from bifa.link import Uno
+from bifa.link.table import CHAMBERS
 from bifa.link.units import set_point_psi
-from bifa.measure.alignment import AlignmentError, camera_rate, resampled
-from bifa.measure.locomotion import noted, record_walk
+from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
+from bifa.measure.alignment import AlignmentError, ClockLine, camera_rate, resampled
 from bifa.measure.plan import PULL_MM, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
-from bifa.measure.undisturbed import refuse_disturbed
+from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
+from bifa.printable import counted
 
-CHAMBERS = ("body", "head", "tail")
 CHAMBER_OF = {"large": "body", "small": "head"}
 SNAP_PSI = 8.5  # extends every actuator
 SETTLE_S = 6.0  # of a pressure: five of the slowest time constants of about 1 s
@@ -28,6 +29,9 @@ STEP_UP_S, STEP_DOWN_S, STEP_END_S = 0.5, 5.005, 14.0
 MOVED_MM = 0.1  # by which a cross-head has moved: well over its noise
 STILL_S = 1.0  # kept before and after the motion
 ATTEMPTS = 3  # at a trial in which no telemetry is lost and the clocks line up
+
+SAMPLE_S = 0.01
+TICK_S = 1e-3  # the Uno switches valves at its ticks
 
 Progress = Callable[[float], None]
 Recorded = tuple[dict[str, np.ndarray], dict[str, Any], int]  # columns, what is noted, lost samples
@@ -50,29 +54,29 @@ def record_trial(
             why = str(error)
             continue
         if not lost:
-            noted_psi = set_point(_commanded_psi(uno, planned))
-            return planned.as_trial(columns, extra=extra | noted_psi)
+            commanded_psi = uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
+            return planned.as_trial(columns, extra=extra | set_point(commanded_psi))
         why = f"{lost} samples were lost on the link; check the cable, then resume the session"
     raise BifaError(f"{planned.title}{f', {attempts} times over' if attempts > 1 else ''}: {why}")
 
 
 def _static(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(bench, uno, "static_loading", actuator=planned.actuator, rate_mm_s=planned.rate_mm_s)
-    chamber = CHAMBER_OF[planned.tested]
-    _pressurise(bench, uno, chamber, planned.commanded_psi)
-    return _moved(bench, uno, on_progress, chamber, planned.commanded_psi, 2 * 54.0 / planned.commanded_mm_s)
+    trial = planned.as_trial()
+    chamber = CHAMBER_OF[trial.tested]
+    _pressurise(bench, uno, chamber, trial.commanded_psi)
+    return _moved(bench, uno, on_progress, chamber, trial.commanded_psi, 2 * 54.0 / trial.commanded_mm_s)
 
 
 def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(bench, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
-    psi = planned.commanded_psi
+    trial = planned.as_trial()
+    psi = trial.commanded_psi
     # Extended first: a head holds with no pressure at all, but it has to snap out for that.
     _pressurise(bench, uno, "head", SNAP_PSI)
-    if psi < SNAP_PSI:
-        _pressurise(bench, uno, "head", psi, RELIEF_S)
-    elif psi > SNAP_PSI:
-        _pressurise(bench, uno, "head", psi)
-    columns, extra, lost = _moved(bench, uno, on_progress, "head", psi, PULL_MM / planned.commanded_mm_s)
+    if psi != SNAP_PSI:
+        _pressurise(bench, uno, "head", psi, RELIEF_S if psi < SNAP_PSI else SETTLE_S)
+    columns, extra, lost = _moved(bench, uno, on_progress, "head", psi, PULL_MM / trial.commanded_mm_s)
     return columns, extra | {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}, lost
 
 
@@ -86,21 +90,23 @@ def _moved(
         instruments.move()
         tape.wait_while(lambda: instruments.moving, expected_s)
         tape.wait(LEAD_S)
-    _refuse_unheld(tape, chamber, pressure_psi)
+    held = "positive" if pressure_psi > 0.0 else "vacuum" if pressure_psi < 0.0 else "off"
+    refuse_disturbed(tape.samples, "holding" if pressure_psi else "idle", {chamber: held})
     return _machine_columns(tape, chamber, _moving_span(tape)), noted(tape.clock), tape.lost_samples
 
 
 def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
     mount(bench, uno, "step_response", actuator=planned.actuator)
-    chamber = CHAMBER_OF[planned.tested]
+    trial = planned.as_trial()
+    chamber = CHAMBER_OF[trial.tested]
     _off(uno)
-    uno.set("pressure_psi", planned.commanded_psi)
+    uno.set("pressure_psi", trial.commanded_psi)
     uno.hold(chamber, "vacuum")
     idle(bench, uno, SETTLE_S, f"The {chamber} is evacuated until it rests, contracted")
     with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
         uno.schedule([(STEP_UP_S, chamber, "positive"), (STEP_DOWN_S, chamber, "vacuum")])
-        step = f"The {chamber} steps to {planned.commanded_psi:g} psi and back to vacuum"
+        step = f"The {chamber} steps to {trial.commanded_psi:g} psi and back to vacuum"
         tape.wait(STEP_END_S + LEAD_S, doing=step)
     refuse_disturbed(tape.samples, "holding")
     i = CHAMBERS.index(chamber)
@@ -120,21 +126,45 @@ def _step(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     return columns, noted(tape.clock) | known | camera_rate(tape.instrument_s), tape.lost_samples
 
 
+def _walk(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
+    """From rest, for as many cycles as are planned. BifaError where no gait is planned, the robot did not walk through,
+    or the clocks do not line up."""
+    if planned.gait is None:
+        raise BifaError(f"{planned.title}: a walk needs a gait")
+    period_s, cycles = planned.gait.period_s, planned.cycles
+    uno.halt()
+    mount(bench, uno, "locomotion", **planned.settings)
+    uno.upload({**planned.gait.as_dict(), **planned.parameters})
+    with Recording(bench, uno, on_progress) as tape:
+        tape.wait(LEAD_S, report=False)
+        uno.run()
+        doing = f"The robot walks {counted(cycles, 'cycle')} of {period_s:g} s"
+        tape.wait(cycles * period_s + LEAD_S, doing=doing)
+    known = {
+        "switch_error_s": TICK_S / 2,
+        "command_age_s": PRESSURES_AFTER_S,
+        "gait_ahead_s": TICK_S,  # the first switches are by the phases after the first step
+    }
+    extra = noted(tape.clock) | camera_rate(tape.instrument_s) | known
+    return _walk_columns(tape, period_s, cycles), extra, tape.lost_samples
+
+
 RUNS: dict[str, Callable[[Bench, Uno, PlannedTrial, Progress], Recorded]] = {
     "static_loading": _static,
     "step_response": _step,
     "anchor_pull": _pull,
-    "locomotion": record_walk,
+    "locomotion": _walk,
 }
+
+
+def noted(clock: ClockLine) -> dict[str, Any]:
+    """What every trial notes of how its clocks were lined up, and of what the Uno does beyond its commands."""
+    return {"clock_error_s": round(clock.rms_s, 7), "clock_rate": clock.rate, "dead_time_s": DEAD_TIME_S}
 
 
 def set_point(commanded_psi: float) -> dict[str, float]:
     """What a trial notes of its pressure: the regulator's real set-point. Nothing regulates the vacuum (below 0)."""
     return {"set_point_psi": round(set_point_psi(commanded_psi), 4)} if commanded_psi >= 0.0 else {}
-
-
-def _commanded_psi(uno: Uno, planned: PlannedTrial) -> float:
-    return uno.get("pressure_psi") if planned.pressure_psi is None else planned.pressure_psi
 
 
 def _off(uno: Uno) -> None:
@@ -170,13 +200,6 @@ def _scheduled_start(uno_s: np.ndarray, command: np.ndarray) -> tuple[float, flo
     return float(0.5 * (low + high)), float(0.5 * (high - low))
 
 
-def _refuse_unheld(tape: Recording, chamber: str, pressure_psi: float) -> None:
-    """DisturbedError unless `chamber` alone was held at its pressure all the time, as `_pressurise` had it."""
-    state = "holding" if pressure_psi else "idle"
-    held = "positive" if pressure_psi > 0.0 else "vacuum" if pressure_psi < 0.0 else "off"
-    refuse_disturbed(tape.samples, state, {chamber: held})
-
-
 def _moving_span(tape: Recording) -> slice:
     """The record about the motion, as far as the Uno recorded as well, without most of the lead on both sides."""
     time_s, place_mm = tape.instrument_s, tape.record["displacement_mm"]
@@ -206,3 +229,29 @@ def _machine_columns(tape: Recording, chamber: str, span: slice) -> dict[str, np
         "force_N": tape.record["force_N"][span],
         "pressure_psi": pressure[nearest],
     }
+
+
+def _walk_columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np.ndarray]:
+    """The Uno's samples while it ran, at the pressures' times since the valves first switched: the displacement then,
+    the commands as they were at the strobe just before."""
+    runs = np.array([sample.state == "running" for sample in tape.samples])
+    # A sample taken in the very tick that starts the run has no command yet.
+    running = np.flatnonzero(runs & ~np.isnan(tape.commands).any(axis=1))
+    if not len(running):
+        raise BifaError("the Uno sent no sample while it ran: check the link's counters with `bifa monitor`")
+    refuse_disturbed(tape.samples[np.argmax(runs) :], "running")
+    # The body's phase grows evenly from 0 on. At a strobe it is still what the tick before has switched the valves by:
+    # when it seems to have been 0, the valves switched for the first time.
+    first = running[0]
+    begun_s = tape.uno_s[first] - tape.samples[first].phase_rad[0] / (2 * np.pi) * period_s
+    since_s = tape.uno_s[running] - begun_s
+    if since_s[-1] < cycles * period_s - SAMPLE_S:
+        raise DisturbedError(f"the robot walked {since_s[-1]:.2f} s instead of {cycles * period_s:g}: repeat")
+    kept = since_s <= cycles * period_s + SAMPLE_S
+    time_s, kept = since_s[kept] + PRESSURES_AFTER_S, running[kept]
+    columns = {"time_s": time_s}
+    columns |= {f"command_{chamber}": tape.commands[kept, i] for i, chamber in enumerate(CHAMBERS)}
+    for name in ("displacement_head_mm", "displacement_tail_mm"):
+        if name in tape.record:
+            columns[name] = resampled(time_s, tape.instrument_s - begun_s, tape.record[name])
+    return columns | {f"pressure_{chamber}_psi": tape.pressures_psi[kept, i] for i, chamber in enumerate(CHAMBERS)}

@@ -34,9 +34,8 @@ from bifa.measure.alignment import (
     camera_rate,
     resampled,
 )
-from bifa.measure.experiments import CHAMBER_OF, set_point
+from bifa.measure.experiments import CHAMBER_OF, noted, set_point
 from bifa.measure.instruments import CHANNELS
-from bifa.measure.locomotion import noted
 from bifa.measure.plan import PlannedTrial
 
 Columns = Mapping[str, np.ndarray]
@@ -75,9 +74,9 @@ def import_trial(
     uno = _read_telemetry(_telemetry_file(telemetry), planned)
     clock = _line_up(edges, uno, instrument, telemetry)
     uno["time_s"] = uno["time_s"] + PRESSURES_AFTER_S
-    instrument_s = clock.to_uno(measured.pop("time_s"))
-    columns = _assemble(measured, instrument_s, uno, planned, instrument)
-    camera = camera_rate(instrument_s) if planned.experiment in ("step_response", "locomotion") else {}
+    measured["time_s"] = clock.to_uno(measured["time_s"])
+    columns = _assemble(measured, uno, planned, instrument)
+    camera = camera_rate(measured["time_s"]) if planned.experiment in ("step_response", "locomotion") else {}
     if recorded is not None:
         planned = _next_repeat(recorded, planned)
     asked = {} if planned.pressure_psi is None else set_point(planned.pressure_psi)
@@ -177,7 +176,7 @@ def _commanded(planned: PlannedTrial) -> tuple[str, ...]:
     """The chambers whose commands are columns of the trial."""
     if planned.experiment == "locomotion":
         return CHAMBERS
-    return (CHAMBER_OF[planned.tested],) if planned.experiment == "step_response" else ()
+    return (CHAMBER_OF[planned.as_trial().tested],) if planned.experiment == "step_response" else ()
 
 
 def _refuse_gaps(columns: Columns, sheet: Sheet, rows: np.ndarray, names: Iterable[str], problem: str) -> None:
@@ -223,25 +222,20 @@ def _marked(strobe: np.ndarray, sequence: np.ndarray, telemetry: Path) -> int:
     return int(sequence[ends[0] + 1])
 
 
-def _assemble(
-    measured: Columns, instrument_s: np.ndarray, uno: Columns, planned: PlannedTrial, instrument: Path
-) -> dict[str, np.ndarray]:
-    overlap = (instrument_s >= uno["time_s"][0]) & (instrument_s <= uno["time_s"][-1])
+def _assemble(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+    """The trial's columns, of records that are both on the Uno's clock."""
+    overlap = (measured["time_s"] >= uno["time_s"][0]) & (measured["time_s"] <= uno["time_s"][-1])
     if overlap.sum() < 3:
         raise InstrumentFileError(f"{instrument} and the telemetry do not overlap in time")
     if planned.experiment in ("static_loading", "anchor_pull"):
-        return _machine(measured, instrument_s, overlap, uno, planned, instrument)
-    return _camera(measured, instrument_s, uno, planned, instrument)
+        return _machine(measured, overlap, uno, planned, instrument)
+    return _camera(measured, uno, planned, instrument)
 
 
 def _machine(
-    measured: Columns,
-    instrument_s: np.ndarray,
-    overlap: np.ndarray,
-    uno: Columns,
-    planned: PlannedTrial,
-    instrument: Path,
+    measured: Columns, overlap: np.ndarray, uno: Columns, planned: PlannedTrial, instrument: Path
 ) -> dict[str, np.ndarray]:
+    instrument_s = measured["time_s"]
     moved = overlap & (np.abs(measured["displacement_mm"] - measured["displacement_mm"][overlap][0]) > _MOVED_MM)
     if not moved.any():
         raise InstrumentFileError(f"{instrument}: nothing moved while the Uno recorded")
@@ -258,9 +252,8 @@ def _machine(
     }
 
 
-def _camera(
-    measured: Columns, instrument_s: np.ndarray, uno: Columns, planned: PlannedTrial, instrument: Path
-) -> dict[str, np.ndarray]:
+def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: Path) -> dict[str, np.ndarray]:
+    instrument_s = measured["time_s"]
     step = planned.experiment == "step_response"
     chambers = _commanded(planned)
     commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])
@@ -275,7 +268,7 @@ def _camera(
         suffix = "" if step else f"_{chamber}"
         columns[f"command{suffix}"] = command[keep]
         columns[f"pressure{suffix}_psi"] = uno[f"pressure_{chamber}_psi"][keep]
-    for name in ("displacement_mm",) if step else ("displacement_head_mm", "displacement_tail_mm"):
+    for name in ("displacement_mm", _HEAD, _TAIL):
         if name in measured:
             try:
                 columns[name] = resampled(time_s, instrument_s, measured[name])

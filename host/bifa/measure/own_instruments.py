@@ -101,14 +101,14 @@ class OwnInstruments:
             stand += f", the pipe at {slope:g} degrees"
         if settings.get("direction") == "backward":
             stand += ", to be pulled backward"
-        zero = "displacement and force" if on_machine(experiment) else "displacement"
+        zero = "displacement and force" if ROLES[experiment] == MACHINE else "displacement"
         self._ask("mount", f"All valves are off. Mount {stand}, and zero {zero}. Press Enter when valves may switch.")
 
     def start(self) -> None:
         """See Instruments."""
         self._known, self._told = dict(self._signatures()), dict(self._alone())
         self._before = dict(self._known)
-        machine = on_machine(self._experiment)
+        machine = ROLES[self._experiment] == MACHINE  # which moves and measures, and not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
             "start",
@@ -328,8 +328,3 @@ def _signature(path: Path) -> tuple[int, int]:
     """What changes while a file is written."""
     stat = path.stat()
     return stat.st_mtime_ns, stat.st_size
-
-
-def on_machine(experiment: str) -> bool:
-    """Whether a testing machine moves and measures, and not a camera."""
-    return ROLES[experiment] == MACHINE

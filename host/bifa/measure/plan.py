@@ -64,21 +64,6 @@ class PlannedTrial:
         """What it is called on the terminal: "static loading, large, 4 psi, 2 mm/s, repeat 1"."""
         return f"{self.as_trial().label}, repeat {self.repeat}"
 
-    @property
-    def commanded_psi(self) -> float:
-        """See Trial."""
-        return self.as_trial().commanded_psi
-
-    @property
-    def commanded_mm_s(self) -> float:
-        """See Trial."""
-        return self.as_trial().commanded_mm_s
-
-    @property
-    def tested(self) -> str:
-        """See Trial."""
-        return self.as_trial().tested
-
     def as_trial(self, columns: Mapping[str, Any] | None = None, **fields: Any) -> Trial:
         """The trial that this becomes once it is recorded."""
         with_gait = {key: self.parameters[key] for key in GAIT_OPTIONAL if key in self.parameters}
@@ -139,6 +124,6 @@ def session(
         for pressure in pressures_psi or (0.0, 5.0, 8.5):
             conditions.append(PlannedTrial("anchor_pull", None, pressure, rate_mm_s or PULL_RATE_MM_S))
     if "locomotion" in experiments:
-        walks = [PlannedTrial("locomotion", gait=gait, cycles=cycles) for gait in gaits]
-        conditions += [replace(walk, settings=dict(settings or {})) for walk in walks]
+        slope = dict(settings or {})
+        conditions += [PlannedTrial("locomotion", gait=gait, cycles=cycles, settings=slope) for gait in gaits]
     return tuple(replace(condition, repeat=repeat) for repeat in range(1, repeats + 1) for condition in conditions)
