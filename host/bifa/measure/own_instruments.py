@@ -79,15 +79,15 @@ class OwnInstruments:
         self._before: dict[Path, Signature] = {}
         self._wrong = ""
         self._told: dict[Path, Signature] = {}
-        self._turn: Turn | None = None
-        self._kept: Path | None = None
+        self._turn: Turn  # as `begin` is told, and the folder
+        self._kept: Path
         self._step = ""
         self._experiment = ""
         self._known: dict[Path, Signature] = {}
         self._seen: dict[Path, tuple[Signature, float]] = {}
         self._record: tuple[Path, dict[str, np.ndarray]] | None = None
 
-    def begin(self, turn: Turn, kept: Path | None = None) -> None:
+    def begin(self, turn: Turn, kept: Path) -> None:
         """What is asked from now on is for this trial; `kept`: the folder of the earlier trials' files."""
         self._turn, self._kept = turn, kept
 
@@ -111,13 +111,12 @@ class OwnInstruments:
         machine = ROLES[self._experiment] == MACHINE  # which moves and measures, and not a camera
         which, then = ("the machine's recording", "") if machine else ("the camera", ": the robot then moves")
         self._ask(
-            "start",
-            f"Start {which}, with the strobe (D10) on its sync input. Press Enter once it is recording{then}.",
+            "start", f"Start {which}, with the strobe (D10) on its sync input. Press Enter once it is recording{then}."
         )
 
     def move(self) -> None:
         """See Instruments."""
-        planned = self._present.planned
+        planned = self._turn.planned
         static = self._experiment == "static_loading"
         way = "to the extended state and back" if static else f"by {PULL_MM:g} mm"
         self._ask("move", f"Move the cross-head {way} at {planned.rate_mm_s:g} mm/s. Press Enter once it has stopped.")
@@ -160,7 +159,7 @@ class OwnInstruments:
         where, then = (
             (f"to {self._watch} ", "") if self._watch is not None else ("", ", then type the path of the first")
         )
-        name = Path(self._present.planned.file).stem
+        name = Path(self._turn.planned.file).stem
         export = self._export
         if export is None:
             what = f"{name}.csv ({', '.join(('time_s', *CHANNELS[self._experiment]))})"
@@ -178,16 +177,10 @@ class OwnInstruments:
         if self._record is None:
             return
         folder.mkdir(parents=True, exist_ok=True)
-        target = (folder / self._present.planned.file).with_suffix(self._record[0].suffix)
+        target = (folder / self._turn.planned.file).with_suffix(self._record[0].suffix)
         shutil.copyfile(self._record[0], target)
         if self._needs_sync_file:
             shutil.copyfile(sync_file(self._record[0]), target.with_suffix(".sync.csv"))
-
-    @property
-    def _present(self) -> Turn:
-        if self._turn is None:
-            raise RuntimeError("nothing is asked of the instruments before `begin`")
-        return self._turn
 
     @property
     def _export(self) -> Export | None:
@@ -200,7 +193,7 @@ class OwnInstruments:
 
     def _ask(self, step: str, text: str) -> None:
         self._step = step
-        self._desk.ask(step, text, self._present.as_dict())
+        self._desk.ask(step, text, self._turn.as_dict())
 
     def _files(self) -> list[Path]:
         """What lies in the watched folder and below, without what is bifa's or an operating system's."""
@@ -314,8 +307,8 @@ class OwnInstruments:
 
     def _refuse_earlier(self, path: Path) -> None:
         """Refuse the file of an earlier trial: somebody saved or named the wrong one."""
-        data, own = path.read_bytes(), Path(self._present.planned.file).stem
-        for old in sorted(self._kept.glob("*")) if self._kept is not None else ():
+        data, own = path.read_bytes(), Path(self._turn.planned.file).stem
+        for old in sorted(self._kept.glob("*")):
             if old.stem != own and not _is_sync(old) and old.is_file() and old.read_bytes() == data:
                 raise InstrumentFileError(f"{path} is the record of an earlier trial, {old.name}")
 

@@ -4,6 +4,7 @@ import os
 import sys
 import time
 import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -44,9 +45,24 @@ def waited(answer):
     return said
 
 
-def test_lines_answer_one_question_each(typed):
-    desk, shown = Desk(lambda text: shown.append(text)), []
+def mounting(say=lambda text: None, watch=None):
+    """A desk that has asked its first question."""
+    desk = Desk(say, watch)
     desk.ask("mount", "Mount it.")
+    return desk
+
+
+def of_a_pull(say=lambda text: None):
+    """Instruments that have asked to mount a pull."""
+    instruments = OwnInstruments(Desk(say))
+    instruments.begin(Turn(PULL, 1, 1), Path("none"))
+    instruments.mount("anchor_pull", rate_mm_s=40.0)
+    return instruments
+
+
+def test_lines_answer_one_question_each(typed):
+    shown = []
+    desk = mounting(shown.append)
     assert desk.answer() is None
     typed(b" r \n\n")
     assert waited(desk.answer) == "r"
@@ -57,10 +73,8 @@ def test_lines_answer_one_question_each(typed):
 
 def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp_path):
     typed(b"")
-    desk = Desk(lambda text: None)
-    desk.ask("mount", "Mount it.")
     with pytest.raises(NobodyError, match="no one can answer"):
-        waited(desk.answer)
+        waited(mounting().answer)
     watching = Desk(lambda text: None, tmp_path)
     watching.ask("mount", "Mount it.", {"trial": 3})
     time.sleep(0.1)
@@ -72,8 +86,7 @@ def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp
 
 
 def test_an_answer_to_an_earlier_question_does_not_count(typed, tmp_path):
-    desk = Desk(lambda text: None, tmp_path)
-    desk.ask("mount", "Mount it.")
+    desk = mounting(watch=tmp_path)
     (tmp_path / "answer").write_text("")
     desk.ask("start", "Start it.")
     assert desk.answer() is None
@@ -83,9 +96,7 @@ def test_without_a_watched_folder_the_path_of_the_record_is_typed(typed, tmp_pat
     (tmp_path / "my pull.csv").write_text("time_s,displacement_mm,force_N\n0,0,0\n1,2,3\n")
     (tmp_path / "my pull.sync.csv").write_text("sync_time_s\n0.1\n0.2\n")
     said = []
-    instruments = OwnInstruments(Desk(said.append))
-    instruments.begin(Turn(PULL, 1, 1))
-    instruments.mount("anchor_pull", rate_mm_s=40.0)
+    instruments = of_a_pull(said.append)
     typed(b"\n")
     assert waited(lambda: instruments.ready or None)
     instruments.save()
@@ -104,9 +115,7 @@ def test_without_a_watched_folder_the_path_of_the_record_is_typed(typed, tmp_pat
 
 
 def test_stopping_is_an_answer_to_every_question(typed):
-    instruments = OwnInstruments(Desk(lambda text: None))
-    instruments.begin(Turn(PULL, 1, 1))
-    instruments.mount("anchor_pull", rate_mm_s=40.0)
+    instruments = of_a_pull()
     typed(b"q\n")
     with pytest.raises(KeyboardInterrupt):
         waited(lambda: SimpleNamespace() if instruments.ready else None)
@@ -114,8 +123,7 @@ def test_stopping_is_an_answer_to_every_question(typed):
 
 @pytest.mark.parametrize("word", ["q", "Quit", "stop", "!"])
 def test_a_stop_that_was_typed_while_the_next_question_was_prepared_stops(terminal, word):
-    desk = Desk(lambda text: None)
-    desk.ask("mount", "Mount it.")
+    desk = mounting()
     terminal(f"\n{word}\nr\n".encode())
     assert waited(desk.answer) == ""
     desk.ask("start", "Start it.")
@@ -124,8 +132,7 @@ def test_a_stop_that_was_typed_while_the_next_question_was_prepared_stops(termin
 
 
 def test_what_else_was_typed_ahead_starts_nothing(terminal):
-    desk = Desk(lambda text: None)
-    desk.ask("mount", "Mount it.")
+    desk = mounting()
     terminal(b"\n\nr\n")
     assert waited(desk.answer) == ""
     desk.ask("start", "Start it.")
@@ -150,8 +157,7 @@ def test_a_stop_while_nothing_is_asked_counts_at_once(terminal, tmp_path):
 
 
 def test_attending_does_not_take_the_answer_to_what_is_asked(terminal):
-    desk = Desk(lambda text: None)
-    desk.ask("mount", "Mount it.")
+    desk = mounting()
     terminal(b"\n")
     desk.attend()
     assert desk.answer() == ""
@@ -160,9 +166,7 @@ def test_attending_does_not_take_the_answer_to_what_is_asked(terminal):
 @pytest.mark.parametrize("word", ["clear", "no", "wait", "n", "yes"])
 def test_a_word_that_is_no_answer_starts_nothing_and_is_asked_again(typed, word):
     said = []
-    instruments = OwnInstruments(Desk(said.append))
-    instruments.begin(Turn(PULL, 1, 1))
-    instruments.mount("anchor_pull", rate_mm_s=40.0)
+    instruments = of_a_pull(said.append)
     typed(f"{word}\n".encode())
     assert waited(lambda: instruments.ready or (len(said) > 1 or None))
     assert not instruments.ready
