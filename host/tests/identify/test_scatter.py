@@ -1,5 +1,6 @@
 """What repeats share, and no noise."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,8 +53,6 @@ def test_few_gaits_tell_less_of_the_next_than_many():
 
 
 def test_a_model_file_keeps_the_scatter(tmp_path):
-    from dataclasses import replace
-
     model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004, 0.0005))
     save_model(tmp_path / "m.toml", model)
     assert load_model(tmp_path / "m.toml").scatter == model.scatter

@@ -51,11 +51,7 @@ def test_an_edge_never_pairs_one_off(start, offset_s, drift, jitter_s, seed, los
 
 
 @settings(deadline=None)
-@given(
-    lost=st.sets(st.integers(0, 3000), max_size=40),
-    start=st.integers(0, 62),
-    drift=st.floats(-5e-3, 5e-3),
-)
+@given(lost=st.sets(st.integers(0, 3000), max_size=40), start=st.integers(0, 62), drift=st.floats(-5e-3, 5e-3))
 def test_whatever_edges_are_lost_they_pair_rightly_or_a_repeat_is_asked_for(lost, start, drift):
     edges_s, numbers = edges_from(PERIOD_S * (FIRST + start), drift=drift)
     keep = np.delete(np.arange(len(edges_s)), sorted(i for i in lost if i < len(edges_s)))

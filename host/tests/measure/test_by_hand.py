@@ -49,8 +49,7 @@ class Bench:
         """As `Countdown`."""
 
     def run(self, folder, plan):
-        made = {"by": "a test"}
-        return run_session(self.rig, folder, plan, name="a day", known={}, provenance=made, record=self.hands)
+        return run_session(self.rig, folder, plan, name="a day", known={}, provenance={}, record=self.hands)
 
 
 @pytest.fixture
@@ -69,7 +68,7 @@ def bench(tmp_path):
 def test_files_give_the_same_trials_as_instruments_that_are_driven(bench, tmp_path):
     by_hand = bench().run(tmp_path / "day", PLAN)
     with open_rig("virtual", seed=3) as rig:
-        driven = run_session(rig, tmp_path / "driven", PLAN, name="a day", known={}, provenance={"by": "a test"})
+        driven = run_session(rig, tmp_path / "driven", PLAN, name="a day", known={}, provenance={})
     for ours, theirs in zip(by_hand.trials, driven.trials, strict=True):
         assert ours.condition == theirs.condition
         assert set(ours.columns) == set(theirs.columns)
@@ -122,14 +121,20 @@ def test_whatever_takes_its_time_is_counted_down_with_what_the_robot_does(bench,
         assert left_s[-1] < 0.5
 
 
-def test_what_looks_wrong_is_said_and_the_trial_repeated_on_request(bench, tmp_path):
+def at_first(spoil):
+    """What spoils the first record only, and the files that were saved."""
     saved = []
 
-    def stuck_at_first(asked, record):
+    def once(asked, record):
         saved.append(asked["file"])
-        return record | ({"force_N": np.full_like(record["force_N"], 7.0)} if len(saved) == 1 else {})
+        return record | (spoil(record) if len(saved) == 1 else {})
 
-    here = bench(spoil=stuck_at_first)
+    return once, saved
+
+
+def test_what_looks_wrong_is_said_and_the_trial_repeated_on_request(bench, tmp_path):
+    stuck, saved = at_first(lambda record: {"force_N": np.full_like(record["force_N"], 7.0)})
+    here = bench(spoil=stuck)
     here.lab.review = lambda asked: "r" if asked["findings"] else ""
     dataset = here.run(tmp_path / "day", (PULL,))
     assert len(saved) == 2
@@ -170,13 +175,8 @@ def test_a_file_that_cannot_be_read_is_named_and_waited_for_again(bench, tmp_pat
 
 
 def test_clocks_that_cannot_be_lined_up_lead_to_another_try_and_nothing_is_kept_of_the_first(bench, tmp_path):
-    saved = []
-
-    def deaf_at_first(asked, record):
-        saved.append(asked["file"])
-        return record | ({"sync_time_s": record["sync_time_s"][40:]} if len(saved) == 1 else {})
-
-    here = bench(spoil=deaf_at_first)
+    deaf, saved = at_first(lambda record: {"sync_time_s": record["sync_time_s"][40:]})
+    here = bench(spoil=deaf)
     dataset = here.run(tmp_path / "day", (PULL,))
     assert len(saved) == 2
     assert "do not show the pause" in "\n".join(here.said)

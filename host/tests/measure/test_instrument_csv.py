@@ -114,22 +114,31 @@ def test_what_is_refused_when_it_is_added_changes_nothing(files):
     assert (folder / "anchor_8.5psi_20mm_s_2.csv").read_text() == "mine"
 
 
+STEP = PlannedTrial("step_response", "large", 8.5)
+
+
+def filmed(files, camera_s, moves_s):
+    """In place of the pull a step that is commanded at 2.5 s and seen by a camera."""
+    write(files / "cam.csv", {"time_s": own(camera_s), "displacement_mm": 50.0 * (camera_s > moves_s)})
+    (files / "pull.sync.csv").rename(files / "cam.sync.csv")
+    header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
+    text = "\n".join([f"{header},command_body", *(f"{row},{float(row[:4]) >= 2.5:d}" for row in rows)])
+    (files / "telemetry_1.csv").write_text(text)
+    return files / "cam.csv"
+
+
 @pytest.mark.parametrize("files", ["marked"], indirect=True)
 def test_a_step_takes_its_commands_from_the_telemetry(files):
-    uno = np.arange(100, 790) * 0.01
-    camera = np.arange(-2.0, 7.9, 0.01)
-    write(files / "cam.csv", {"time_s": own(camera), "displacement_mm": 50.0 * (camera > 3.0)})
-    (files / "pull.sync.csv").rename(files / "cam.sync.csv")
-    telemetry = {"time_s": uno, "sequence": np.arange(100, 790), "command_body": (uno >= 2.5) * 1.0}
-    telemetry |= {f"pressure_{c}_psi": uno for c in ("body", "head", "tail")}
-    telemetry["strobe"] = has_strobe(telemetry["sequence"])
-    write(files / "telemetry_1.csv", telemetry)
-    planned = PlannedTrial("step_response", "large", 8.5)
-    dataset, _ = import_trial(files / "cam.csv", files / "telemetry_1.csv", planned, files / "out")
+    camera = filmed(files, np.arange(-2.0, 7.9, 0.01), 3.0)
+    dataset, _ = import_trial(camera, files / "telemetry_1.csv", STEP, files / "out")
     columns = dataset.trials[0].columns
     switched = columns["time_s"][np.flatnonzero(columns["command"])[0]]
     moved = columns["time_s"][np.flatnonzero(columns["displacement_mm"] > 25.0)[0]]
     assert moved - switched == pytest.approx(0.5, abs=0.011)
+
+
+def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
+    return f"{header}\n" + "".join(f"{t},1,2{end}\n" for t in times)
 
 
 @pytest.mark.parametrize(
@@ -146,9 +155,16 @@ def test_a_step_takes_its_commands_from_the_telemetry(files):
             "(no|not show the) pause",
         ),
         ("telemetry_1.csv", "time_s,sequence\n1,2\n2,3\n", "pressure_body_psi"),
+        ("pull.csv", table((1, 2, 2, 3)), "line 4, column time_s: not later"),
+        ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", "line 4, column sync_time_s: not later"),
+        ("pull.csv", table().replace(",", ";"), "separated by semicolons"),
+        ("pull.csv", table().replace(",", "\t"), "separated by tabs"),
+        ("pull.csv", table(end=",5"), "line 2: 4 fields, but 3 columns.*decimal points"),
+        ("pull.csv", table(header="time_s,displacement_mm,force_N,force_N", end=",5"), "force_N more than once"),
+        ("pull.csv", table(end="x" * 140_000), "cannot be read as a CSV"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_named(files, file, text, message):
+def test_a_file_that_cannot_be_used_is_named_with_what_to_do(files, file, text, message):
     (files / file).write_text(text)
     with pytest.raises(DatasetError, match=message):
         import_trial(files / "pull.csv", files, PULL, files / "out")
@@ -198,11 +214,19 @@ def test_edges_that_do_not_fit_the_uno_are_refused(files):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
-def test_a_lost_marker_is_named_by_file_line_and_column_and_leaves_nothing_behind(files):
+@pytest.mark.parametrize(
+    ("cell", "told"),
+    [
+        ("", "no value"),
+        ("-999", "-999 is a code for a missing value"),
+        ("9999.0", "9999 is a code for a missing value"),
+    ],
+)
+def test_a_lost_marker_is_named_by_file_line_and_column_and_leaves_nothing_behind(files, cell, told):
     lines = (files / "pull.csv").read_text().splitlines()
     time_s, _, force = lines[40].split(",")
-    (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},,{force}", *lines[41:]]))
-    with pytest.raises(DatasetError, match=r"pull\.csv, line 41, column displacement_mm: no value"):
+    (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{cell},{force}", *lines[41:]]))
+    with pytest.raises(DatasetError, match=rf"pull\.csv, line 41, column displacement_mm: {told}"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
     (files / "pull.csv").write_text("\n".join(lines))
     import_trial(files / "pull.csv", files, PULL, files / "out")
@@ -214,28 +238,6 @@ def test_what_a_spreadsheet_adds_does_not_matter(files):
     (files / "pull.csv").write_text("\ufeff" + "\n".join(table) + "\n")
     dataset, _ = import_trial(files / "pull.csv", files, PULL, files / "out")
     assert len(dataset.trials) == 1
-
-
-def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
-    return f"{header}\n" + "".join(f"{t},1,2{end}\n" for t in times)
-
-
-@pytest.mark.parametrize(
-    ("file", "text", "message"),
-    [
-        ("pull.csv", table((1, 2, 2, 3)), "line 4, column time_s: not later"),
-        ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", "line 4, column sync_time_s: not later"),
-        ("pull.csv", table().replace(",", ";"), "separated by semicolons"),
-        ("pull.csv", table().replace(",", "\t"), "separated by tabs"),
-        ("pull.csv", table(end=",5"), "line 2: 4 fields, but 3 columns.*decimal points"),
-        ("pull.csv", table(header="time_s,displacement_mm,force_N,force_N", end=",5"), "force_N more than once"),
-        ("pull.csv", table(end="x" * 140_000), "cannot be read as a CSV"),
-    ],
-)
-def test_a_file_in_another_shape_is_refused_with_what_to_do(files, file, text, message):
-    (files / file).write_text(text)
-    with pytest.raises(DatasetError, match=message):
-        import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
 def test_a_tail_with_gaps_is_refused_and_one_never_tracked_is_absent(tmp_path):
@@ -250,7 +252,7 @@ def test_a_tail_with_gaps_is_refused_and_one_never_tracked_is_absent(tmp_path):
 
 def test_telemetry_without_commands_or_with_a_gap_is_refused(files):
     with pytest.raises(DatasetError, match="lacks the column command_body"):
-        import_trial(files / "pull.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
+        import_trial(files / "pull.csv", files, STEP, files / "out")
     path = files / "telemetry_1.csv"
     path.write_text(path.read_text().replace(",200.000000,", ",,"))
     with pytest.raises(DatasetError, match="column sequence: no value"):
@@ -275,26 +277,10 @@ def test_a_hole_in_the_telemetry_is_not_filled(files):
 
 @pytest.mark.parametrize("files", ["marked"], indirect=True)
 def test_rows_of_a_camera_that_are_missing_are_named_with_file_and_column(files):
-    camera = np.arange(-2.0, 7.9, 0.01)
-    camera = camera[(camera < 3.2) | (camera > 3.7)]
-    write(files / "cam.csv", {"time_s": own(camera), "displacement_mm": 50.0 * (camera > 3.45)})
-    (files / "pull.sync.csv").rename(files / "cam.sync.csv")
-    header, *rows = (files / "telemetry_1.csv").read_text().splitlines()
-    text = "\n".join([f"{header},command_body", *(f"{row},{float(row[:4]) >= 2.5:d}" for row in rows)])
-    (files / "telemetry_1.csv").write_text(text)
+    camera_s = np.arange(-2.0, 7.9, 0.01)
+    camera = filmed(files, camera_s[(camera_s < 3.2) | (camera_s > 3.7)], 3.45)
     with pytest.raises(DatasetError, match=r"cam\.csv, column displacement_mm: .*hole.*0\.51 s.*not filled in"):
-        import_trial(files / "cam.csv", files, PlannedTrial("step_response", "large", 8.5), files / "out")
-
-
-@pytest.mark.parametrize("code", ["-999", "9999.0"])
-def test_a_code_for_no_value_is_no_value(files, code):
-    lines = (files / "pull.csv").read_text().splitlines()
-    time_s, _, force = lines[40].split(",")
-    (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{code},{force}", *lines[41:]]))
-    with pytest.raises(
-        DatasetError, match=r"pull\.csv, line 41, column displacement_mm: -?9+ is a code for a missing value"
-    ):
-        import_trial(files / "pull.csv", files, PULL, files / "out")
+        import_trial(camera, files, STEP, files / "out")
 
 
 # -- declared exports ---------------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ VALVE_PINS, STROBE_PIN = range(4, 10), 10
 
 
 def run(rig, folder, trials=PLAN, **more):
-    return run_session(rig, folder, trials, name="a day", known={}, provenance={"by": "a test"}, **more)
+    return run_session(rig, folder, trials, **{"name": "a day", "known": {}, "provenance": {"by": "a test"}} | more)
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +156,11 @@ def test_a_session_holds_45_trials_and_spreads_the_repeats():
     assert [trial.repeat for trial in trials] == sorted(trial.repeat for trial in trials)
 
 
+def test_the_pipes_slope_is_a_setting_of_walks_only():
+    trials = session(settings={"inclination_deg": 10.0})
+    assert {trial.experiment for trial in trials if trial.settings} == {"locomotion"}
+
+
 def test_a_quick_session_measures_what_a_verdict_needs():
     """Each condition twice, for the noise, and of each experiment one that is never fitted, for the verdict."""
     trials = session(quick=True)
@@ -218,10 +223,9 @@ def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_sa
 def test_a_session_is_resumed_with_the_same_settings_only(tmp_path, change):
     options = {"seed": 3, "profile": "ideal", "cycles": 1}
 
-    def begin(rig, options, on_event=lambda event: None):
-        made = provenance("bifa experiment", "virtual", options)
-        plan = PLAN[1:3]
-        return run_session(rig, tmp_path / "day", plan, name="a day", known={}, provenance=made, on_event=on_event)
+    def begin(rig, options, port="virtual", **more):
+        made = provenance("bifa experiment", port, options)
+        return run(rig, tmp_path / "day", PLAN[1:3], provenance=made, **more)
 
     def interrupt(event):
         if event.number == 2:
@@ -229,16 +233,15 @@ def test_a_session_is_resumed_with_the_same_settings_only(tmp_path, change):
 
     with open_rig("virtual", profile="ideal", seed=3) as rig:
         with pytest.raises(KeyboardInterrupt):
-            begin(rig, options, interrupt)
+            begin(rig, options, on_event=interrupt)
         if not change:
             assert len(begin(rig, options).trials) == 2
             return
         [(name, value)] = change.items()
         with pytest.raises(DatasetError, match=f"1 trial made with {name} = {options[name]}, not {value}"):
             begin(rig, options | change)
-        made = provenance("bifa experiment", "/dev/ttyACM0", options)
         with pytest.raises(DatasetError, match="virtual = True, not False"):
-            run_session(rig, tmp_path / "day", PLAN[1:3], name="a day", known={}, provenance=made)
+            begin(rig, options, "/dev/ttyACM0")
 
 
 @pytest.mark.uno

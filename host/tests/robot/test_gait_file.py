@@ -41,11 +41,7 @@ def test_other_parameters_of_the_uno_may_stand_beside_the_gait(tmp_path):
     [
         ("period_s = 5.7", "period_s = 0.1", r"period_s = 0.1 is outside its range 0.5 to 60 s"),
         ("duty_head = 0.5", "duty_head = nan", "duty_head"),
-        (
-            "duty_head = 0.5",
-            "duty_heat = 0.5",
-            "unknown key duty_heat; .* hold period_s, .*coupling_per_s",
-        ),
+        ("duty_head = 0.5", "duty_heat = 0.5", "unknown key duty_heat; .* hold period_s, .*coupling_per_s"),
         ("duty_head = 0.5", "duty_head = true", "duty_head"),
         ("duty_head = 0.5", f"duty_head = 1{400 * '0'}", "duty_head"),
         ("duty_head = 0.5\n", "", "duty_head is missing"),
