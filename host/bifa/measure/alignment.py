@@ -55,8 +55,17 @@ def align(sync_s: np.ndarray, uno_s: np.ndarray, sequence: np.ndarray, marked: i
     """
     gaps = _gaps(sync_s)
     pauses = np.flatnonzero(np.abs(gaps - (MARK_PAUSE + 1)) < _OFF_GRID)
-    if len(pauses) != 1:
-        raise AlignmentError(_no_pause(gaps, len(pauses)))
+    if len(pauses) > 1:
+        raise AlignmentError(
+            f"the sync edges show {len(pauses)} pauses of {MARK_PAUSE} strobes, so it is not clear which one is this "
+            "recording's: restart the instrument for every recording, and repeat"
+        )
+    if not len(pauses):
+        raise AlignmentError(
+            f"the sync edges do not show the pause of {MARK_PAUSE} strobes that tells which edge is which sample (the "
+            f"longest gap is {gaps.max():.1f} periods): the instrument has to record from before the Uno's mark, and "
+            "must not lose an edge beside it; repeat"
+        )
     return _line_up(sync_s[pauses[0] + 1 :], marked, uno_s, sequence)
 
 
@@ -127,19 +136,6 @@ def _gaps(sync_s: np.ndarray) -> np.ndarray:
             "input, and was it recording?"
         )
     return np.diff(sync_s) / np.median(np.diff(sync_s))
-
-
-def _no_pause(gaps: np.ndarray, pauses: int) -> str:
-    if pauses > 1:
-        return (
-            f"the sync edges show {pauses} pauses of {MARK_PAUSE} strobes, so it is not clear which one is this "
-            "recording's: restart the instrument for every recording, and repeat"
-        )
-    return (
-        f"the sync edges do not show the pause of {MARK_PAUSE} strobes that tells which edge is which sample (the "
-        f"longest gap is {gaps.max():.1f} periods): the instrument has to record from before the Uno's mark, and must "
-        "not lose an edge beside it; repeat"
-    )
 
 
 def _numbers(sync_s: np.ndarray) -> np.ndarray:

@@ -71,25 +71,29 @@ def test_edges_after_samples_stopped_and_clocks_of_a_millisecond_are_taken():
     assert clock.rms_s < 4e-4
 
 
-@pytest.mark.parametrize("beside", [-1, 0])
-def test_an_edge_that_is_lost_beside_the_pause_asks_for_a_repeat(beside):
-    edges_s, numbers = edges_from(0.0)
-    after = int(np.flatnonzero(numbers == MARKED)[0])
-    with pytest.raises(AlignmentError, match=r"longest gap is 12\.0 periods.*repeat"):
-        align(np.delete(edges_s, after + beside), STROBES_S, NUMBERS, MARKED)
+SEEN_S, SEEN = edges_from(0.0)
+AFTER = int(np.flatnonzero(SEEN == MARKED)[0])  # the first edge after the pause
+REFUSED = {
+    "the edge before the pause is lost": (np.delete(SEEN_S, AFTER - 1), r"longest gap is 12\.0 periods.*repeat"),
+    "the edge after the pause is lost": (np.delete(SEEN_S, AFTER), r"longest gap is 12\.0 periods.*repeat"),
+    "started too late for the mark": (edges_from(PERIOD_S * (MARKED - 5))[0], r"longest gap is 1\.0 periods.*repeat"),
+    "two pauses": (np.delete(SEEN_S, slice(500, 500 + MARK_PAUSE)), r"2 pauses.*repeat"),
+    "no edges": (np.arange(3) * 0.01, "is D10 wired"),
+    "in milliseconds": (1e3 * SEEN_S, "are the instrument's times in seconds"),
+    "scattered": (np.sort(edges_from(0.0, jitter_s=2.5e-3)[0]), r"check the sync wiring|repeat"),
+}
 
 
-def test_an_instrument_that_starts_too_late_for_the_mark_asks_for_a_repeat():
-    edges_s, _ = edges_from(PERIOD_S * (MARKED - 5))
-    with pytest.raises(AlignmentError, match=r"longest gap is 1\.0 periods.*repeat"):
+@pytest.mark.parametrize("case", REFUSED)
+def test_edges_that_cannot_be_lined_up_are_refused_with_what_to_do(case):
+    edges_s, told = REFUSED[case]
+    with pytest.raises(AlignmentError, match=told):
         align(edges_s, STROBES_S, NUMBERS, MARKED)
 
 
-def test_two_pauses_ask_for_a_repeat():
-    edges_s, _ = edges_from(0.0)
-    once_more = np.delete(edges_s, slice(500, 500 + MARK_PAUSE))
-    with pytest.raises(AlignmentError, match=r"2 pauses.*repeat"):
-        align(once_more, STROBES_S, NUMBERS, MARKED)
+def test_edges_of_other_samples_are_refused():
+    with pytest.raises(AlignmentError, match="did not record at the same time"):
+        align(SEEN_S, STROBES_S, NUMBERS + 10_000, MARKED)
 
 
 def test_a_restart_is_a_mark_too_and_lost_edges_are_none():
@@ -102,22 +106,6 @@ def test_a_restart_is_a_mark_too_and_lost_edges_are_none():
     assert clock.offset_s == pytest.approx(3.0, abs=1e-8)
     with pytest.raises(AlignmentError, match="no pause"):
         align_after_restart(edges_s[len(before_s) :], PERIOD_S * numbers, numbers)
-
-
-def test_nothing_to_line_up_is_said():
-    with pytest.raises(AlignmentError, match="is D10 wired"):
-        align(np.arange(3) * 0.01, STROBES_S, NUMBERS, MARKED)
-    edges_s, _ = edges_from(0.0)
-    with pytest.raises(AlignmentError, match="did not record at the same time"):
-        align(edges_s, STROBES_S, NUMBERS + 10_000, MARKED)
-    with pytest.raises(AlignmentError, match="are the instrument's times in seconds"):
-        align(1e3 * edges_s, STROBES_S, NUMBERS, MARKED)
-
-
-def test_edges_that_scatter_are_refused():
-    edges_s, _ = edges_from(0.0, jitter_s=2.5e-3)
-    with pytest.raises(AlignmentError, match=r"check the sync wiring|repeat"):
-        align(np.sort(edges_s), STROBES_S, NUMBERS, MARKED)
 
 
 @pytest.mark.parametrize(("first_s", "last_s", "said"), [(-1.0, 0.8, "ends 0.2"), (0.3, 2.0, "begins 0.3")])
