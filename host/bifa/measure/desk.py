@@ -55,7 +55,9 @@ class Desk:
         `about`: what else a script needs to know, plain values.
         """
         self._close_countdown()
-        self._listen()
+        if not self._is_listening:
+            self._is_listening = True
+            threading.Thread(target=read_lines, args=(self._lines,), daemon=True).start()
         self._forget()
         self.is_asking = True
         if self._watch is not None:
@@ -128,11 +130,6 @@ class Desk:
                     break
                 early.append(line)
         self._is_stopped = self._is_stopped or any(_is_stop(line) for line in early if line)
-
-    def _listen(self) -> None:
-        if not self._is_listening:
-            self._is_listening = True
-            threading.Thread(target=read_lines, args=(self._lines,), daemon=True).start()
 
 
 def _is_stop(line: str) -> bool:

@@ -83,7 +83,8 @@ def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
 def _moved(
     bench: Bench, uno: Uno, on_progress: Progress, chamber: str, pressure_psi: float, expected_s: float
 ) -> Recorded:
-    """The cross-head's motion, which takes about `expected_s`, on a chamber that is held as `_pressurise` had it."""
+    """The cross-head's motion, which takes about `expected_s`, on a chamber that is held as `_pressurise` had it;
+    DisturbedError unless it alone was, all the time."""
     instruments = bench.instruments
     with Recording(bench, uno, on_progress) as tape:
         tape.wait(LEAD_S)
@@ -247,11 +248,11 @@ def _walk_columns(tape: Recording, period_s: float, cycles: int) -> dict[str, np
     since_s = tape.uno_s[running] - begun_s
     if since_s[-1] < cycles * period_s - SAMPLE_S:
         raise DisturbedError(f"the robot walked {since_s[-1]:.2f} s instead of {cycles * period_s:g}: repeat")
-    kept = since_s <= cycles * period_s + SAMPLE_S
-    time_s, kept = since_s[kept] + PRESSURES_AFTER_S, running[kept]
+    within = since_s <= cycles * period_s + SAMPLE_S
+    time_s, rows = since_s[within] + PRESSURES_AFTER_S, running[within]
     columns = {"time_s": time_s}
-    columns |= {f"command_{chamber}": tape.commands[kept, i] for i, chamber in enumerate(CHAMBERS)}
+    columns |= {f"command_{chamber}": tape.commands[rows, i] for i, chamber in enumerate(CHAMBERS)}
     for name in ("displacement_head_mm", "displacement_tail_mm"):
         if name in tape.record:
             columns[name] = resampled(time_s, tape.instrument_s - begun_s, tape.record[name])
-    return columns | {f"pressure_{chamber}_psi": tape.pressures_psi[kept, i] for i, chamber in enumerate(CHAMBERS)}
+    return columns | {f"pressure_{chamber}_psi": tape.pressures_psi[rows, i] for i, chamber in enumerate(CHAMBERS)}
