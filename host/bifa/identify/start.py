@@ -66,18 +66,15 @@ def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:
 
 def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model: Model) -> FittedCurve:
     """The static curve, pinned by where the actuator rested in step responses."""
-    prefix = _ACTUATORS[fit.actuator]
+    prefix, stiffness = _ACTUATORS[fit.actuator], fit.stiffness
     name = f"{prefix}_area_N_psi"
-    area = values.get(name, model.parameters[name].value)
+    area = values.get(name, model[name])
     seen = _rests(dataset, fit.actuator)
-    moves = bool(seen or dataset.of("locomotion"))
-    if not seen:
-        return FittedCurve(prefix, fit.stiffness, moves)
-    sd = np.full(len(seen), area * _PRESSURE_SD_PSI)
-    pinned = fit.stiffness.with_equilibria(
-        [rest.displacement_m for rest in seen], [area * rest.pressure_psi for rest in seen], sd
-    )
-    return FittedCurve(prefix, pinned, moves)
+    if seen:
+        held_N = [area * rest.pressure_psi for rest in seen]
+        sd = np.full(len(seen), area * _PRESSURE_SD_PSI)
+        stiffness = stiffness.with_equilibria([rest.displacement_m for rest in seen], held_N, sd)
+    return FittedCurve(prefix, stiffness, bool(seen or dataset.of("locomotion")))
 
 
 def _known(dataset: Dataset, model: Model) -> dict[str, float]:

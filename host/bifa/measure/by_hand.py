@@ -16,7 +16,7 @@ from bifa.data.layout import RAW
 from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, Uno
 from bifa.measure.desk import Desk
-from bifa.measure.experiments import record_trial
+from bifa.measure.experiments import Progress, record_trial
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import Bench, idle
@@ -49,7 +49,7 @@ class ByHand:
         rig: Rig,
         uno: Uno,
         planned: PlannedTrial,
-        on_progress: Callable[[float], None],
+        on_progress: Progress,
         *,
         number: int,
         total: int,
@@ -67,14 +67,11 @@ class ByHand:
         finally:
             self._desk.clear()
 
-    def _until_kept(
-        self, bench: Bench, uno: Uno, turn: Turn, on_progress: Callable[[float], None], writer: DatasetWriter
-    ) -> Trial:
-        planned, number, total = turn.planned, turn.number, turn.total
+    def _until_kept(self, bench: Bench, uno: Uno, turn: Turn, on_progress: Progress, writer: DatasetWriter) -> Trial:
         while True:
-            self._desk.say(f"\nTrial {number} of {total}: {planned.title}")
+            self._desk.say(f"\nTrial {turn.number} of {turn.total}: {turn.planned.title}")
             try:
-                trial = record_trial(bench, uno, planned, on_progress, attempts=1)
+                trial = record_trial(bench, uno, turn.planned, on_progress, attempts=1)
             except (LinkError, PortGoneError):
                 raise
             except BifaError as error:
