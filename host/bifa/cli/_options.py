@@ -15,45 +15,45 @@ Method = Literal["cma", "de", "bo"]  # bifa.gait.methods.METHODS, which would be
 Obstacle = Literal["tunnel", "subtunnels", "arcs"]  # bifa.simulate.obstacles
 
 
-def ports(incomplete: str = "") -> list[str]:
-    """Rigs by name and serial ports, for completion."""
+# What is completed; typer itself keeps of it what begins as the word does.
+
+
+def ports() -> list[str]:
+    """Rigs by name and serial ports."""
     from importlib.metadata import entry_points
 
     from bifa.rig.ports import serial_ports
 
-    names = [*entry_points(group="bifa.rigs").names, *(port.device for port in serial_ports())]
-    return [name for name in names if name.startswith(incomplete)]
+    return [*entry_points(group="bifa.rigs").names, *(port.device for port in serial_ports())]
 
 
-def effects(incomplete: str = "") -> list[str]:
-    """Effects of the library, one a file, for completion."""
+def effects() -> list[str]:
+    """Effects of the library, one a file."""
     import bifa.effects
 
-    names = sorted(module.name for module in pkgutil.iter_modules(bifa.effects.__path__) if module.name != "effect")
-    return [name for name in names if name.startswith(incomplete)]
+    return sorted(module.name for module in pkgutil.iter_modules(bifa.effects.__path__) if module.name != "effect")
 
 
-def known_names(incomplete: str = "") -> list[str]:
-    """Parameters that can be declared, as NAME=, for completion."""
+def known_names() -> list[str]:
+    """Parameters that can be declared, as NAME=."""
     from bifa.robot.parameters import BASE_PARAMETERS
 
-    return [f"{name}=" for name in BASE_PARAMETERS if name.startswith(incomplete)]
+    return [f"{name}=" for name in BASE_PARAMETERS]
 
 
-def gait_names(incomplete: str = "") -> list[str]:
-    """Gaits of the library, for completion."""
+def gait_names() -> list[str]:
+    """Gaits of the library."""
     from bifa.gait.library import NAMES
 
-    return [name for name in NAMES if name.startswith(incomplete)]
+    return list(NAMES)
 
 
-def stages(incomplete: str = "") -> list[str]:
-    """Stages of a campaign, for completion."""
+def stages() -> list[str]:
+    """Stages of a campaign."""
     from bifa.campaign.loop import campaign
     from bifa.campaign.setup import Effort, Setup
 
-    names = [stage.name for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)]
-    return [name for name in names if name.startswith(incomplete)]
+    return [stage.name for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)]
 
 
 def port_option(text: str = "Serial port, `virtual`, or the name of a rig; detected if left out.") -> Any:
@@ -76,6 +76,7 @@ KNOWN = typer.Option(
 RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
 WATCH = typer.Option(help="Folder in which your instruments save, subfolders included (serial port).")
 BENCH = typer.Option(help="File that declares how your instruments write theirs (bifa instrument).")
+QUICK = typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
 PROFILE = typer.Option(help="Profile of a virtual robot; ideal: the paper's equations and white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")

@@ -1,17 +1,15 @@
 """`bifa campaign`: measure, fit, find what is missing, optimise, walk, compare."""
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import KNOWN, PROFILE, RERUN, WATCH, Profile, port_option, stoppable
+from bifa.cli._options import KNOWN, PROFILE, QUICK, RERUN, WATCH, Profile, port_option, stoppable
 from bifa.computer import EXAMPLE_PORT
 from bifa.printable import counted
 
 if TYPE_CHECKING:
-    from bifa.campaign.setup import Setup
     from bifa.measure.by_hand import ByHand
     from bifa.measure.desk import Desk
     from bifa.screen import Console
@@ -32,9 +30,7 @@ def campaign(
     seed: Annotated[
         int, typer.Option(min=0, help="Random seed of a virtual robot, its undisclosed effect and all noise.")
     ] = 0,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
-    ] = False,
+    quick: Annotated[bool, QUICK] = False,
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path,
@@ -55,55 +51,50 @@ def campaign(
     the bench file or with --known; everything else is fitted, or kept at its nominal value where no experiment
     determines it. A virtual robot declares its masses and its supply pressure.
     """
-    _check(out, port)
+    from bifa.campaign.stages import check_folder
+    from bifa.files import check_targets
+    from bifa.rig import check_port
 
-    from bifa.measure.bench_file import parse_known
+    check_targets(folders=(out,))
+    check_folder(out)
+    check_port(port)
 
-    run_campaign(out, port, seed, quick, rerun, parse_known(known), profile, watch, bench)
+    from dataclasses import replace
 
-
-def run_campaign(
-    out: Path,
-    port: str,
-    seed: int,
-    quick: bool,
-    rerun: Sequence[str],
-    known: Mapping[str, float] | None = None,
-    profile: str = "realistic",
-    watch: Path | None = None,
-    bench_file: Path | None = None,
-) -> None:
-    """Bring all stages up to date with progress on the terminal, then print the results."""
-    _check(out, port)
-
-    import json
-
-    from rich.text import Text
-
-    from bifa.campaign.setup import Setup
+    from bifa.campaign.setup import Effort, Setup
+    from bifa.measure.bench_file import known_on, parse_known
     from bifa.screen import Console
 
     console = Console()
-    setup = Setup(port, seed, {"sealed": seed, "profile": profile} if port == "virtual" else {}, known or {})
+    options = {"sealed": seed, "profile": profile} if port == "virtual" else {}
+    setup = Setup(port, seed, options, parse_known(known))
     with stoppable(lambda: f"{kept_on_disk(out)}. The same command resumes there"):
         if setup.is_by_hand:
-            setup = _attended(console, setup, watch, bench_file)
+            desk, hands = at_desk(console, watch, bench)
+            setup = replace(setup, known={**known_on(bench, desk), **setup.known}, hands=hands)
 
         with console.status("starting"):  # slow to import: the person is asked first
-            from bifa.campaign.loop import campaign
-            from bifa.campaign.page import prediction_table, speed_table
+            from bifa.campaign import loop
             from bifa.campaign.progress import stage_progress
-            from bifa.campaign.setup import Effort
             from bifa.campaign.stages import run_stages
-            from bifa.report.diagnosis import noise_table
-            from bifa.report.terminal import plain_spaces, print_lines, print_table
-            from bifa.report.words import effect_words
 
         with stage_progress(console) as progress:
             if setup.hands is not None:
                 setup.hands.before = progress.close
-            stages = campaign(setup, Effort(quick), progress.update)
+            stages = loop.campaign(setup, Effort(quick), progress.update)
             run_stages(out, stages, rerun=rerun, on_start=progress.start, on_end=progress.end)
+    _print_summary(console, out)
+
+
+def _print_summary(console: "Console", out: Path) -> None:
+    import json
+
+    from rich.text import Text
+
+    from bifa.campaign.page import prediction_table, speed_table
+    from bifa.report.diagnosis import noise_table
+    from bifa.report.terminal import plain_spaces, print_lines, print_table
+    from bifa.report.words import effect_words
 
     summary = json.loads((out / "summary.json").read_text())
     effects = "; ".join(effect_words(e["name"], e["parameters"]) for e in summary["effects"]) or "no effect"
@@ -125,28 +116,7 @@ def run_campaign(
     console.print(f"report: {out / 'report.html'}", soft_wrap=True)
 
 
-def _check(out: Path, port: str) -> None:
-    from bifa.campaign.stages import check_folder
-    from bifa.files import check_targets
-    from bifa.rig import check_port
-
-    check_targets(folders=(out,))
-    check_folder(out)
-    check_port(port)
-
-
-def _attended(console: "Console", setup: "Setup", watch: Path | None, bench_file: Path | None) -> "Setup":
-    """The setup with somebody at the desk, and what that person declares as known."""
-    from dataclasses import replace
-
-    from bifa.measure.bench_file import known_on
-
-    desk, hands = at_desk(console, watch, bench_file)
-    known = {**(known_on(bench_file, desk) if bench_file else {}), **setup.known}
-    return replace(setup, known=known, hands=hands)
-
-
-def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = None) -> "tuple[Desk, ByHand]":
+def at_desk(console: "Console", watch: Path | None, bench: Path) -> "tuple[Desk, ByHand]":
     """The desk on this terminal, and who works the instruments there (`bifa.measure.by_hand`)."""
     from functools import partial
 
@@ -160,7 +130,7 @@ def at_desk(console: "Console", watch: Path | None, bench_file: Path | None = No
         raise BifaError(f"the folder {watch} to watch does not exist; create it, and have the instruments save there")
     plain = not console.encoding.lower().startswith("utf")
     desk = Desk(lambda text: console.print(text), watch, Countdown(console))
-    exports = partial(read_exports, bench_file) if bench_file else dict
+    exports = partial(read_exports, bench)
     exports()  # what is wrong is said before anything moves
     return desk, ByHand(desk, watch, plain, exports, console.width)
 

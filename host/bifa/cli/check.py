@@ -63,14 +63,13 @@ def warn_of_units(console: "Console", dataset: "Dataset") -> None:
 
 
 def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
-    from rich.text import Text
-
     from bifa.check.finding import gathered
+    from bifa.screen import warning
 
     for found in gathered(findings):
-        console.print(Text.assemble(("warning", "yellow"), f" [{found.kind}] {found.text}"))
+        console.print(warning(f"[{found.kind}] {found.text}"))
         if found.places:
-            console.print(Text(f"  {'; '.join(found.places)}"))
+            console.print(f"  {'; '.join(found.places)}")
 
 
 def _print_contents(console: "Console", dataset: "Dataset") -> None:

@@ -19,9 +19,7 @@ EXAMPLES = ("bifa console", "bifa console --port virtual", f"echo show | bifa co
 _LOOK_S = 0.2
 
 
-def console(
-    port: Annotated[str | None, PORT] = None,
-) -> None:
+def console(port: Annotated[str | None, PORT] = None) -> None:
     """Talk to the Uno: type `help`. `!` stops at once; Ctrl-D or Ctrl-C leaves, with all valves off.
 
     With piped input it sends the lines one by one, prints the answers, and exits with status 1 if any was an error.

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PROFILE, RERUN, Profile
+from bifa.cli._options import PROFILE, QUICK, RERUN, Profile
 
 EXAMPLES = ("bifa demo", "bifa demo --seed 3 --out out/three", "bifa demo --quick", "bifa demo --rerun diagnose")
 
@@ -15,13 +15,11 @@ def demo(
     seed: Annotated[
         int, typer.Option(min=0, help="Random seed of the robot, its undisclosed effect and all noise.")
     ] = 4,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
-    ] = False,
+    quick: Annotated[bool, QUICK] = False,
     profile: Annotated[Profile, PROFILE] = "realistic",
     rerun: Annotated[list[str], RERUN] = [],  # noqa: B006
 ) -> None:
     """Characterise a virtual robot with an undisclosed effect, find the effect, optimise the gait, walk, compare."""
-    from bifa.cli.campaign import run_campaign
+    from bifa.cli.campaign import campaign
 
-    run_campaign(out, "virtual", seed, quick, rerun, profile=profile)
+    campaign(out, "virtual", seed, quick, profile=profile, rerun=rerun)

@@ -14,14 +14,12 @@ from bifa.cli.check import warn_of_units
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from concurrent.futures import Executor
     from contextlib import AbstractContextManager
 
     from rich.progress import Progress
 
     from bifa.data import Dataset
     from bifa.rig import Rig
-    from bifa.robot import Model
     from bifa.screen import Console
     from lacuna.diagnosis.diagnose import Diagnosis
 
@@ -79,11 +77,13 @@ def diagnose(
 
     check_targets(json, out, report)
 
-    from bifa.screen import Console
+    from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
+
+    from bifa.screen import Console, words
 
     console = Console()
     with console.status("reading"):
-        from bifa.campaign.resolve import refuse_leftovers
+        from bifa.campaign import resolve as further
         from bifa.data import read_dataset
         from bifa.problem.accuracy import accuracies
         from bifa.robot import load_model
@@ -92,39 +92,15 @@ def diagnose(
         measured = read_dataset(dataset)
         warn_of_units(console, measured)
     beside = named(dataset)
-    folder = beside.with_name(f"{beside.name}-resolved") if resolve else None
-    if folder is not None:
-        refuse_leftovers(folder)
+    resolved = beside.with_name(f"{beside.name}-resolved")  # where --resolve records
+    if resolve:
+        further.refuse_leftovers(resolved)
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
-    found = _found(console, measured, robot, good_enough, suspect or (), seed, folder, port, watch, workers)
-    _report(console, measured, found, json, out, report)
-
-
-def _found(
-    console: Console,
-    measured: Dataset,
-    robot: Model | None,
-    good_enough: dict[str, float],
-    suspected: Collection[str],
-    seed: int,
-    resolved: Path | None,
-    port: str | None,
-    watch: Path | None,
-    workers: AbstractContextManager[tuple[Executor | None, int]],
-) -> Diagnosis:
-    """The diagnosis of a data set; `resolved`: with experiments that separate, recorded into this folder."""
-    from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
-
-    from bifa.cli.campaign import at_desk
-    from bifa.rig import is_offered
-    from bifa.screen import words
-
     with console.status("starting"):
-        from bifa.campaign.resolve import resolve
         from bifa.identify.start import prepare
         from bifa.report.words import spoken
-        from lacuna.diagnosis.diagnose import diagnose
+        from lacuna.diagnosis import diagnose as engine
 
     with Progress(SpinnerColumn(), words("{task.description}"), TimeElapsedColumn(), console=console) as progress:
         task = progress.add_task("fitting stiffness curves")
@@ -132,27 +108,26 @@ def _found(
         def said(what: str, share: float = 0.0) -> None:
             progress.update(task, description=spoken(what))
 
-        def diagnosed(trials: Dataset, named: Collection[str] = ()) -> Diagnosis:
+        def diagnosed(trials: Dataset, confusable: Collection[str] = ()) -> Diagnosis:
             system = prepare(trials, robot)
             system.accuracies = good_enough
-            return diagnose(system, seed=seed, suspected={*suspected, *named}, on_progress=said, executor=executor)
+            suspected = {*(suspect or ()), *confusable}
+            return engine.diagnose(system, seed=seed, suspected=suspected, on_progress=said, executor=executor)
 
         with workers as (executor, _):
             found = diagnosed(measured)
-            if resolved is not None:
+            if resolve:
+                from bifa.cli.campaign import at_desk
+                from bifa.rig import is_offered
+
                 hands = None if is_offered(port) else at_desk(console, watch, Path("bench.toml"))[1]
                 rigs = _rigs(measured, port, progress)
-                _, found, _ = resolve(measured, found, diagnosed, rigs, resolved, said, hands)
-    return found
+                _, found, _ = further.resolve(measured, found, diagnosed, rigs, resolved, said, hands)
+    _report(console, measured, found, json, out, report)
 
 
 def _report(
-    console: Console,
-    measured: Dataset,
-    found: Diagnosis,
-    json: Path | None,
-    model: Path | None,
-    page: Path | None,
+    console: Console, measured: Dataset, found: Diagnosis, json: Path | None, model: Path | None, page: Path | None
 ) -> None:
     """Print the diagnosis, and write what was asked for."""
     from datetime import date

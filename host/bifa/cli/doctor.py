@@ -10,9 +10,7 @@ from bifa.computer import EXAMPLE_PORT
 EXAMPLES = ("bifa doctor", f"bifa doctor --port {EXAMPLE_PORT}", "bifa doctor --port virtual")
 
 
-def doctor(
-    port: Annotated[str | None, port_option("Also query the board at this port (it restarts).")] = None,
-) -> None:
+def doctor(port: Annotated[str | None, port_option("Also query the board at this port (it restarts).")] = None) -> None:
     """Say what is installed, which port and firmware there are, what is missing and how to get it.
 
     Exits with status 1 if something required is missing.

@@ -40,7 +40,7 @@ def _named(text: str) -> str:
 WHICH = typer.Argument(
     help=f"{', '.join(NAMES[:-1])}, or all: the paper's section IV, and walks.",
     callback=_named,  # an enumeration's own help is one word that no narrow terminal can break
-    autocompletion=lambda incomplete: [name for name in NAMES if name.startswith(incomplete)],
+    autocompletion=lambda: list(NAMES),
     metavar="EXPERIMENT",
 )
 

@@ -117,9 +117,13 @@ def _best(console: "Console", search: "Callable[..., Optimum]", settings: "list[
     for one in settings:
         with search_progress(console) as progress:
             optima.append(search(one, progress(f"seed {one.seed}")))
-        console.print(_line(optima[-1]))
-        if optima[-1].doubt:
-            console.print(warning(str(optima[-1].doubt)))
+        found = optima[-1]
+        console.print(
+            f"seed {one.seed}: {found.nominal_mm_s:.2f} mm/s on the model, 10th percentile "
+            f"{found.quantile_mm_s:.2f} mm/s; {found.evaluations} gaits, {found.simulations} simulations"
+        )
+        if found.doubt:
+            console.print(warning(str(found.doubt)))
     return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
 
 
@@ -154,13 +158,6 @@ def search_progress(console: "Console") -> Iterator[Callable[[str], Callable[[st
             return report
 
         yield begin
-
-
-def _line(optimum: "Optimum") -> str:
-    return (
-        f"seed {optimum.settings.seed}: {optimum.nominal_mm_s:.2f} mm/s on the model, 10th percentile "
-        f"{optimum.quantile_mm_s:.2f} mm/s; {optimum.evaluations} gaits, {optimum.simulations} simulations"
-    )
 
 
 def _summary(optimum: "Optimum") -> "Table":

@@ -60,10 +60,7 @@ def rig(
     options = {"profile": profile, "effects": effects, "sealed": sealed, "seed": seed}
     with console.status("starting"):
         virtual: Any = open_rig("virtual", **options, firmware=firmware, eeprom=eeprom, keep_events=False)
-    with (
-        virtual as bench,
-        console.status("starting", spinner="dots") as status,
-    ):
+    with virtual as bench, console.status("starting", spinner="dots") as status:
 
         def ready(path: str) -> None:
             console.print(f"{link or path}  250000 baud; Ctrl-C ends", soft_wrap=True)

@@ -59,7 +59,8 @@ def simulate(
 
     The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
     """
-    if paper and _walks_otherwise(cycles, inclination, payload, obstacle, buckling, pictures, out):
+    walks = (cycles, inclination, payload, obstacle, buckling, pictures, out)
+    if paper and walks != (_CYCLES, 0.0, 0.0, None, _BUCKLING_N, None, None):
         raise typer.BadParameter("--paper simulates walks of its own; only --model and --gait can be combined with it")
 
     from bifa.files import check_targets, written_into
@@ -91,10 +92,6 @@ def simulate(
         with written_into(pictures) as aside:
             draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
         console.print(f"picture: {pictures / 'walk.png'}")
-
-
-def _walks_otherwise(*asked: object) -> bool:
-    return asked != (_CYCLES, 0.0, 0.0, None, _BUCKLING_N, None, None)
 
 
 def _walk(
@@ -184,9 +181,9 @@ def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None")
 
         pairs = [(model, gait or FAST)] if model else [(robot.nominal(), FAST), (robot.strong_push(), FAST_STRONG)]
         tables = [compare(*pair) for pair in pairs]
-    table = Table(title=Text.assemble("The paper and the model; ", _RED, ": they disagree"), title_justify="left")
-    for heading in ("", "paper", *(chosen.name for chosen, _ in pairs), "remark on the first"):
-        table.add_column(heading)
+    headings = ("", "paper", *(chosen.name for chosen, _ in pairs), "remark on the first")
+    title = Text.assemble("The paper and the model; ", _RED, ": they disagree")
+    table = Table(*headings, title=title, title_justify="left")
     for rows in zip(*tables, strict=True):
         shown = (Text(row.ours, "" if row.fits else "red") for row in rows)
         table.add_row(rows[0].what, rows[0].paper, *shown, rows[0].remark)
@@ -202,12 +199,9 @@ def _print_obstacles(console: "Console", model: "Model", fast: "Gait") -> None:
 
     from bifa.simulate.paper import obstacle_rows
 
-    table = Table(
-        title=Text.assemble(f"Obstacles, {model.name}: N that a stroke builds up / needs; ", _RED, ": not enough"),
-        title_justify="left",
-    )
-    for heading in ("obstacle", "gait", "through", "extension", "contraction"):
-        table.add_column(heading)
+    title = Text.assemble(f"Obstacles, {model.name}: N that a stroke builds up / needs; ", _RED, ": not enough")
+    headings = ("obstacle", "gait", "through", "extension", "contraction")
+    table = Table(*headings, title=title, title_justify="left")
     for obstacle, gait, outcome in obstacle_rows(model, fast):
         strokes = (outcome.extension, outcome.contraction)
         shown = (f"{stroke.built_up_N:.0f} / {stroke.needed_N:.0f}" for stroke in strokes)
