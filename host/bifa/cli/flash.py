@@ -29,7 +29,7 @@ def flash(
     from bifa.toolchain import build_image, choose_port, find_project, project_folder
 
     console = Console()
-    on_line = console.out if verbose else _ignore
+    on_line: Callable[[str], None] = console.out if verbose else lambda _: None  # unless a tool fails
     project = project_folder() if build_only else find_project()
     chosen = None if build_only else choose_port(port)
     if project is not None:
@@ -57,7 +57,3 @@ def _write(project: Path | None, port: str, on_line: Callable[[str], None]) -> N
         upload_image(project, port, on_line)
     else:
         write_with_avrdude(carried_image(), port, on_line)
-
-
-def _ignore(_: str) -> None:
-    """The tools' output is shown only when they fail."""

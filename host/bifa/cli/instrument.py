@@ -16,7 +16,7 @@ EXAMPLES = (
     "bifa instrument take.csv --role camera --bench monday.toml",
     "bifa instrument --presets",
 )
-_ROLES = {"machine": "the testing machine (static loadings, pulls)", "camera": "the camera (steps, walks)"}
+_ROLES = ["machine", "camera"]
 _MOST_PLOTS = 8
 
 
@@ -48,18 +48,25 @@ def instrument(
     if role is not None and role not in _ROLES:
         raise typer.BadParameter(f"--role must be machine or camera, not {role}")
 
+    from bifa.errors import BifaError
+    from bifa.files import write_text
+    from bifa.measure.bench_file import read_exports
     from bifa.measure.propose import declaration, look
 
     seen = look(file)
     _show(console, file, seen)
-    role = role or _choice("Whose file is it?", list(_ROLES), None)
-    _refuse_declared(bench, role)
+    role = role or _choice("Whose file is it?", _ROLES, None)
+    if role in read_exports(bench):
+        raise BifaError(
+            f"{bench} declares [instrument.{role}] already: remove that table first, or name another --bench"
+        )
     table = _asked(console, seen, role)
     _prove(console, file, role, table)
     text = declaration(role, table)
     console.print(f"\n{text}")
     if typer.confirm(f"Write this into {bench}?", default=False):
-        _append(bench, text)
+        before = bench.read_text(encoding="utf-8") if bench.exists() else ""
+        write_text(bench, f"{before.rstrip()}\n\n{text}" if before.strip() else text)
         console.print(f"written: {bench}")
 
 
@@ -192,20 +199,3 @@ def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> 
         gaps = len(values) - len(known)
         told = f"{known.min():.6g} to {known.max():.6g}" if len(known) else "nothing"
         console.print(f"  {name}: {told}{f', {gaps} empty' if gaps else ''}")
-
-
-def _refuse_declared(bench: Path, role: str) -> None:
-    from bifa.errors import BifaError
-    from bifa.measure.bench_file import read_exports
-
-    if role in read_exports(bench):
-        raise BifaError(
-            f"{bench} declares [instrument.{role}] already: remove that table first, or name another --bench"
-        )
-
-
-def _append(bench: Path, text: str) -> None:
-    from bifa.files import write_text
-
-    before = bench.read_text(encoding="utf-8") if bench.exists() else ""
-    write_text(bench, f"{before.rstrip()}\n\n{text}" if before.strip() else text)
