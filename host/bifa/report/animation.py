@@ -10,7 +10,7 @@ from html import escape
 
 import numpy as np
 
-from bifa.report.style import DARK, LIGHT
+from bifa.report.style import PALETTES
 
 FRAMES_PER_S = 8  # between which the browser goes on evenly
 PIPE_MM = 147.0  # inner diameter (paper, section II)
@@ -18,6 +18,7 @@ LENGTH_MM = 186.0  # from tail to head when contracted: 240 mm extended less the
 ANCHORED_MM, FREE_MM = PIPE_MM, 0.72 * PIPE_MM
 _BODY_MM, _END_MM, _WALL_MM = 52.0, 24.0, 4.0
 _MARGIN_MM, _LABEL_MM, _RULER_MM = 16.0, 46.0, 46.0
+_GROUND = '<rect width="100%" height="100%" fill="var(--paper)"/>'
 _SHORT_MM = 640.0  # up to which lettering is as large as it stands here; in longer pictures it grows with them
 
 
@@ -65,12 +66,13 @@ def animate_walks(
     bottom = len(lanes) * lane_mm
     ruler, clock = bottom + 8 * zoom, bottom + ruler_mm + 8 * zoom
     drawn += [_ruler(ruler, left + origin_mm, far_mm, zoom), _clock(clock, width, frames_s, zoom)]
-    rules.append(_keyframes("walk-clock", _clock_moves(clock, width), seconds))
+    ends = [f"translate({x:.1f}px,{clock:.0f}px)" for x in (_MARGIN_MM, width - _MARGIN_MM)]
+    rules.append(_keyframes("walk-clock", ends, seconds))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" viewBox="0 0 {width:.0f} {height:.0f}">'
         f"<title>{escape(title)}</title><style>{_colors() if standalone else ''}{_look(zoom)}{''.join(rules)}"
         "@media (prefers-reduced-motion: reduce) { [class^=walk] { animation-play-state: paused } }</style>"
-        f"{_ground() if standalone else ''}{''.join(drawn)}</svg>"
+        f"{_GROUND if standalone else ''}{''.join(drawn)}</svg>"
     )
 
 
@@ -143,14 +145,6 @@ def _scale(y: float, start: float, long: float, marks: list[tuple[float, str]], 
     return "".join(drawn)
 
 
-def _clock_moves(y: float, width: float) -> list[str]:
-    return [f"translate({x:.1f}px,{y:.0f}px)" for x in (_MARGIN_MM, width - _MARGIN_MM)]
-
-
 def _colors() -> str:
-    light, dark = (";".join(f"--{k}:{v}" for k, v in p.colors().items()) for p in (LIGHT, DARK))
+    light, dark = (";".join(f"--{k}:{v}" for k, v in colors.items()) for colors in PALETTES.values())
     return f"svg{{{light}}}@media (prefers-color-scheme: dark){{svg{{{dark}}}}}"
-
-
-def _ground() -> str:
-    return '<rect width="100%" height="100%" fill="var(--paper)"/>'

@@ -19,8 +19,7 @@ _REPEATS = ("ink", "after", "before", "quiet")
 
 
 def plot_dataset(dataset: Dataset, folder: Path) -> list[Path]:
-    """Write one PNG per condition into `folder` (made if absent); returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write one PNG per condition into `folder`; returns their paths."""
     written: list[Path] = []
     for number, group in enumerate(dataset.repeats(), start=1):
         path = folder / f"{number:02d}_{re.sub(r'[^A-Za-z0-9.]+', '_', group[0].label)}.png"
@@ -50,7 +49,8 @@ def condition_chart(group: Sequence[Trial]) -> Chart:
                 x, y = thinned(trial.columns[abscissa], trial.columns[name], _MAX_POINTS)
                 lifted, style = (y + _APART * row, "steps") if is_command(name) else (y, "line")
                 series.append(Series((key.label,), x, lifted, key.color, style))
-        panels.append(Panel(series, Axis(_axis(abscissa)), _upward(what, names)))
+        across = Axis(f"{channel_words(abscissa)}, {unit_of(abscissa)}")
+        panels.append(Panel(series, across, _upward(what, names)))
     title = f"{first.label} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
     return Chart([Column(panels)], list(keys.values()), title, title=title, across=1, height=160)
 
@@ -71,7 +71,3 @@ def _key(name: str, repeat: int, index: int) -> Key:
         if chamber in name.split("_"):
             return Key(chamber, chamber)
     return Key(f"run {repeat}", _REPEATS[index % len(_REPEATS)])
-
-
-def _axis(name: str) -> str:
-    return f"{channel_words(name)}, {unit_of(name)}"

@@ -35,25 +35,21 @@ def errors_chart(error: Mapping[str, Any]) -> Chart:
 def before_and_after(pairs: Mapping[str, tuple[float, float]], floor: float | None, alt: str) -> Chart:
     """A row a name: the error of the base model and of the completed one, in units of the noise; `floor`: the least
     that held-out trials allow."""
-    names = list(pairs)
-    before, after = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
-    rows = np.arange(len(names), 0, -1, dtype=float)
+    rows = np.arange(len(pairs), 0, -1, dtype=float)
     links = [
-        Series((BASE, COMPLETED), np.array([before[name], after[name]]), np.array([row, row]), "quiet")
-        for row, name in zip(rows, names, strict=True)
+        Series((BASE, COMPLETED), np.array(pair), np.array([row, row]), "quiet")
+        for row, pair in zip(rows, pairs.values(), strict=True)
     ]
-    marks = [
-        Series((BASE,), np.array([before[name] for name in names]), rows, "before", "dots"),
-        Series((COMPLETED,), np.array([after[name] for name in names]), rows, "after", "dots"),
-    ]
-    everything = [*(before[n] for n in names), *(after[n] for n in names), floor or 1.0]
+    before, after = np.array(list(pairs.values())).T
+    marks = [Series((BASE,), before, rows, "before", "dots"), Series((COMPLETED,), after, rows, "after", "dots")]
+    everything = [value for pair in pairs.values() for value in pair] + [floor or 1.0]
     reach = (0.7 * min(everything), 1.5 * max(everything))
     panel = Panel(
         [*links, *marks],
         Axis("RMS error in units of the noise", reach, log=True),
-        Axis(range=(0.4, len(names) + 1.0), ticks=dict(zip(names, rows.tolist(), strict=True))),
+        Axis(range=(0.4, len(pairs) + 1.0), ticks=dict(zip(pairs, rows.tolist(), strict=True))),
         [("x", floor, "noise floor")] if floor else [],
-        len(names) * _ROW_PX / 150,
+        len(pairs) * _ROW_PX / 150,
     )
     keys = [Key(BASE, "before", "dots"), Key(COMPLETED, "after", "dots")]
     return Chart(

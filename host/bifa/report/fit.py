@@ -11,15 +11,7 @@ from bifa.report.diagnosis import BASE_MODEL, NOISE_FLOOR, RMS
 from bifa.report.evidence import BASE
 from bifa.report.page import ChartedSection, Page, PageTable
 from bifa.report.picture import draw_chart
-from bifa.report.words import (
-    channel_words,
-    experiment_words,
-    parameter_words,
-    plain,
-    quantity,
-    spoken,
-    unit_of,
-)
+from bifa.report.words import channel_words, experiment_words, parameter_words, plain, quantity, spoken, unit_of
 
 _CORRELATED = 0.9
 AS_NOISE = 1.1  # an error of so many times the noise is noise
@@ -56,8 +48,7 @@ def curves(found: Identification) -> list[ChartedSection]:
 
 
 def draw_curves(found: Identification, folder: Path) -> list[Path]:
-    """Those curves as PNG, a file an experiment, into `folder` (made if absent); returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Those curves as PNG, a file an experiment, into `folder`; returns their paths."""
     written = []
     for section in curves(found):
         written.append(folder / f"{section.title.lower().replace(' ', '_')}.png")
@@ -125,13 +116,6 @@ def errors_table(found: Identification) -> PageTable:
     rows = []
     for (experiment, channel), error in found.error.items():
         noise = found.fit.problem.floor.channels[experiment, channel]
-        unit = unit_of(channel)
-        rows.append(
-            [
-                f"{channel_words(channel)}, {experiment_words(experiment)}",
-                quantity(error * noise.sd, unit, 3),
-                quantity(noise.sd, unit, 3),
-                f"{error:.2f}",
-            ]
-        )
+        sizes = (quantity(size, unit_of(channel), 3) for size in (error * noise.sd, noise.sd))
+        rows.append([f"{channel_words(channel)}, {experiment_words(experiment)}", *sizes, f"{error:.2f}"])
     return PageTable(["RMS error", BASE, "noise floor", "ratio"], rows)

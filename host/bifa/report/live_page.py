@@ -5,7 +5,7 @@ from __future__ import annotations
 from bifa.link.table import CHAMBERS
 from bifa.report.page import environment, page_style, template_file
 from bifa.report.plot import library_script
-from bifa.report.style import DARK, LIGHT
+from bifa.report.style import PALETTES
 
 _SLIDERS = (
     ("period_s", "period", "s", 0.01),
@@ -19,12 +19,11 @@ _SLIDERS = (
 
 def live_page() -> str:
     """One HTML document; what it shows and asks goes to where it came from."""
-    palettes = {"light": LIGHT.colors(), "dark": DARK.colors()}
     return (
         environment()
         .get_template("live.html.jinja")
         .render(
-            palettes=palettes,
+            palettes=PALETTES,
             chambers=CHAMBERS,
             sliders=_SLIDERS,
             style=page_style() + template_file("live.css"),

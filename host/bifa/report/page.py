@@ -15,7 +15,7 @@ from markupsafe import Markup
 from bifa.files import write_text
 from bifa.report.chart import Chart
 from bifa.report.plot import as_plot, library_script
-from bifa.report.style import DARK, LIGHT
+from bifa.report.style import PALETTES
 from lacuna.report import page as engine
 from lacuna.report.page import Page, PageTable
 
@@ -51,8 +51,8 @@ def render(page: Page) -> str:
         .render(
             page=page,
             numbers=iter(range(len(plots))),
-            palettes={"light": LIGHT.colors(), "dark": DARK.colors()},
-            data=_embedded({"plots": plots, "light": LIGHT.colors(), "dark": DARK.colors()}),
+            palettes=PALETTES,
+            data=_embedded({"plots": plots} | PALETTES),
             style=page_style(),
             script=template_file("page.js"),
             library=library_script() if plots else "",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bifa.report.chart import Axis, Chart, Key, Panel, Series
-from bifa.report.style import ColorScheme, figure_style
+from bifa.report.style import LIGHT, PICTURE
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -15,16 +15,20 @@ if TYPE_CHECKING:
 
 
 _PER_INCH = 75.0  # of a chart's pixels
+_COLORS = LIGHT.colors()
 _DASHES: dict[str, Literal["--", ":"]] = {"dashed": "--", "dotted": ":"}
 
 
-def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9.6) -> None:
+def draw_chart(chart: Chart, path: Path, width_in: float = 9.6) -> None:
     """Write the chart to `path`, with its legend above."""
     across = min(chart.across, len(chart.columns))
     rows = math.ceil(len(chart.columns) / across)
     heights = [panel.height for panel in max((column.panels for column in chart.columns), key=len)]
     tall = rows * sum(heights) * chart.height / _PER_INCH + 0.35 * rows + 0.6
-    with figure_style(dark) as palette:
+    import matplotlib
+
+    matplotlib.use("Agg")  # needs no display
+    with matplotlib.rc_context(PICTURE):
         import matplotlib.pyplot as plt
 
         figure, axes = plt.subplots(
@@ -45,25 +49,24 @@ def draw_chart(chart: Chart, path: Path, dark: bool = False, width_in: float = 9
             mine[0].set_title(column.title, loc="left")
             for axis, panel in zip(mine, column.panels, strict=True):
                 axis.set_visible(True)
-                _draw(axis, panel, palette)
+                _draw(axis, panel)
             for axis in mine[:-1]:
                 axis.sharex(mine[-1])
                 axis.set_xlabel("")
                 axis.tick_params(labelbottom=False)
         if chart.keys:
-            handles = [_handle(key, palette) for key in chart.keys]
+            handles = [_handle(key) for key in chart.keys]
             figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 6))
         figure.align_ylabels()
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
         plt.close(figure)
 
 
-def _draw(axis: Axes, panel: Panel, palette: ColorScheme) -> None:
-    colors = palette.colors()
+def _draw(axis: Axes, panel: Panel) -> None:
     for series in panel.series:
-        _draw_series(axis, series, colors[series.color])
+        _draw_series(axis, series, _COLORS[series.color])
     for along, place, label in panel.rules:
-        (axis.axvline if along == "x" else axis.axhline)(place, color=palette.ink, linestyle=":", linewidth=1.0)
+        (axis.axvline if along == "x" else axis.axhline)(place, color=LIGHT.ink, linestyle=":", linewidth=1.0)
         where = {"x": (place, 0.97, axis.get_xaxis_transform()), "y": (0.5, place, axis.get_yaxis_transform())}[along]
         side: dict[str, Any] = {"ha": "left", "va": "top"} if along == "x" else {"ha": "center", "va": "bottom"}
         axis.text(*where[:2], label, transform=where[2], fontsize=8, **side)
@@ -99,11 +102,11 @@ def _scale(axis: Axes, name: Literal["x", "y"], one: Axis) -> None:
     axis.set(**{f"{name}label": one.label})
 
 
-def _handle(key: Key, palette: ColorScheme) -> Artist:
+def _handle(key: Key) -> Artist:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    color = palette.colors()[key.color]
+    color = _COLORS[key.color]
     if key.style == "area":
         return Patch(color=color, label=key.label)
     form: dict[str, Any] = (

@@ -31,7 +31,7 @@ def as_plot(column: Column, height: int) -> list[dict[str, Any]]:
             "height": round(panel.height * height),
             "x": _axis(panel.x if panel is column.panels[-1] else Axis(range=panel.x.range, log=panel.x.log)),
             "y": _axis(panel.y),
-            "curves": [_curve(series, panel.x.label) for series in panel.series],
+            "curves": [_curve(series) for series in panel.series],
             "rules": [{"along": along, "place": place, "label": label} for along, place, label in panel.rules],
         }
         for panel in column.panels
@@ -49,10 +49,9 @@ def _axis(axis: Axis) -> dict[str, Any]:
     }
 
 
-def _curve(series: Series, across: str) -> dict[str, Any]:
+def _curve(series: Series) -> dict[str, Any]:
     return {
         "keys": series.keys,
-        "across": across,
         "points": [[x, y] for x, y in zip(_short(series.x), _short(series.y), strict=True)],
         "colour": series.color,
         "style": series.style,

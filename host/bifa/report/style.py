@@ -1,7 +1,5 @@
 """One look for every figure: the three chambers keep their colours, grids stay quiet, light and dark."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -32,18 +30,11 @@ class ColorScheme:
 
 LIGHT = ColorScheme(**COLORS["light"], measured="#1d1f23", before="#8a7000", after="#a3308f")
 DARK = ColorScheme(**COLORS["dark"], measured="#e6e6e6", before="#d6b656", after="#ee9fd8")
+PALETTES = {"light": LIGHT.colors(), "dark": DARK.colors()}
 
-_RC: dict[Any, Any] = LOOK | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
-
-
-@contextmanager
-def figure_style(dark: bool = False) -> Iterator[ColorScheme]:
-    """Matplotlib without a display and with the project's look, inside the block only."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    palette = DARK if dark else LIGHT
-    ink = dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), palette.ink)
-    background = {"figure.facecolor": palette.paper, "axes.facecolor": palette.paper}
-    with matplotlib.rc_context(_RC | ink | background | {"grid.color": palette.grid}):
-        yield palette
+PICTURE: dict[Any, Any] = (  # the look of a picture: settings of Matplotlib
+    LOOK
+    | {"grid.alpha": 1.0, "axes.axisbelow": True, "svg.hashsalt": "bifa"}
+    | dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), LIGHT.ink)
+    | {"figure.facecolor": LIGHT.paper, "axes.facecolor": LIGHT.paper, "grid.color": LIGHT.grid}
+)

@@ -77,10 +77,7 @@ def _column(
     ]
     paths = [
         Series(
-            (name,),
-            *thinned(*_until(record, "displacement_head_mm", horizon_s)),
-            _ROLES.get(name, "ink"),
-            lines[name],
+            (name,), *thinned(*_until(record, "displacement_head_mm", horizon_s)), _ROLES.get(name, "ink"), lines[name]
         )
         for name, record in walk.records.items()
     ]

@@ -37,24 +37,7 @@ _PHRASES = {
     "viscoelasticity": "{stiffness_N_m} relaxing in {time_s}",
 }
 NBSP = "\N{NO-BREAK SPACE}"  # between a number and its unit
-_UNIT_WORDS = (
-    "N_psi",
-    "Ns_m",
-    "N_m",
-    "s_per_psi",
-    "per_s",
-    "mm_s",
-    "m_s",
-    "mm",
-    "psi",
-    "N",
-    "m",
-    "kg",
-    "deg",
-    "Hz",
-    "s",
-    "rad",
-)
+_UNIT = re.compile("_(N_psi|Ns_m|N_m|s_per_psi|per_s|mm_s|m_s|mm|psi|N|m|kg|deg|Hz|s|rad)$")
 _PARTS = ("body", "head", "tail")
 _IDENTIFIER = re.compile(r"\b[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)+\b")
 _FILE = re.compile(r"[\w.\-]+\.csv\b")
@@ -86,7 +69,7 @@ def experiment_words(name: str) -> str:
 
 def channel_words(name: str) -> str:
     """ "pressure_body_psi" is "pressure of the body"."""
-    words = _without_unit(name).split("_")
+    words = _UNIT.sub("", name).split("_")
     if words[-1] in _PARTS and len(words) > 1:
         return f"{' '.join(words[:-1])} of the {words[-1]}"
     return " ".join(words)
@@ -114,7 +97,7 @@ def gait_parameter_words(name: str) -> str:
 def parameter_words(name: str) -> str:
     """A parameter of the model, an effect's, or a nuisance."""
     known = BASE_PARAMETERS.get(name)
-    return known.meaning if known else _without_unit(name).replace("_", " ")
+    return known.meaning if known else _UNIT.sub("", name).replace("_", " ")
 
 
 def effect_words(name: str, parameters: Mapping[str, float] | None = None) -> str:
@@ -159,10 +142,3 @@ def _said(name: str) -> str:
     if name in BASE_PARAMETERS or name in library():
         return parameter_words(name)
     return channel_words(name)
-
-
-def _without_unit(name: str) -> str:
-    for unit in _UNIT_WORDS:
-        if name.endswith("_" + unit):
-            return name.removesuffix("_" + unit)
-    return name

@@ -10,8 +10,8 @@
 
   const dashes = { dashed: [4, 3], dotted: [1, 3] };
 
-  const curve = ({ keys, across, points, colour, style, base }, palette) => ({
-    keys, across, label: keys.join(", "), data: points.map(([x, y]) => ({ x, y })),
+  const curve = ({ keys, points, colour, style, base }, palette) => ({
+    keys, label: keys.join(", "), data: points.map(([x, y]) => ({ x, y })),
     showLine: style !== "dots", pointRadius: style === "dots" ? 5.5 : 0, pointHitRadius: 6, stepped: style === "steps" || style === "area",
     borderColor: palette[colour], backgroundColor: palette[colour], borderWidth: style === "area" ? 0 : 1.6, borderDash: dashes[style] || [],
     fill: style === "area" ? { value: base } : false, spanGaps: false, animation: false,
