@@ -42,8 +42,8 @@ def displacement_lag(trial: Trial) -> Lag | None:
         return None
     from scipy.interpolate import CubicSpline  # slow to import
 
-    time_s, (length_mm, pressure_psi) = trial.time_s, _body(trial)
-    motion = CubicSpline(time_s, length_mm)
+    time_s, motion = trial.time_s, CubicSpline(trial.time_s, length_mm(trial))
+    pressure_psi = trial.columns["pressure_psi" if trial.experiment == "step_response" else "pressure_body_psi"]
     found = [_of_snap(time_s[k], motion, pressure_psi[k]) for k in _snaps(time_s, motion(time_s, 1))]
     pairs = np.array([pair for pair in found if pair is not None])
     if not len(pairs):
@@ -88,24 +88,18 @@ def misfit_of(trial: Trial, earlier: Sequence[Trial]) -> str | None:
     return f"{trial.file}: {text}" if text else None
 
 
-def misfit_of_last(trials: Sequence[Trial]) -> str | None:
-    """`misfit_of` the last trial recorded, against the earlier ones."""
-    return misfit_of(trials[-1], trials[:-1])
-
-
 def _in_words(late_s: float) -> str:
     """In words, such as "8.8 ms early"."""
     return f"{abs(1e3 * late_s):.1f} ms {'late' if late_s > 0.0 else 'early'}"
 
 
-def _body(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
-    """Length [mm] and pressure [psi] of the actuator that was recorded; of a walk the body's, or, where only the head
-    was tracked, its position: it alone moves in most of a body's snaps."""
+def length_mm(trial: Trial) -> np.ndarray:
+    """Of the actuator in a step response, of the body in a walk, (samples,); where only the head was tracked, its
+    position: it alone moves in most of a body's snaps."""
     columns = trial.columns
     if trial.experiment == "step_response":
-        return columns["displacement_mm"], columns["pressure_psi"]
-    length_mm = columns["displacement_head_mm"] - columns.get("displacement_tail_mm", 0.0)
-    return length_mm, columns["pressure_body_psi"]
+        return columns["displacement_mm"]
+    return columns["displacement_head_mm"] - columns.get("displacement_tail_mm", 0.0)
 
 
 def _snaps(time_s: np.ndarray, speed_mm_s: np.ndarray) -> list[slice]:

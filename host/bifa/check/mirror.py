@@ -8,10 +8,8 @@ slide or a late valve can reverse the former, not the latter.
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from bifa.check.finding import Finding
-from bifa.check.lag import displacement_lag
+from bifa.check.lag import displacement_lag, length_mm
 from bifa.data import Trial
 
 from .swing import follow, swing
@@ -24,7 +22,7 @@ _FOLLOWS = 0.6  # of its range, the body's pressure its command; less in cycles 
 def shortens_mm(trial: Trial) -> float:
     """By how much the body gets shorter while it is commanded to fill (tail not tracked: the head goes back); 0 if
     negligible."""
-    mm = swing(trial.columns["command_body"], _length_mm(trial), trial.time_s)
+    mm = swing(trial.columns["command_body"], length_mm(trial), trial.time_s)
     return -mm if mm is not None and mm < -_SHORTER_MM else 0.0
 
 
@@ -45,10 +43,6 @@ def check_mirror(trial: Trial) -> Iterator[Finding]:
             "camera's axis point backwards? Reverse the sign"
         )
     yield Finding("mirrored", text, trial.file, column="displacement_head_mm")
-
-
-def _length_mm(trial: Trial) -> np.ndarray:
-    return trial.columns["displacement_head_mm"] - trial.columns.get(_TAIL, 0.0)
 
 
 def _is_turned(trial: Trial) -> bool:

@@ -1,6 +1,6 @@
 """Mistakes made in the lab that the format cannot refuse: signs, mirrors, exchanged tubes, another gait, a wrong unit.
 
-A diagnosis would look for their cause in the robot. Each check has its own file, with its limits and how far healthy
+A diagnosis would look for their cause in the robot. Each kind has its own file, with its limits and how far healthy
 data stay from them, even with strong effects. Nothing here changes what is fitted.
 """
 
@@ -8,12 +8,10 @@ from collections.abc import Iterable, Sequence
 
 from bifa.data import Dataset, Trial
 
-from .copies import check_copies
 from .finding import Finding
 from .known import check_known
-from .loadings import check_anchor_pull, check_static_loading
-from .repeats import check_repeats
-from .steps import check_step_response
+from .repeats import check_copies, check_repeats
+from .signs import check_anchor_pull, check_static_loading, check_step_response
 from .units import check_strokes, check_units
 from .walks import check_walk
 

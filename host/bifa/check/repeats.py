@@ -2,6 +2,8 @@
 
 What is compared does not depend on when a recording was started: forces at equal displacement, steps and walks from
 the first switch on. Of a walk only the pressures and the length count: two runs of a brittle gait may end far apart.
+
+And the same record in two trials, as a file was saved, named or copied twice: no two recordings have the same noise.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -40,6 +42,20 @@ def check_repeats(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
     for group in groups:
         usual = _usual(group, groups)
         yield from _of_two(group, usual) if len(group.trials) == 2 else _of_more(group, usual)
+
+
+def check_copies(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[Finding]:
+    """Trials whose displacement or force is that of an earlier one of the experiment; `skipped`: files told of."""
+    first: dict[tuple[str, str, bytes], str] = {}
+    for trial in (trial for trial in dataset.trials if trial.file not in skipped):
+        for name, values in trial.columns.items():
+            if not name.startswith(("displacement", "force")) or np.ptp(values) == 0.0:
+                continue
+            earlier = first.setdefault((trial.experiment, name, values.tobytes()), trial.file)
+            if earlier != trial.file:
+                text = f"has the same {name} as {earlier}, sample by sample: give its own record, or leave it out"
+                yield Finding("copy", text, trial.file, column=name)
+                break
 
 
 def _of_more(group: _Group, usual: dict[str, float]) -> Iterator[Finding]:

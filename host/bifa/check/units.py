@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.check.finding import Finding
+from bifa.check.lag import length_mm
 from bifa.data import Dataset, Trial
 from bifa.robot.parameters import BASE_PARAMETERS
 
@@ -19,10 +20,8 @@ _OVER_S = 0.5  # a speed is taken over so long
 _AREA = 2.5  # times outside what is plausible; healthy: within 1.0 of it, and pounds 4.4 times outside
 _PRESSED_PSI = 3.0  # from here on area times pressure outweighs the spring in the mean force
 _HELD_PSI = 5.0  # from here on an anchor holds
-_SNAP, _SNAP_S = (
-    0.35,
-    0.06,
-)  # of the range, within so long; healthy: 0.5 and more where it snaps, 0.15 where it does not
+_SNAP_S = 0.06
+_SNAP = 0.35  # of the range, within so long; healthy: 0.5 and more where it snaps, 0.15 where it does not
 _SMALLER, _LARGER = 0.2, 2.2  # of the cross-head's stroke; healthy: 1.1 to 1.5, drawn in by vacuum and pressed out
 _PULL_N = (2.0, 150.0)  # of an anchor that holds, the median; healthy: 15 to 31, and 4 where it does not
 _LONGEST_MM = 200.0  # that a body is at its longest more than at its shortest; healthy: 60 to 70
@@ -49,7 +48,7 @@ def check_units(trial: Trial) -> Iterator[Finding]:
         yield from _speed(trial)
         yield from _force(trial)
     elif trial.experiment == "locomotion" and "displacement_tail_mm" in trial.columns:
-        long_mm = float(np.ptp(_length_mm(trial)))
+        long_mm = float(np.ptp(length_mm(trial)))
         if long_mm > _LONGEST_MM:
             text = f"the body's length changes by {long_mm:.4g} mm, where some 60 is possible"
             yield Finding("unit", text + _or_else(long_mm, 60.0, _MM), trial.file, column="displacement_head_mm")
@@ -63,9 +62,10 @@ def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
         if found:
             strokes[actuator] = float(np.median(found))
     for trial in dataset.trials:
-        shown, seen_mm, column = _seen(trial)
+        shown, column = _seen(trial)
         if shown is None or shown not in strokes or trial.file in skipped:
             continue
+        seen_mm = length_mm(trial)
         moved_mm = float(np.ptp(seen_mm))
         share = moved_mm / strokes[shown]
         if share > _LARGER or (share < _SMALLER and _snaps(trial.time_s, seen_mm)):
@@ -76,27 +76,23 @@ def check_strokes(dataset: Dataset, skipped: Collection[str] = ()) -> Iterator[F
             yield Finding("unit", text, trial.file, column=column)
 
 
-def _seen(trial: Trial) -> tuple[str | None, np.ndarray, str]:
-    """Which actuator a camera saw, its length [mm], and by which column. Without a tail a walk tells no length."""
+def _seen(trial: Trial) -> tuple[str | None, str]:
+    """Which actuator's length a camera saw, and by which column. Without a tail a walk tells no length."""
     if trial.experiment == "step_response":
-        return trial.actuator, trial.columns["displacement_mm"], "displacement_mm"
+        return trial.actuator, "displacement_mm"
     if trial.experiment == "locomotion" and "displacement_tail_mm" in trial.columns:
-        return "large", _length_mm(trial), "displacement_head_mm"
-    return None, np.zeros(1), ""
+        return "large", "displacement_head_mm"
+    return None, ""
 
 
-def _snaps(time_s: np.ndarray, length_mm: np.ndarray) -> bool:
+def _snaps(time_s: np.ndarray, seen_mm: np.ndarray) -> bool:
     """Whether it goes a good part of its way within moments, in whatever unit; filling alone takes a second."""
     step = max(1, round(_SNAP_S / float(np.median(np.diff(time_s)))))
-    return bool(np.abs(length_mm[step:] - length_mm[:-step]).max() > _SNAP * np.ptp(length_mm) > 0.0)
+    return bool(np.abs(seen_mm[step:] - seen_mm[:-step]).max() > _SNAP * np.ptp(seen_mm) > 0.0)
 
 
 def _stroke_mm(trial: Trial) -> float:
     return float(np.ptp(trial.columns["displacement_mm"]))
-
-
-def _length_mm(trial: Trial) -> np.ndarray:
-    return trial.columns["displacement_head_mm"] - trial.columns["displacement_tail_mm"]
 
 
 def _speed(trial: Trial) -> Iterator[Finding]:

@@ -1,21 +1,34 @@
-"""What was mistaken in a walk: exchanged chambers first, since everything else would seem wrong with them."""
+"""What was mistaken in a walk: exchanged chambers first, since everything else would seem wrong with them.
+
+Which command does each chamber's pressure follow? Its own, unless chambers are exchanged or a sign is reversed.
+"""
 
 from collections.abc import Iterator, Sequence
+from itertools import permutations
 
 import numpy as np
 
 from bifa.check.finding import Finding
 from bifa.data import Trial
+from bifa.robot.cpg import CHAMBERS
 
-from .chambers import exchange_finding, exchanged, following, turned
 from .mirror import check_mirror, shortens_mm
-from .schedule import check_gait
-from .steps import AGAINST
+from .schedule import check_gait, contradicted, seen_gait
+from .signs import AGAINST, PORTS
+from .swing import follow, swing
+
+# Of a pressure's range. In cycles of 3 s and more it follows its own command over 0.62 to 0.98 of it, even where valves
+# choke; in faster ones over less, which tells nothing.
+_FOLLOWS = 0.5
+# Better with another's command than with its own. Healthy: whichever are exchanged, one of them worse by 0.24 or more.
+_BETTER = 0.04
+
+Exchange = dict[str, str]  # chamber: whose command its pressure follows
 
 
 def check_walk(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
     """`walks`: the day's others, whose gait this may be."""
-    shares = following(trial)
+    shares = _following(trial)
     all_against = bool((np.diag(shares) < AGAINST).all())
     if all_against and shortens_mm(trial):
         text = (
@@ -23,9 +36,72 @@ def check_walk(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
             "them in all three columns"
         )
         yield Finding("sign", text, trial.file, column="command_body")
-    elif not all_against and (exchange := exchanged(shares)):
-        yield exchange_finding(trial, exchange, shares)
+    elif not all_against and (exchange := _exchanged(shares)):
+        yield _exchange_finding(trial, exchange, shares)
     else:
-        yield from turned(trial, shares)
+        yield from _turned(trial, shares)
         yield from check_mirror(trial)
         yield from check_gait(trial, walks)
+
+
+def _following(trial: Trial) -> np.ndarray:
+    """(3, 3) shares of the range by which the pressure of a chamber (row) follows the command of each (column), in the
+    order of CHAMBERS; NaN where one of them never changes."""
+    shares = np.full((3, 3), np.nan)
+    for i, pressure in enumerate(CHAMBERS):
+        for j, command in enumerate(CHAMBERS):
+            share = follow(trial.columns[f"command_{command}"], trial.columns[f"pressure_{pressure}_psi"], trial.time_s)
+            shares[i, j] = np.nan if share is None else share
+    return shares
+
+
+def _exchanged(shares: np.ndarray) -> Exchange:
+    """The chambers whose pressures follow one another's commands far better than their own; empty if none."""
+    best, most = {}, 0.0
+    for order in permutations(range(3)):
+        moved = [i for i in range(3) if order[i] != i]
+        gains = [shares[i, order[i]] - shares[i, i] for i in moved]
+        follows = all(shares[i, order[i]] > _FOLLOWS and gain > _BETTER for i, gain in zip(moved, gains, strict=True))
+        if moved and follows and min(gains) > most:
+            best, most = {CHAMBERS[i]: CHAMBERS[order[i]] for i in moved}, min(gains)
+    return best
+
+
+def _exchange_finding(trial: Trial, exchange: Exchange, shares: np.ndarray) -> Finding:
+    """What was exchanged, in words: the commands' columns, if the gait says so, else something about the pressures."""
+    chamber, followed = next(iter(exchange.items()))
+    row = shares[CHAMBERS.index(chamber)]
+    seen = (
+        f"follows command_{followed} (up and down with it over {_percent(row, followed)} % of its range, with "
+        f"command_{chamber} {_percent(row, chamber)} %)"
+    )
+    names = " and ".join(exchange)
+    commands = {f"command_{c}": trial.columns[f"command_{c}"] for c in CHAMBERS}
+    renamed = commands | {f"command_{c}": commands[f"command_{other}"] for c, other in exchange.items()}
+    if _fits(trial, commands) or not _fits(trial, renamed):
+        what = f"the pressures' columns, sensors or tubes of {names} are exchanged: trace the tubes, rename the columns"
+    else:
+        what = f"the command columns of {names} are exchanged, as the gait says too: rename them"
+    return Finding("swapped", f"{seen}: {what}", trial.file, column=f"pressure_{chamber}_psi")
+
+
+def _turned(trial: Trial, shares: np.ndarray) -> Iterator[Finding]:
+    """Pressures that fall while their own command is positive."""
+    chambers = [CHAMBERS[i] for i in np.flatnonzero(np.diag(shares) < AGAINST)]
+    if chambers:
+        names = [f"pressure_{chamber}_psi" for chamber in chambers]
+        falls = [
+            -(swing(trial.columns[f"command_{chamber}"], trial.columns[name], trial.time_s) or 0.0)
+            for chamber, name in zip(chambers, names, strict=True)
+        ]
+        listed = ", ".join(f"{psi:.2f}" for psi in falls)
+        text = f"falls by {listed} psi while the chamber's command is positive, {PORTS}"
+        yield Finding("sign", text, trial.file, column=", ".join(names))
+
+
+def _percent(row: np.ndarray, chamber: str) -> str:
+    return f"{100 * row[CHAMBERS.index(chamber)]:.0f}"
+
+
+def _fits(trial: Trial, commands: dict[str, np.ndarray]) -> bool:
+    return not contradicted(trial.walked, seen_gait(trial, commands))

@@ -1,4 +1,4 @@
-"""A repeat that was none is found; a lab's ordinary scatter is not."""
+"""A repeat that was none is found, and a record that stands in two trials; a lab's ordinary scatter is not."""
 
 from dataclasses import replace
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bifa.check.plausibility import check_plausibility
-from bifa.data import Trial
+from bifa.check.repeats import check_copies
+from bifa.data import Dataset, Trial
 
 from .days import mistaken, said, with_columns
 
@@ -80,3 +81,11 @@ def slid(trial: Trial) -> Trial:
 
 def test_a_walk_that_ends_elsewhere_is_no_odd_repeat(day):
     assert said(mistaken(day, "walk_easy_2.csv", slid)) == []
+
+
+def test_a_record_that_stands_in_two_trials_is_told_once():
+    columns = {"time_s": np.arange(3.0), "displacement_mm": np.arange(3.0), "force_N": np.zeros(3)}
+    first = Trial("one.csv", "anchor_pull", columns, pressure_psi=8.5)
+    other = replace(first, file="three.csv", columns={**columns, "displacement_mm": np.arange(3.0) + 1})
+    (found,) = check_copies(Dataset(None, "day", {}, (first, replace(first, file="two.csv"), other)))
+    assert (found.file, "one.csv" in found.text) == ("two.csv", True)
