@@ -37,7 +37,6 @@ app = typer.Typer(
     name="bifa",
     cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Drive a soft in-pipe robot from an Arduino Uno and learn from data how it really behaves.",
     no_args_is_help=True,
     rich_markup_mode="rich" if shutil.get_terminal_size().columns >= _PANELS else None,
     pretty_exceptions_enable=False,

@@ -1,20 +1,12 @@
 """`bifa monitor`: pressures, valves and phases, live."""
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from bifa.cli._options import PORT, file_option
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from bifa.link import Uno
-    from bifa.rig import SameBoard
-    from bifa.robot import Model
-    from bifa.screen import Console
-
 
 _WEB_PORT = 8765
 
@@ -59,6 +51,7 @@ def monitor(
     from bifa.robot.gait import read_gait_file
     from bifa.screen import Console
 
+    console = Console()
     parameters = read_gait_file(gait).parameters if gait else {}
     robot = load_model(model) if model else nominal()
 
@@ -73,38 +66,22 @@ def monitor(
 
     with writable():
         try:
-            if web:
-                _fly(SameBoard(port), Console(), web_port, robot, seconds, begin, adjust)
-            else:
+            if not web:
                 with open_rig(port) as rig:
-                    watch(Uno(rig.transport, rig.clock), rig.clock, Console(), seconds, begin)
+                    watch(Uno(rig.transport, rig.clock), rig.clock, console, seconds, begin)
+                return
+            with console.status("starting the page"):
+                from bifa.live.web.flights import fly
+                from bifa.live.web.pilot import Pilot
+                from bifa.live.web.server import LivePage, served
+                from bifa.report.live_page import live_page
+
+                pilot = Pilot()
+                page = LivePage(pilot, live_page(), robot)
+            pilot.is_watched = page.is_watched
+            say = partial(console.print, soft_wrap=True)
+            with served(page, web_port) as address:
+                say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
+                fly(pilot, SameBoard(port), page.tell, say, seconds, begin, adjust)
         except KeyboardInterrupt:
             typer.echo("valves off")
-
-
-def _fly(
-    board: "SameBoard",
-    console: "Console",
-    port: int,
-    model: "Model",
-    seconds: float | None,
-    begin: "Callable[[Uno], None]",
-    later: "Callable[[Uno], None]",
-) -> None:
-    """Serve the page and fly until Ctrl-C or for `seconds`."""
-    with console.status("starting the page"):
-        from bifa.live.web.flights import fly
-        from bifa.live.web.pilot import Pilot
-        from bifa.live.web.server import LivePage, served
-        from bifa.report.live_page import live_page
-
-        pilot = Pilot()
-        page = LivePage(pilot, live_page(), model)
-    pilot.is_watched = page.is_watched
-
-    def say(text: str) -> None:
-        console.print(text, soft_wrap=True)
-
-    with served(page, port) as address:
-        say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
-        fly(pilot, board, page.tell, say, seconds, begin, later)
