@@ -26,6 +26,7 @@ def compared_curves(
 
     predictions: by model (`BASE`, `COMPLETED`), one for each of `trials`. labels: what trials are called, by file.
     """
+    keys = [Key(MEASURED, "measured"), *(Key(model, *_LOOKS[model]) for model in predictions)]
     first = {trial.condition: k for k, trial in reversed(list(enumerate(trials)))}
     found = []
     for experiment, title in _TITLES.items():
@@ -36,13 +37,9 @@ def compared_curves(
         ]
         if columns:
             alt = f"Measured and modelled in {experiment_words(experiment)}, and the difference"
-            chart = Chart(columns, _keys(predictions), alt, "Below each quantity: measured minus modelled.", height=130)
+            chart = Chart(columns, keys, alt, "Below each quantity: measured minus modelled.", height=130)
             found.append(ChartedSection(title, charts=[chart]))
     return found
-
-
-def _keys(predictions: Mapping[str, object]) -> list[Key]:
-    return [Key(MEASURED, "measured"), *(Key(model, *_LOOKS[model]) for model in predictions)]
 
 
 def _column(trial: Record, predictions: Mapping[str, Channels], label: str) -> Column:

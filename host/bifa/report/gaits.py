@@ -17,23 +17,15 @@ def sensitivity_chart(scans: Sequence[Scan]) -> Chart:
     """A panel a gait parameter; shaded: where nine robots in ten keep 90 % of the speed."""
     keys = [Key("the model itself", "measured"), Key("10th percentile", "after"), Key("room", "grid", "area")]
     most = 1.05 * max(float(np.max(scan.nominal_mm_s)) for scan in scans)
-    columns = [
-        Column(
-            [
-                Panel(
-                    [
-                        Series(("room",), np.array(scan.room), np.full(2, most), "grid", "area"),
-                        Series(("the model itself",), scan.values, scan.nominal_mm_s, "measured"),
-                        Series(("10th percentile",), scan.values, scan.quantile_mm_s, "after"),
-                    ],
-                    Axis(f"{scan.name}, room {scan.room[0]:.4g} to {scan.room[1]:.4g} {scan.unit}".rstrip()),
-                    Axis("speed, mm/s", (0.0, most)),
-                    [("x", scan.at, "")],
-                )
-            ]
-        )
-        for scan in scans
-    ]
+    columns = []
+    for scan in scans:
+        series = [
+            Series(("room",), np.array(scan.room), np.full(2, most), "grid", "area"),
+            Series(("the model itself",), scan.values, scan.nominal_mm_s, "measured"),
+            Series(("10th percentile",), scan.values, scan.quantile_mm_s, "after"),
+        ]
+        across = Axis(f"{scan.name}, room {scan.room[0]:.4g} to {scan.room[1]:.4g} {scan.unit}".rstrip())
+        columns.append(Column([Panel(series, across, Axis("speed, mm/s", (0.0, most)), [("x", scan.at, "")])]))
     return Chart(columns, keys, "Speed over each parameter of the gait, the others unchanged", height=200)
 
 
@@ -54,13 +46,12 @@ def front_chart(found: Front, chosen_mm_s: tuple[float, float]) -> Chart:
 
 def distribution_chart(optimum: Optimum, others: Mapping[str, np.ndarray]) -> Chart:
     """Speeds over the draws that the search never met; `others`: those of further gaits on the same draws."""
-    top = max(optimum.speeds_mm_s.max(), *(speeds.max() for speeds in others.values()), 1.0)
+    shown = {"this gait": optimum.speeds_mm_s, **others}
+    top = max(1.0, *(speeds.max() for speeds in shown.values()))
     bins = np.linspace(0.0, 1.05 * top, _BINS)
     series: list[Series] = []
     keys = []
-    for name, speeds, color in zip(
-        ("this gait", *others), (optimum.speeds_mm_s, *others.values()), ("after", "quiet", "before"), strict=False
-    ):
+    for (name, speeds), color in zip(shown.items(), ("after", "quiet", "before"), strict=False):
         label = f"{name}: 10th percentile {np.quantile(speeds, 0.1):.1f} mm/s"
         style = "steps" if series else "area"
         series.append(Series((label,), bins, np.append(np.histogram(speeds, bins)[0], 0), color, style))
