@@ -11,14 +11,9 @@ from typing import TYPE_CHECKING, Any
 from bifa.version import __version__
 
 _WHERE = {  # imported when first asked for: a command waits only for what it uses
-    "load_dataset": ("bifa.notebook", "load_dataset"),
-    "Robot": ("bifa.notebook", "Robot"),
-    "connect": ("bifa.notebook", "connect"),
-    "Gait": ("bifa.robot.gait", "Gait"),
-    "BASELINE": ("bifa.robot.gait", "BASELINE"),
-    "load_gait": ("bifa.robot.gait", "load_gait"),
-    "save_gait": ("bifa.robot.gait", "save_gait"),
-    "BifaError": ("bifa.errors", "BifaError"),
+    **dict.fromkeys(("load_dataset", "Robot", "connect"), "bifa.notebook"),
+    **dict.fromkeys(("Gait", "BASELINE", "load_gait", "save_gait"), "bifa.robot.gait"),
+    "BifaError": "bifa.errors",
 }
 __all__ = ["__version__", *_WHERE]
 
@@ -36,8 +31,7 @@ if TYPE_CHECKING:  # the same, for those who read types
 def __getattr__(name: str) -> Any:
     if name not in _WHERE:
         raise AttributeError(f"bifa has no {name}; it has {', '.join(_WHERE)}")
-    module, attribute = _WHERE[name]
-    return getattr(import_module(module), attribute)
+    return getattr(import_module(_WHERE[name]), name)
 
 
 def __dir__() -> list[str]:
