@@ -1,13 +1,14 @@
 """What commands print: text from files is text."""
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.table import Table
 from typer.testing import CliRunner
 
 from bifa.cli import app
-from bifa.robot import nominal, save_model
+from bifa.robot import BASELINE, nominal, save_gait, save_model
 from bifa.screen import Console, Countdown, warning, words
 
 NAMES = ["[/x]", "[link=https://evil.example]here[/link]", "[red]", "[bold]x[/bold]", ":warning:", "a\\[b"]
@@ -39,12 +40,8 @@ def test_no_markup_is_obeyed_wherever_it_stands(name):
 @pytest.mark.parametrize("name", ["[/x]", "[link=https://evil.example]m[/link]"])
 @pytest.mark.parametrize("command", [("simulate", "--paper"), ("simulate",)])
 def test_a_model_may_be_called_anything(tmp_path, name, command):
-    from dataclasses import replace
-
     save_model(tmp_path / "m.toml", replace(nominal(), name=name))
-    (tmp_path / "g.toml").write_text(
-        "period_s = 5.7\npsi12_deg = 270\npsi13_deg = 90\nduty_body = 0.5\nduty_head = 0.5\nduty_tail = 0.5\n"
-    )
+    save_gait(tmp_path / "g.toml", BASELINE)
     arguments = [*command, "--model", str(tmp_path / "m.toml")]
     arguments += ["--gait", str(tmp_path / "g.toml")] if len(command) == 1 else []
     result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"}, catch_exceptions=False)

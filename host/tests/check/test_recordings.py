@@ -12,29 +12,26 @@ from bifa.data import EXPERIMENTS, Dataset, write_dataset
 from bifa.files import TargetError
 from harness.data_sets import make_dataset, make_trial
 
+from .days import mistaken, with_columns
+
 
 def sound() -> Dataset:
     """Three repeats of every experiment, pressures as commanded."""
     trials = []
     for trial in make_dataset(repeats=3).trials:
-        columns = dict(trial.columns)
-        for name in columns:
-            if name.startswith("pressure"):
-                columns[name] = (trial.pressure_psi or 0.0) + 0.01 * np.sin(np.arange(len(trial.time_s)))
-        trials.append(replace(trial, columns=columns, session_order=len(trials)))
+        psi = (trial.pressure_psi or 0.0) + 0.01 * np.sin(np.arange(len(trial.time_s)))
+        pressures = {name: psi for name in trial.columns if name.startswith("pressure")}
+        trials.append(replace(with_columns(trial, **pressures), session_order=len(trials)))
     return replace(make_dataset(), trials=tuple(trials))
 
 
 def damaged(file: str, **columns) -> list:
     """The findings after some columns of one file were changed by a function of the values."""
-    dataset = sound()
-    trials = [
-        replace(t, columns={**t.columns, **{name: f(t.columns[name].copy()) for name, f in columns.items()}})
-        if t.file == file
-        else t
-        for t in dataset.trials
-    ]
-    return check_recordings(replace(dataset, trials=tuple(trials)))
+
+    def change(trial):
+        return with_columns(trial, **{name: f(trial.columns[name].copy()) for name, f in columns.items()})
+
+    return check_recordings(mistaken(sound(), file, change))
 
 
 def put(start, stop, value):
@@ -103,15 +100,12 @@ def test_an_actuator_that_vacuum_draws_in_begins_where_it_should():
 
 def test_missing_repeats_and_experiments():
     dataset = sound()
-    kept = [t for t in dataset.trials if t.experiment != "anchor_pull" and t.file != "locomotion_2.csv"]
-    kept = [t for t in kept if t.file not in ("step_response_2.csv", "step_response_3.csv")]
-    kept = [replace(t, pressure_psi=3.0) if t.experiment == "static_loading" else t for t in kept]
-    kept = [
-        replace(t, columns={**t.columns, "pressure_psi": t.columns["pressure_psi"] + 3.0})
-        if t.experiment == "static_loading"
-        else t
-        for t in kept
-    ]
+    absent = ("locomotion_2.csv", "step_response_2.csv", "step_response_3.csv")
+    kept = [t for t in dataset.trials if t.experiment != "anchor_pull" and t.file not in absent]
+    for place, trial in enumerate(kept):
+        if trial.experiment == "static_loading":
+            pressed = with_columns(trial, pressure_psi=trial.columns["pressure_psi"] + 3.0)
+            kept[place] = replace(pressed, pressure_psi=3.0)
     texts = [str(found) for found in check_recordings(replace(dataset, trials=tuple(kept)))]
     assert len(texts) == 4
     assert "step response, small, 8.5 psi: repeat 2, 3 is missing; no noise floor can be estimated" in texts[0]

@@ -11,20 +11,14 @@ DISPLACEMENTS = ("displacement_head_mm", "displacement_tail_mm")
 PAIRS = [("body", "head"), ("head", "tail"), ("body", "tail")]
 
 
-def test_a_camera_whose_axis_points_backwards(any_day):
+@pytest.mark.parametrize(
+    "change",
+    [turned(*DISPLACEMENTS), lambda trial: head_only(turned("displacement_head_mm")(trial)), exchanged(*DISPLACEMENTS)],
+    ids=["the camera's axis points backwards", "so it does and tracks the head only", "head and tail are exchanged"],
+)
+def test_a_walk_that_is_mirrored(any_day, change):
     for trial in any_day.of("locomotion"):
-        assert said(mistaken(any_day, trial.file, turned(*DISPLACEMENTS))) == [("mirrored", trial.file)]
-
-
-def test_a_camera_that_tracks_the_head_only(any_day):
-    for trial in any_day.of("locomotion"):
-        wrong = mistaken(any_day, trial.file, lambda t: head_only(turned("displacement_head_mm")(t)))
-        assert said(wrong) == [("mirrored", trial.file)]
-
-
-def test_head_and_tail_exchanged(any_day):
-    for trial in any_day.of("locomotion"):
-        assert said(mistaken(any_day, trial.file, exchanged(*DISPLACEMENTS))) == [("mirrored", trial.file)]
+        assert said(mistaken(any_day, trial.file, change)) == [("mirrored", trial.file)]
 
 
 @pytest.mark.slow

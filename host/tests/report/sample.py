@@ -9,7 +9,7 @@ from bifa.campaign.page import campaign_page
 from bifa.report.evidence import BASE, COMPLETED
 from bifa.report.walks import MEASURED, Walk
 from bifa.robot import nominal, save_model
-from bifa.robot.gait import BASELINE, save_gait
+from bifa.robot.gait import BASELINE, Gait, save_gait
 
 EFFECT = {
     "name": "hysteresis",
@@ -97,14 +97,7 @@ PREDICTION_ERRORS = [
     for trials in ("fitted", "held-out")
 ]
 LABELS = {"static_large_0psi_2mm_s_1.csv": "static loading, large, 0 psi, 2 mm/s (run 1)"}
-_GAIT = {
-    "period_s": 2.8,
-    "psi12_deg": 204.5,
-    "psi13_deg": 331.7,
-    "duty_body": 0.6535,
-    "duty_head": 0.44,
-    "duty_tail": 0.4,
-}
+_GAIT = Gait(2.8, 204.5, 331.7, 0.6535, 0.44, 0.4).as_dict()
 ROUNDS = [
     {
         "effects": ["hysteresis"],
@@ -155,18 +148,11 @@ def columns(period_s, cycles=14, speed_mm_s=10.0):
 
 def walks():
     """One of each gait, the base model 2 % slow."""
-    return {
-        name: Walk(
-            f"{name} gait",
-            period_s,
-            {
-                MEASURED: columns(period_s, speed_mm_s=speed),
-                COMPLETED: columns(period_s, speed_mm_s=speed),
-                BASE: columns(period_s, speed_mm_s=0.98 * speed),
-            },
-        )
-        for name, period_s, speed, _ in _GAITS
-    }
+    found = {}
+    for name, period_s, speed, _ in _GAITS:
+        true, slow = (columns(period_s, speed_mm_s=share * speed) for share in (1.0, 0.98))
+        found[name] = Walk(f"{name} gait", period_s, {MEASURED: true, COMPLETED: true, BASE: slow})
+    return found
 
 
 def traces():
