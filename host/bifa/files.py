@@ -33,22 +33,20 @@ def check_targets(
     same command reads, are not replaced, and no two targets are the same place.
     """
     read = {path.resolve() for path in inputs if path is not None}
-    _refuse_same(files, folders)
-    for path in files:
-        if path is None:
-            continue
+    targets, made = ([path for path in paths if path is not None] for paths in (files, folders))
+    _refuse_same(targets, made)
+    for path in targets:
+        parent = path.resolve().parent
         if path.is_dir():
             raise TargetError(f"{path} is a folder; name a file in it")
-        if not path.resolve().parent.is_dir():
-            raise TargetError(f"the folder {path.resolve().parent} does not exist; create it first")
+        if not parent.is_dir():
+            raise TargetError(f"the folder {parent} does not exist; create it first")
         if path.resolve() in read:
             raise TargetError(f"{path} is an input of this command; choose another file for its output")
-        if path.exists() and (path.resolve().parent / "dataset.toml").exists():
+        if path.exists() and (parent / "dataset.toml").exists():
             raise TargetError(f"{path} belongs to a data set, which is never overwritten; choose another place")
-        _check_writable(path if path.exists() else path.resolve().parent, path)
-    for path in folders:
-        if path is None:
-            continue
+        _check_writable(path if path.exists() else parent, path)
+    for path in made:
         there = path.resolve()
         while not there.exists():
             there = there.parent
@@ -57,14 +55,13 @@ def check_targets(
         _check_writable(there, path)
 
 
-def _refuse_same(files: tuple[Path | None, ...], folders: tuple[Path | None, ...]) -> None:
-    taken: set[Path] = set()
-    for file in (path.resolve() for path in files if path is not None):
-        if file in taken:
+def _refuse_same(files: list[Path], folders: list[Path]) -> None:
+    taken = [path.resolve() for path in files]
+    for file in taken:
+        if taken.count(file) > 1:
             raise TargetError(f"{file} is used for two outputs; choose different paths")
-        taken.add(file)
     for path in folders:
-        if path is not None and path.resolve() in taken:
+        if path.resolve() in taken:
             raise TargetError(f"{path} is used for both a file and a folder; choose different paths")
 
 

@@ -62,6 +62,15 @@ def _taken(path: Path, folder: Path) -> IO[str]:
         file.close()  # whoever held it has just removed it: there is another now, or none
 
 
+def _hold(file: IO[str]) -> bool:
+    """Whether `file` is now held by this program."""
+    try:
+        _lock(file)
+    except OSError:
+        return False
+    return True
+
+
 def _who() -> dict[str, object]:
     return {
         "pid": os.getpid(),
@@ -82,22 +91,12 @@ def _words(text: str) -> str:
 if sys.platform == "win32":
     import msvcrt
 
-    def _hold(file: IO[str]) -> bool:
-        """Whether `file` is now held by this program."""
+    def _lock(file: IO[str]) -> None:
         file.seek(_FARTHEST)
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 
 else:
     import fcntl
 
-    def _hold(file: IO[str]) -> bool:
-        """Whether `file` is now held by this program."""
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return False
-        return True
+    def _lock(file: IO[str]) -> None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

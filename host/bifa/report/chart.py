@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Series:
-    """Values y over x, arrays of shape (n,). `color`: a role of the palette (`style.Palette.colors`).
+    """Values y over x, arrays of shape (n,). `color`: a role of `style.LIGHT`.
 
     keys: the entries of the legend that it belongs to; it is drawn while all of them are switched on.
     style: "line", "dashed", "dotted", "dots", "steps" (each y holds until the next) or "area"

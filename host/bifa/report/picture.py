@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 
 _PER_INCH = 75.0  # of a chart's pixels
-_COLORS = LIGHT.colors()
 _DASHES: dict[str, Literal["--", ":"]] = {"dashed": "--", "dotted": ":"}
 
 
@@ -64,9 +63,9 @@ def draw_chart(chart: Chart, path: Path, width_in: float = 9.6) -> None:
 
 def _draw(axis: Axes, panel: Panel) -> None:
     for series in panel.series:
-        _draw_series(axis, series, _COLORS[series.color])
+        _draw_series(axis, series, LIGHT[series.color])
     for along, place, label in panel.rules:
-        (axis.axvline if along == "x" else axis.axhline)(place, color=LIGHT.ink, linestyle=":", linewidth=1.0)
+        (axis.axvline if along == "x" else axis.axhline)(place, color=LIGHT["ink"], linestyle=":", linewidth=1.0)
         where = {"x": (place, 0.97, axis.get_xaxis_transform()), "y": (0.5, place, axis.get_yaxis_transform())}[along]
         side: dict[str, Any] = {"ha": "left", "va": "top"} if along == "x" else {"ha": "center", "va": "bottom"}
         axis.text(*where[:2], label, transform=where[2], fontsize=8, **side)
@@ -106,7 +105,7 @@ def _handle(key: Key) -> Artist:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    color = _COLORS[key.color]
+    color = LIGHT[key.color]
     if key.style == "area":
         return Patch(color=color, label=key.label)
     form: dict[str, Any] = (

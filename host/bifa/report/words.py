@@ -8,12 +8,6 @@ from collections.abc import Mapping
 from bifa.effects import library
 from bifa.robot.parameters import BASE_PARAMETERS
 
-_EXPERIMENTS = {
-    "static_loading": "static loading",
-    "step_response": "step response",
-    "anchor_pull": "anchor pull",
-    "locomotion": "walk",
-}
 # What an effect's numbers say in a phrase; one without a phrase has them listed with their meanings.
 _PHRASES = {
     "area_variation": "{slope} over the stroke",
@@ -64,7 +58,7 @@ def plain(value: float, digits: int = 3) -> str:
 
 def experiment_words(name: str) -> str:
     """ "static_loading" is "static loading"; a walk is a walk."""
-    return _EXPERIMENTS.get(name, name.replace("_", " "))
+    return "walk" if name == "locomotion" else name.replace("_", " ")
 
 
 def channel_words(name: str) -> str:
@@ -137,8 +131,6 @@ def spoken(text: str, labels: Mapping[str, str] | None = None) -> str:
 
 
 def _said(name: str) -> str:
-    if name in _EXPERIMENTS:
-        return experiment_words(name)
     if name in BASE_PARAMETERS or name in library():
         return parameter_words(name)
     return channel_words(name)

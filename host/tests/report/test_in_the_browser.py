@@ -236,7 +236,7 @@ def test_on_paper_nothing_is_cut_off_and_no_table_is_split(opened, tmp_path):
         page.pdf(path=tmp_path / "page.pdf", width="210mm", height=f"{height_mm}mm")
         printed = page.evaluate("window.onPaper")
         assert printed["widest"] <= 700, "wider than what A4 leaves"
-        assert printed["ink"] == LIGHT.ink, "dark on white, whatever the screen's scheme"
+        assert printed["ink"] == LIGHT["ink"], "dark on white, whatever the screen's scheme"
         sheets = pages_of(tmp_path / "page.pdf")
         for rows in tables:
             on = [{number for number, sheet in enumerate(sheets) if row in sheet} for row in rows]

@@ -146,7 +146,7 @@ def test_every_plot_is_in_the_page_and_json_cannot_end_its_element(html):
 
 def test_a_chamber_s_color_is_nobody_else_s():
     for palette in (LIGHT, DARK):
-        others = {role: color for role, color in palette.colors().items() if role not in CHAMBER_COLORS}
+        others = {role: color for role, color in palette.items() if role not in CHAMBER_COLORS}
         assert not set(others.values()) & set(CHAMBER_COLORS.values())
 
 
