@@ -23,8 +23,7 @@ _DUTIES = {chamber: f"duty_{chamber}" for chamber in CHAMBERS}
 
 def check_gait(trial: Trial, walks: Sequence[Trial] = ()) -> Iterator[Finding]:
     """A gait that the commands contradict; `walks`, others of the day, may have the gait that they fit."""
-    commands = {f"command_{c}": trial.columns[f"command_{c}"] for c in CHAMBERS}
-    seen = seen_gait(trial, commands)
+    seen = seen_gait(trial, trial.columns)
     wrong = contradicted(trial.walked, seen)
     if wrong:
         values = ", ".join(f"{name} = {_written(name, seen[name])}" for name in wrong)

@@ -76,9 +76,8 @@ def _exchange_finding(trial: Trial, exchange: Exchange, shares: np.ndarray) -> F
         f"command_{chamber} {_percent(row, chamber)} %)"
     )
     names = " and ".join(exchange)
-    commands = {f"command_{c}": trial.columns[f"command_{c}"] for c in CHAMBERS}
-    renamed = commands | {f"command_{c}": commands[f"command_{other}"] for c, other in exchange.items()}
-    if _fits(trial, commands) or not _fits(trial, renamed):
+    renamed = {f"command_{c}": trial.columns[f"command_{exchange.get(c, c)}"] for c in CHAMBERS}
+    if _fits(trial, trial.columns) or not _fits(trial, renamed):
         what = f"the pressures' columns, sensors or tubes of {names} are exchanged: trace the tubes, rename the columns"
     else:
         what = f"the command columns of {names} are exchanged, as the gait says too: rename them"

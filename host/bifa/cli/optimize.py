@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +14,6 @@ from bifa.files import named
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from bifa.gait import Settings
     from bifa.gait.pool import Simulations
     from bifa.gait.search import Optimum
     from bifa.robot import Model
@@ -70,12 +68,12 @@ def optimize(
     By default the 10th percentile of the speed over the model's uncertainty is maximised, since the fastest nominal
     gait, which may not slip, collapses under a 1 % change. Pictures go to a folder next to the gait file by default.
     """
-    from bifa.files import check_targets
+    from bifa.files import check_targets, written_into
 
     folder = pictures or pictures_beside(out)
     check_targets(out, folders=() if no_pictures else (folder,), inputs=(model, *(begin or ())))
 
-    from bifa.screen import Console
+    from bifa.screen import Console, warning
 
     console = Console()
     with ExitStack() as open_until_the_end:
@@ -93,12 +91,29 @@ def optimize(
             ]
             tls = cluster.Tls(dask_ca, dask_cert, dask_key)
             pool = open_until_the_end.enter_context(simulations(dask, tls=tls))
-        best = _best(console, partial(optimize, robot, pool), settings)
+        optima = []
+        for one in settings:
+            with search_progress(console) as progress:
+                found = optimize(robot, pool, one, progress(f"seed {one.seed}"))
+            console.print(
+                f"seed {one.seed}: {found.nominal_mm_s:.2f} mm/s on the model, 10th percentile "
+                f"{found.quantile_mm_s:.2f} mm/s; {found.evaluations} gaits, {found.simulations} simulations"
+            )
+            if found.doubt:
+                console.print(warning(str(found.doubt)))
+            optima.append(found)
+        best = max(optima, key=lambda o: o.quantile_mm_s if robust else o.nominal_mm_s)
         save_gait(out, best.gait, provenance(best, robot.name, "bifa optimize"))
         console.print(_summary(best))
         console.print(f"gait: {out}")
-        if not no_pictures:
-            _explain(console, robot, pool, best, folder)
+        if no_pictures:
+            return
+        what = "pictures: what changed and why, sensitivity, front, distribution"
+        with console.status(what), written_into(folder) as aside:
+            reasons = _pictures(robot, pool, best, aside)
+        for sentence in reasons:
+            console.print(f"- {sentence}")
+        console.print(f"pictures: {folder}")
 
 
 def pictures_beside(out: Path) -> Path:
@@ -107,36 +122,6 @@ def pictures_beside(out: Path) -> Path:
     folder = out.with_suffix("")
     taken = folder == out or (folder / "dataset.toml").exists()
     return out.with_name(f"{folder.name}-pictures") if taken else folder
-
-
-def _best(console: "Console", search: "Callable[..., Optimum]", settings: "list[Settings]") -> "Optimum":
-    """The best optimum of one search after another, each with its line."""
-    from bifa.screen import warning
-
-    optima = []
-    for one in settings:
-        with search_progress(console) as progress:
-            optima.append(search(one, progress(f"seed {one.seed}")))
-        found = optima[-1]
-        console.print(
-            f"seed {one.seed}: {found.nominal_mm_s:.2f} mm/s on the model, 10th percentile "
-            f"{found.quantile_mm_s:.2f} mm/s; {found.evaluations} gaits, {found.simulations} simulations"
-        )
-        if found.doubt:
-            console.print(warning(str(found.doubt)))
-    return max(optima, key=lambda o: o.quantile_mm_s if o.settings.robust else o.nominal_mm_s)
-
-
-def _explain(console: "Console", robot: "Model", pool: "Simulations", best: "Optimum", folder: Path) -> None:
-    """Draw the pictures into `folder` and print why the gait is faster."""
-    from bifa.files import written_into
-
-    what = "pictures: what changed and why, sensitivity, front, distribution"
-    with console.status(what), written_into(folder) as aside:
-        reasons = _pictures(robot, pool, best, aside)
-    for sentence in reasons:
-        console.print(f"- {sentence}")
-    console.print(f"pictures: {folder}")
 
 
 @contextmanager

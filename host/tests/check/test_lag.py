@@ -13,6 +13,8 @@ from virtual_robot.effects import EFFECTS, plant_parameters
 from virtual_robot.sealed import plans, specimen
 from virtual_robot.trials import Lab
 
+from .days import head_only, with_columns
+
 
 def recorded(*experiments, **effects):
     """Steps and walks of a robot with these effects, sizes as factors of their modest ones."""
@@ -34,11 +36,9 @@ def session():
 
 def late(trial, late_s):
     """The same trial, its displacement stamped so much late."""
-    columns = dict(trial.columns)
-    for name in columns:
-        if name.startswith("displacement"):
-            columns[name] = CubicSpline(trial.time_s, columns[name])(np.clip(trial.time_s - late_s, 0.0, None))
-    return replace(trial, columns=columns)
+    at = np.clip(trial.time_s - late_s, 0.0, None)
+    moved = {n: CubicSpline(trial.time_s, v)(at) for n, v in trial.columns.items() if n.startswith("displacement")}
+    return with_columns(trial, **moved)
 
 
 def findings(trials):
@@ -54,8 +54,7 @@ def test_a_shift_is_measured_to_a_millisecond(session, late_s):
 
 def test_a_walk_of_which_only_the_head_was_tracked_tells_it_too(session):
     for trial in session:
-        columns = {name: values for name, values in trial.columns.items() if name != "displacement_tail_mm"}
-        lag = displacement_lag(late(replace(trial, columns=columns), -0.01))
+        lag = displacement_lag(late(head_only(trial), -0.01))
         assert lag.late_s == pytest.approx(-0.01, abs=1.2e-3)
 
 
