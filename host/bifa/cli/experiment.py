@@ -174,6 +174,8 @@ def _run(
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
+    # No part of a walk's condition, but a session can only be resumed with the same number.
+    cycles = max(trial.cycles for trial in trials)
     errors: list[float] = []
     with open_rig(port, **options) as rig:
         hands = at_desk(console, watch, bench)[1] if rig.instruments is None else None
@@ -194,7 +196,7 @@ def _run(
                 trials,
                 name=f"{name} on the bench",
                 known=known_of(rig, known),
-                provenance=provenance("bifa experiment", port, options | _length_of_walks(trials)),
+                provenance=provenance("bifa experiment", port, options | ({"cycles": cycles} if cycles else {})),
                 record=hands,
                 on_event=on_event,
             )
@@ -205,13 +207,6 @@ def _run(
             f"Instruments and Uno synchronised to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
         )
     console.print(f"Next: bifa check {out}, then bifa fit {out} --out model.toml")
-
-
-def _length_of_walks(trials: "Sequence[PlannedTrial]") -> dict[str, int]:
-    """The number of cycles, which is not part of a walk's condition: a session can only be resumed with the same
-    one."""
-    cycles = [trial.cycles for trial in trials if trial.cycles]
-    return {"cycles": cycles[0]} if cycles else {}
 
 
 def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":

@@ -17,10 +17,6 @@ EXAMPLES = (
 )
 
 
-class RigOptionError(BifaError):
-    """An option of `bifa rig` cannot be understood."""
-
-
 def rig(
     profile: Annotated[Profile, PROFILE] = "ideal",
     effect: Annotated[
@@ -51,7 +47,7 @@ def rig(
     from bifa.screen import Console
 
     if not hasattr(os, "openpty"):
-        raise RigOptionError("bifa rig serves a pseudo-terminal, which needs Linux or macOS (on Windows: WSL)")
+        raise BifaError("bifa rig serves a pseudo-terminal, which needs Linux or macOS (on Windows: WSL)")
     for ending in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(ending, signal.default_int_handler)  # a closed terminal ends as cleanly as Ctrl-C
     check_targets(eeprom)
@@ -76,9 +72,9 @@ def _effect(text: str) -> tuple[str, dict[str, float]]:
     try:
         values = {key: float(value) for key, value in (part.split("=") for part in rest.split(",") if part)}
     except ValueError:
-        raise RigOptionError(f"--effect {text}: write NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE") from None
+        raise BifaError(f"--effect {text}: write NAME or NAME:PARAMETER=VALUE,PARAMETER=VALUE") from None
     if not all(map(math.isfinite, values.values())):
-        raise RigOptionError(f"--effect {text}: a value is not a finite number")
+        raise BifaError(f"--effect {text}: a value is not a finite number")
     return name, values
 
 

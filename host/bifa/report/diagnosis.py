@@ -89,26 +89,20 @@ def found_sentences(effects: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def further(record: Mapping[str, Any], labels: Labels | None = None) -> list[ChartedSection]:
     """What is left, what else was tried, what to heed and what to measure next: only what there is."""
-    sections = []
-    if record["learnt"]:
-        said = [f"Added to the model: {curve['term']}, a curve over {curve['variable']}." for curve in record["learnt"]]
-        sections.append(
-            ChartedSection("Learnt from the data", said, charts=[learnt_chart(c) for c in record["learnt"]])
-        )
-    if record["effects"]:
-        sections.append(ChartedSection("What the named effects leave", (spoken(record["remainder"]["text"], labels),)))
-    if base := base_table(record):
-        sections.append(ChartedSection("Parameters of the base model", tables=(base,)))
-    if tried := nearest_table(record):
-        sections.append(ChartedSection("Also tried", tables=(tried,)))
-    if record["warnings"]:
-        sections.append(ChartedSection("Before you believe it", [spoken(line, labels) for line in record["warnings"]]))
-    if record["not_detectable_here"]:
-        hidden = ", ".join(effect_words(name) for name in record["not_detectable_here"])
-        sections.append(ChartedSection("Not detectable in this data", (f"{hidden}.",)))
-    if record["next_experiment"]["experiment"]:
-        sections.append(ChartedSection("Next experiment", (next_sentence(record["next_experiment"]),)))
-    return sections
+    learnt, coming = record["learnt"], record["next_experiment"]
+    said = [f"Added to the model: {curve['term']}, a curve over {curve['variable']}." for curve in learnt]
+    left = [spoken(record["remainder"]["text"], labels)] if record["effects"] else []
+    hidden = ", ".join(effect_words(name) for name in record["not_detectable_here"])
+    sections = (
+        ChartedSection("Learnt from the data", said, charts=[learnt_chart(curve) for curve in learnt]),
+        ChartedSection("What the named effects leave", left),
+        ChartedSection("Parameters of the base model", tables=base_table(record)),
+        ChartedSection("Also tried", tables=nearest_table(record)),
+        ChartedSection("Before you believe it", [spoken(line, labels) for line in record["warnings"]]),
+        ChartedSection("Not detectable in this data", [f"{hidden}."] if hidden else []),
+        ChartedSection("Next experiment", [next_sentence(coming)] if coming["experiment"] else []),
+    )
+    return [section for section in sections if section.paragraphs or section.tables]
 
 
 def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> PageTable:
@@ -127,14 +121,14 @@ def effects_table(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Any]
     return PageTable(columns, rows or [["no effect", *[""] * (len(columns) - 1)]])
 
 
-def base_table(record: Mapping[str, Any]) -> PageTable | None:
+def base_table(record: Mapping[str, Any]) -> list[PageTable]:
     """The base model's parameters, fitted together with the named effects; none where the data remain unexplained."""
     rows = []
     for name, one in record["base_parameters"].items():
         if name in BASE_PARAMETERS:  # not the coefficients of a curve's shape
             ends = "" if None in one["interval_90"] else " to ".join(plain(end, 4) for end in one["interval_90"])
             rows.append((parameter_words(name), plain(one["value"], 4), ends, BASE_PARAMETERS[name].unit))
-    return PageTable(("", "value", "90 % interval", "unit"), rows) if rows else None
+    return [PageTable(("", "value", "90 % interval", "unit"), rows)] if rows else []
 
 
 def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
@@ -143,13 +137,13 @@ def _sized(effect: Mapping[str, Any], key: str, unit: str) -> tuple[str, str]:
     return quantity(value, unit, 3), ends
 
 
-def nearest_table(record: Mapping[str, Any]) -> PageTable | None:
-    """Explanations that were not chosen, and what each would close."""
+def nearest_table(record: Mapping[str, Any]) -> list[PageTable]:
+    """Explanations that were not chosen, and what each would close; no table where there are none."""
     rows = [
         (" and ".join(effect_words(name) for name in near["effects"]), _percent(near["share_of_gap"]))
         for near in sorted(record["nearest"], key=lambda near: -(near["share_of_gap"] or 0.0))
     ]
-    return PageTable(("explanation", "of the gap that it alone would close"), rows) if rows else None
+    return [PageTable(("explanation", "of the gap that it alone would close"), rows)] if rows else []
 
 
 def _percent(share: float | None) -> str:
