@@ -74,7 +74,7 @@ def monitor(
                 from bifa.live.web.flights import fly
                 from bifa.live.web.pilot import Pilot
                 from bifa.live.web.server import LivePage, served
-                from bifa.report.live_page import live_page
+                from bifa.report.page import live_page
 
                 pilot = Pilot()
                 page = LivePage(pilot, live_page(), robot)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from bifa.robot import Gait, Model
     from bifa.screen import Console
-    from bifa.simulate import Advance, SimulatedTrial, Supports
+    from bifa.simulate import Advance, Supports
     from bifa.simulate.terrain import Obstacle as Obstacle_
 
 
@@ -79,7 +79,18 @@ def simulate(
         _print_paper(console, chosen if model else None, file.gait if gait else None)
         return
     chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
-    record, speed_mm_s = _walk(console, chosen, file.gait, cycles, inclination, obstacle, buckling)
+    with console.status("simulating"):
+        from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
+
+        ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
+        place: dict[str, Any] = {"inclination_deg": inclination}
+        if ahead:
+            place["terrain"] = terrain(ahead, supports)
+        record = walk(chosen, file.gait, cycles, **place)
+        progress = speeds(chosen, gait_rows([file.gait]), cycles, 1e-6, **place)
+    _print_walk(console, chosen, file.gait, progress)
+    if ahead:
+        _print_passing(console, chosen, file.gait, ahead, supports, inclination)
     if not (obstacle or inclination):
         _print_prediction(console, chosen, file.gait)
     if out:
@@ -88,35 +99,10 @@ def simulate(
     if pictures:
         from bifa.report.walks import SIMULATED, Walk, draw_walks
 
-        title = f"{chosen.name}, {speed_mm_s:.1f} mm/s"
+        title = f"{chosen.name}, {progress.speed_mm_s[0]:.1f} mm/s"
         with written_into(pictures) as aside:
             draw_walks([Walk(title, file.gait.period_s, {SIMULATED: record.columns})], aside / "walk.png")
         console.print(f"picture: {pictures / 'walk.png'}")
-
-
-def _walk(
-    console: "Console",
-    model: "Model",
-    gait: "Gait",
-    cycles: int,
-    inclination: float,
-    obstacle: Obstacle | None,
-    buckling: float,
-) -> "tuple[SimulatedTrial, float]":
-    """Simulate and print the walk; its record, and the speed of the last cycle in mm/s."""
-    with console.status("simulating"):
-        from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
-
-        ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
-        place: dict[str, Any] = {"inclination_deg": inclination} | (
-            {"terrain": terrain(ahead, supports)} if ahead else {}
-        )
-        record = walk(model, gait, cycles, **place)
-        progress = speeds(model, gait_rows([gait]), cycles, 1e-6, **place)
-    _print_walk(console, model, gait, progress)
-    if ahead:
-        _print_passing(console, model, gait, ahead, supports, inclination)
-    return record, float(progress.speed_mm_s[0])
 
 
 def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Advance") -> None:

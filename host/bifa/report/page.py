@@ -1,4 +1,4 @@
-"""The engine's page with plots that can be zoomed and an animation; no network, and no other file."""
+"""Pages without network or other files: the engine's with plots that zoom and an animation, and the live page."""
 
 from __future__ import annotations
 
@@ -13,13 +13,23 @@ import jinja2
 from markupsafe import Markup
 
 from bifa.files import write_text
+from bifa.link.table import CHAMBERS
 from bifa.report.chart import Chart
 from bifa.report.plot import as_plot, library_script
 from bifa.report.style import PALETTES
 from lacuna.report import page as engine
 from lacuna.report.page import Page, PageTable
 
-__all__ = ["ChartedSection", "Motion", "Page", "PageTable", "page_style", "render", "write_page"]
+__all__ = ["ChartedSection", "Motion", "Page", "PageTable", "live_page", "render", "write_page"]
+
+_SLIDERS = (
+    ("period_s", "period", "s", 0.01),
+    ("psi12_deg", "head ahead of the body", "°", 0.5),
+    ("psi13_deg", "tail ahead of the body", "°", 0.5),
+    ("duty_body", "body at vacuum", "of the cycle", 0.005),
+    ("duty_head", "head at vacuum", "of the cycle", 0.005),
+    ("duty_tail", "tail at vacuum", "of the cycle", 0.005),
+)
 
 
 @dataclass(frozen=True)
@@ -45,18 +55,14 @@ def render(page: Page) -> str:
     """The page, whose sections are this module's, as one HTML document; all text is escaped."""
     charts = [chart for section in page.sections if isinstance(section, ChartedSection) for chart in section.charts]
     plots = [as_plot(column, chart.height) for chart in charts for column in chart.columns]
-    return (
-        environment()
-        .get_template("charted.html.jinja")
-        .render(
-            page=page,
-            numbers=iter(range(len(plots))),
-            palettes=PALETTES,
-            data=_embedded({"plots": plots} | PALETTES),
-            style=page_style(),
-            script=template_file("page.js"),
-            library=library_script() if plots else "",
-        )
+    return _template("charted.html.jinja").render(
+        page=page,
+        numbers=iter(range(len(plots))),
+        palettes=PALETTES,
+        data=_embedded({"plots": plots} | PALETTES),
+        style=_style(),
+        script=_file("page.js"),
+        library=library_script() if plots else "",
     )
 
 
@@ -65,18 +71,30 @@ def write_page(page: Page, path: Path) -> None:
     write_text(path, render(page))
 
 
+def live_page() -> str:
+    """The document that `bifa.live.web` serves; what it shows and asks goes to where it came from."""
+    return _template("live.html.jinja").render(
+        palettes=PALETTES,
+        chambers=CHAMBERS,
+        sliders=_SLIDERS,
+        style=_style() + _file("live.css"),
+        script=_file("live.js"),
+        library=library_script(),
+    )
+
+
 @cache
-def environment() -> jinja2.Environment:
-    """Templates of this package and of the engine; all text is escaped."""
-    return engine.environment(jinja2.PackageLoader("bifa.report", "templates"))
+def _template(name: str) -> jinja2.Template:
+    """Of this package or of the engine; all text is escaped."""
+    return engine.environment(jinja2.PackageLoader("bifa.report", "templates")).get_template(name)
 
 
-def page_style() -> Markup:
+def _style() -> Markup:
     """The engine's rules, and those of charts and animations."""
-    return engine.style() + template_file("charts.css")
+    return engine.style() + _file("charts.css")
 
 
-def template_file(name: str) -> Markup:
+def _file(name: str) -> Markup:
     """A file of this package that goes into a page as it is."""
     return Markup(files("bifa.report").joinpath("templates", name).read_text(encoding="utf-8"))
 
