@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,13 +16,14 @@ from markupsafe import Markup
 from bifa.files import write_text
 from bifa.link.table import CHAMBERS
 from bifa.report.chart import Chart
-from bifa.report.plot import as_plot, library_script
+from bifa.report.plot import as_plot
 from bifa.report.style import PALETTES
 from lacuna.report import page as engine
 from lacuna.report.page import Page, PageTable
 
 __all__ = ["ChartedSection", "Motion", "Page", "PageTable", "live_page", "render", "write_page"]
 
+_LIBRARY = ("chart.min.js", "chart-zoom.min.js", "chart-annotation.min.js")  # in this order; versions in their heads
 _SLIDERS = (
     ("period_s", "period", "s", 0.01),
     ("psi12_deg", "head ahead of the body", "°", 0.5),
@@ -61,8 +63,8 @@ def render(page: Page) -> str:
         palettes=PALETTES,
         data=_embedded({"plots": plots} | PALETTES),
         style=_style(),
-        script=_file("page.js"),
-        library=library_script() if plots else "",
+        script=_file("templates/page.js"),
+        library=_library() if plots else "",
     )
 
 
@@ -77,9 +79,9 @@ def live_page() -> str:
         palettes=PALETTES,
         chambers=CHAMBERS,
         sliders=_SLIDERS,
-        style=_style() + _file("live.css"),
-        script=_file("live.js"),
-        library=library_script(),
+        style=_style() + _file("templates/live.css"),
+        script=_file("templates/live.js"),
+        library=_library(),
     )
 
 
@@ -89,14 +91,21 @@ def _template(name: str) -> jinja2.Template:
     return engine.environment(jinja2.PackageLoader("bifa.report", "templates")).get_template(name)
 
 
+@cache
+def _library() -> Markup:
+    """Chart.js, its zoom and its rules, to be put into a page's script element, which they do not end."""
+    source = re.sub(r"//# sourceMappingURL=\S+", "", "\n".join(_file(f"vendor/{name}") for name in _LIBRARY))
+    return Markup(re.sub(r"</(?=script)", r"<\\/", source, flags=re.IGNORECASE))
+
+
 def _style() -> Markup:
     """The engine's rules, and those of charts and animations."""
-    return engine.style() + _file("charts.css")
+    return engine.style() + _file("templates/charts.css")
 
 
 def _file(name: str) -> Markup:
     """A file of this package that goes into a page as it is."""
-    return Markup(files("bifa.report").joinpath("templates", name).read_text(encoding="utf-8"))
+    return Markup(files("bifa.report").joinpath(name).read_text(encoding="utf-8"))
 
 
 def _embedded(value: object) -> Markup:

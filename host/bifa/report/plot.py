@@ -2,26 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from bifa.report.chart import Axis, Column, Series
-
-_LIBRARY = ("chart.min.js", "chart-zoom.min.js", "chart-annotation.min.js")  # in this order; versions in their heads
-
-
-@cache
-def library_script() -> Markup:
-    """Chart.js, its zoom and its rules, to be put into a page's script element, which they do not end."""
-    folder = files("bifa.report").joinpath("vendor")
-    source = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in _LIBRARY)
-    source = re.sub(r"//# sourceMappingURL=\S+", "", source)
-    return Markup(re.sub(r"</(?=script)", r"<\\/", source, flags=re.IGNORECASE))
 
 
 def as_plot(column: Column, height: int) -> list[dict[str, Any]]:
