@@ -47,21 +47,17 @@ def animate_walks(
         top = number * lane_mm
         middle = top + label_mm + _WALL_MM + PIPE_MM / 2
         tail, head = path["tail"] + left, path["head"] + left + LENGTH_MM
-        moves = {
-            "body": _moves(tail, middle, "X", (head - tail) / LENGTH_MM),
-            "tail": _moves(tail, middle, "Y", path["tail_mm"] / PIPE_MM),
-            "head": _moves(head, middle, "Y", path["head_mm"] / PIPE_MM),
+        # of natural size: a browser that stops an animation shows a shape of one unit, enlarged, as a blur
+        parts = {
+            "body": (0.0, LENGTH_MM, _BODY_MM, _moves(tail, middle, "X", (head - tail) / LENGTH_MM)),
+            "tail": (-_END_MM / 2, _END_MM, PIPE_MM, _moves(tail, middle, "Y", path["tail_mm"] / PIPE_MM)),
+            "head": (-_END_MM / 2, _END_MM, PIPE_MM, _moves(head, middle, "Y", path["head_mm"] / PIPE_MM)),
         }
         drawn.append(_lane(label, top + label_mm, width))
-        for part, steps in moves.items():
+        for part, (left_mm, long_mm, tall_mm, steps) in parts.items():
             name = f"walk{number}-{part}"
             rules.append(_keyframes(name, steps, seconds))
-            # of natural size: a browser that stops an animation shows a shape of one unit, enlarged, as a blur
-            box = (
-                f'x="0" width="{LENGTH_MM:g}" y="{-_BODY_MM / 2:g}" height="{_BODY_MM:g}"'
-                if part == "body"
-                else f'x="{-_END_MM / 2:g}" width="{_END_MM:g}" y="{-PIPE_MM / 2:g}" height="{PIPE_MM:g}"'
-            )
+            box = f'x="{left_mm:g}" width="{long_mm:g}" y="{-tall_mm / 2:g}" height="{tall_mm:g}"'
             drawn.append(f'<rect class="{name}" {box} fill="var(--{part})"/>')
     bottom = len(lanes) * lane_mm
     ruler, clock = bottom + 8 * zoom, bottom + ruler_mm + 8 * zoom

@@ -54,15 +54,9 @@ def _column(trial: Record, predictions: Mapping[str, Channels], label: str) -> C
             both.append(Series((model,), *thinned(x, modeled, _MOST), *_LOOKS[model]))
             off.append(Series((model,), *thinned(x, measured - modeled, _MOST), _LOOKS[model][0]))
         unit = unit_of(channel)
-        panels.append(Panel(both, over, Axis(f"{_short(channel)}, {unit}")))
+        panels.append(Panel(both, over, Axis(f"{channel_words(channel).rpartition(' of the ')[2]}, {unit}")))
         panels.append(Panel(off, over, Axis(f"off, {unit}"), height=0.55))
     return Column(panels, label)
-
-
-def _short(channel: str) -> str:
-    words = channel_words(channel)
-    part = words.rpartition(" of the ")[2]
-    return part if part != words else words
 
 
 def _abscissa(trial: Record) -> tuple[np.ndarray, Axis]:
