@@ -265,29 +265,15 @@ def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) 
     return structure.lifted(np.clip(values, lower, upper))
 
 
-def fit_base(
-    system: System, trials: Sequence[Record], *, starts: int = 1, seed: int = 0, max_iterations: int = 30
-) -> Fit:
+def fit_base(system: System, trials: Sequence[Record]) -> Fit:
     """Fit the base model, then take the noise floor again from what repeats differ by in the residual, and refit."""
-    floor = estimate_noise(system, trials)
     structure = Structure(system)
-    first = fit(
-        structure,
-        trials,
-        floor,
-        starts=spread_starts(structure, structure.start(), starts, seed),
-        max_iterations=max_iterations,
-        graduated=True,
-    )
+    first = fit(structure, trials, estimate_noise(system, trials), max_iterations=30, graduated=True)
     sharper = estimate_noise(system, trials, first.residuals())
-    again = fit(structure, trials, sharper, starts=[first.solution.point.values], max_iterations=10)
-    return Fit(again.problem, again.solution, first.starts, first.starts_agreeing)
+    return fit(structure, trials, sharper, starts=[first.solution.point.values], max_iterations=10)
 
 
 def starting_point(fitted: Fit, structure: Structure) -> np.ndarray:
     """The vector of `structure` that continues from `fitted`: what both have in common keeps its value."""
-    return structure.values(structure.theta(structure.start()) | _common(fitted, structure))
-
-
-def _common(fitted: Fit, structure: Structure) -> dict[str, float]:
-    return {name: value for name, value in fitted.theta.items() if name in structure.names}
+    common = {name: value for name, value in fitted.theta.items() if name in structure.names}
+    return structure.values(structure.theta(structure.start()) | common)

@@ -72,14 +72,6 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Steps:
-    """How far derivatives step, in the parameters' units, in the form of a `Point`."""
-
-    structure: np.ndarray
-    nuisances: tuple[np.ndarray, ...]
-
-
-@dataclass(frozen=True)
 class View:
     """How closely residuals are looked at.
 
@@ -116,9 +108,8 @@ class Problem:
         self._grids = [[even_grid(t.time_s[np.isfinite(v)]) for v in t.channels.values()] for t in trials]
         self._prior = structure.prior_precision()
         self._own = [structure.own(t) for t in trials]
-        self._recent: dict[
-            tuple[Any, ...], list[np.ndarray]
-        ] = {}  # residuals: a search begins where the one before ended
+        # residuals by point: a search begins where the one before ended
+        self._recent: dict[tuple[Any, ...], list[np.ndarray]] = {}
         self.sizes = [len(w.keep) for w in self._weighing]  # samples of all channels of each trial
         self._together = _side_by_side(self.trials, structure.system.at_once)
 
@@ -138,16 +129,13 @@ class Problem:
 
     def _scan(self, values: np.ndarray, nuisances: list[np.ndarray], index: int) -> None:
         """Set the effects' own parameters of a trial, the last first, to the best of `_OWN_STARTS` values each."""
-        for k in range(len(self._own[index])):
-            self._scan_one(values, nuisances, index, len(self.nuisances[index]) - k - 1)
-
-    def _scan_one(self, values: np.ndarray, nuisances: list[np.ndarray], index: int, k: int) -> None:
-        parameter = self.nuisances[index][k]
-        tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
-        tried[:, k] = np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False)
-        found = self._simulate([(values, mine) for mine in tried], index, coarse=True)
-        costs = np.sum(self._weigh(found, index) ** 2, axis=1)
-        nuisances[index] = tried[int(np.argmin(costs))]
+        for k in range(-1, -len(self._own[index]) - 1, -1):
+            parameter = self.nuisances[index][k]
+            tried = np.tile(nuisances[index], (_OWN_STARTS, 1))
+            tried[:, k] = np.linspace(parameter.lower, parameter.upper, _OWN_STARTS, endpoint=False)
+            found = self._simulate([(values, mine) for mine in tried], index, coarse=True)
+            costs = np.sum(self._weigh(found, index) ** 2, axis=1)
+            nuisances[index] = tried[int(np.argmin(costs))]
 
     def seen(self, view: View) -> Problem:
         """The same problem looked at in another way."""
@@ -211,29 +199,29 @@ class Problem:
         """Of the structure's vector, shape (P, P); a raised floor makes it weaker in proportion."""
         return self._prior / self.view.raised**2
 
-    def first_steps(self) -> Steps:
-        """A tenth of the largest step."""
+    def first_steps(self) -> Point:
+        """How far derivatives step, in the parameters' units, at first: a tenth of the largest step."""
         share = 0.1 * LARGEST_STEP
-        return Steps(
+        return Point(
             np.maximum(share * self.structure.scales(), self.structure.grains()),
             tuple(np.array([share * p.step_scale for p in ps]) for ps in self.nuisances),
         )
 
-    def tuned_steps(self, steps: Steps, free: Sequence[int], squares: Sequence[np.ndarray]) -> Steps:
+    def tuned_steps(self, steps: Point, free: Sequence[int], squares: Sequence[np.ndarray]) -> Point:
         """Steps that change the residuals by a few standard deviations in all: wide enough to drown the
         integrator's own error, narrow enough for the derivative to be one. `squares`: of each trial the square
         norms of its derivatives, by the free parameters and by its nuisances."""
         scales, p = self.structure.scales(), len(free)
-        structure = steps.structure.copy()
+        structure = steps.values.copy()
         structure[list(free)] = _tuned(sum((s[:p] for s in squares), start=np.zeros(p)), scales[list(free)])
         structure = np.maximum(structure, self.structure.grains())
         nuisances = tuple(
             _tuned(s[p:], np.array([parameter.step_scale for parameter in ps]))
             for s, ps in zip(squares, self.nuisances, strict=True)
         )
-        return Steps(structure, nuisances)
+        return Point(structure, nuisances)
 
-    def jacobians(self, point: Point, free: Sequence[int], steps: Steps) -> list[Sensitivity]:
+    def jacobians(self, point: Point, free: Sequence[int], steps: Point) -> list[Sensitivity]:
         """For each trial the derivatives of its residuals by the parameters `free` and by its nuisances, by absolute
         steps."""
 
@@ -242,25 +230,22 @@ class Problem:
             moving = [k for k, j in enumerate(free) if self.structure.moves(j, self.trials[i])]
             factors = self._factors(i, [free[k] for k in moving])
             stepping = [k for k in range(len(nuisances)) if k not in factors]
-            by_structure = [
-                _stepped(values, free[k], self.structure.parameters[free[k]], steps.structure[free[k]]) for k in moving
-            ]
+            parameters = self.structure.parameters
+            by_structure = [_stepped(values, free[k], parameters[free[k]], steps.values[free[k]]) for k in moving]
             by_nuisance = [_stepped(nuisances, k, self.nuisances[i][k], steps.nuisances[i][k]) for k in stepping]
             moved = [*((v, nuisances) for v, _ in by_structure), *((values, n) for n, _ in by_nuisance)]
             changes = self.changes(i, (values, nuisances), moved, coarse=True)
             changes /= np.array([step for _, step in (*by_structure, *by_nuisance)])[:, None]
             by_parameter = {free[k]: row for k, row in zip(moving, changes, strict=False)}
+            times_slope = self.structure.system.times_slope
             by_factor = [
-                sum(self._by_factor(j, values[j]) * by_parameter[j] for j in of) / nuisances[k]
+                sum(times_slope(parameters[j].name, values[j]) * by_parameter[j] for j in of) / nuisances[k]
                 for k, of in factors.items()
             ]
             felt = [*moving, *(p + k for k in (*stepping, *factors))]
             return Sensitivity.of(np.vstack([changes, *by_factor]), felt, p, len(nuisances))
 
         return in_parallel(of_trial, range(len(self.trials)), self.sizes)
-
-    def _by_factor(self, index: int, value: float) -> float:
-        return self.structure.system.times_slope(self.structure.names[index], value)
 
     def _factors(self, index: int, moving: Sequence[int]) -> dict[int, list[int]]:
         """The nuisances of a trial that are factors of parameters all of which are in `moving`, and of which ones."""
@@ -343,10 +328,7 @@ class Problem:
 
     def _weigh(self, predictions: Sequence[Channels], index: int) -> np.ndarray:
         """Residuals of each prediction of a trial, a row each."""
-        return self._compressed(self._deviations(predictions, index), index)
-
-    def _compressed(self, deviations: np.ndarray, index: int) -> np.ndarray:
-        z, weight = self._looked_at(deviations, index)
+        z, weight = self._looked_at(self._deviations(predictions, index), index)
         limit = self.view.soft_limit * self.view.raised
         return np.arcsinh(z / limit) * (self.view.soft_limit * weight)
 
@@ -403,9 +385,8 @@ class _Weighing(NamedTuple):
         channels = trial.channels
         measured = np.concatenate([*channels.values()])
         weight = np.concatenate([1.0 / floor.sd(trial, c) for c in channels])
-        thinning = np.concatenate(
-            [np.full(v.shape, floor.samples_per_piece(trial, c) ** -0.5) for c, v in channels.items()]
-        )
+        shares = [floor.samples_per_piece(trial, c) ** -0.5 for c in channels]
+        thinning = np.repeat(shares, [v.size for v in channels.values()])
         keep = np.isfinite(measured)
         ends = np.cumsum([np.isfinite(v).sum() for v in channels.values()])[:-1]
         return cls(keep, measured[keep], weight[keep], thinning[keep], ends)

@@ -62,10 +62,6 @@ class Sensitivity:
         """With every residual's derivatives times its own factor, shape (n,)."""
         return self.of(self._rows * factors, self.felt, self.structure, self.nuisances)
 
-    def widened(self, nuisances: int) -> Sensitivity:
-        """With so many more nuisances, which nothing is known of: they stay where they are."""
-        return replace(self, gram=np.pad(self.gram, (0, nuisances)), right=np.pad(self.right, ((0, 0), (0, nuisances))))
-
     def dense(self) -> tuple[np.ndarray, np.ndarray]:
         """By the structure's parameters, shape (n, p), and by the nuisances, shape (n, q)."""
         whole = np.zeros((self.gram.shape[0], self.taken.shape[1]))

@@ -53,14 +53,6 @@ class Solution:
         return [s.dense() for s in self.sensitivities]
 
 
-@dataclass
-class _Linearized:
-    """Blocks of the Gauss-Newton system: structure first, then the trials' nuisances one after the other."""
-
-    normal: np.ndarray
-    gradient: np.ndarray
-
-
 def cost_of(problem: Problem, point: Point) -> float:
     return 0.5 * sum(float(r @ r) for r in problem.residuals(point)) + problem.prior_cost(point)
 
@@ -111,7 +103,7 @@ def solve(
             break
         steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
         sensitivities, age = problem.jacobians(here.point, free, steps), 0
-    normal = _linearize(problem, here.point, free, here.residuals, sensitivities).normal
+    normal, _ = _linearize(problem, here, free, sensitivities)
     return Solution(
         here.point, here.cost, converged, iteration, free, _eliminate(normal, len(free)), tuple(sensitivities)
     )
@@ -128,9 +120,7 @@ class _Place:
 
     @classmethod
     def at(cls, problem: Problem, point: Point, free: tuple[int, ...]) -> _Place:
-        residuals = problem.residuals(point)
-        cost = 0.5 * sum(float(r @ r) for r in residuals) + problem.prior_cost(point)
-        return cls(point, _pack(point, free), residuals, cost)
+        return cls(point, _pack(point, free), problem.residuals(point), cost_of(problem, point))
 
 
 class _Taken(NamedTuple):
@@ -158,14 +148,14 @@ def _descended(
 ) -> tuple[_Taken | None, float, bool]:
     """A step from `here` that leads down, damped the more the oftener it did not (one try where derivatives are old,
     `once`); the damping for the next; and whether the last step tried promised too little to be worth it."""
-    system = _linearize(problem, here.point, free, here.residuals, sensitivities)
+    system = _linearize(problem, here, free, sensitivities)
     lower, upper, scale = _limits(problem, here.point, free)
     reach = _REACH * scale
     bounds = np.maximum(lower, here.x - reach), np.minimum(upper, here.x + reach)
     least = max(ENOUGH, relative * here.cost)
     promise, growth = np.inf, 8.0
     while damping < _LAMBDA_MOST:
-        step, promise = _step(system, here.x, *bounds, scale, damping)
+        step, promise = _step(*system, here.x, *bounds, scale, damping)
         if promise < least:
             break
         there = _Place.at(problem, _allowed(problem, _unpack(here.point, free, here.x + step)), free)
@@ -237,19 +227,17 @@ def _unpack(point: Point, free: tuple[int, ...], x: np.ndarray) -> Point:
 
 
 def _linearize(
-    problem: Problem,
-    point: Point,
-    free: tuple[int, ...],
-    residuals: Sequence[np.ndarray],
-    sensitivities: Sequence[Sensitivity],
-) -> _Linearized:
-    p = len(free)
+    problem: Problem, here: _Place, free: tuple[int, ...], sensitivities: Sequence[Sensitivity]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and gradient of the Gauss-Newton system: structure first, then the trials' nuisances one after the
+    other."""
+    point, p = here.point, len(free)
     size = p + sum(len(n) for n in point.nuisances)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     prior = problem.prior_precision
     normal[:p, :p] = prior[np.ix_(free, free)]
     gradient[:p] = (prior @ problem.prior_shift(point))[list(free)]
-    gradients = in_parallel(lambda pair: pair[1].gradient(pair[0]), zip(residuals, sensitivities, strict=True))
+    gradients = in_parallel(lambda pair: pair[1].gradient(pair[0]), zip(here.residuals, sensitivities, strict=True))
     at = p
     for one, change, nuisance, parameters in zip(
         sensitivities, gradients, point.nuisances, problem.nuisances, strict=True
@@ -266,15 +254,20 @@ def _linearize(
             normal[own, own] = one.gram[p:, p:] + np.diag(spread**-2.0)
             gradient[own] = change[p:] + (nuisance - means) / spread**2
         at += q
-    return _Linearized(normal, gradient)
+    return normal, gradient
 
 
 def _step(
-    system: _Linearized, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, scale: np.ndarray, damping: float
+    normal: np.ndarray,
+    gradient: np.ndarray,
+    x: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    scale: np.ndarray,
+    damping: float,
 ) -> tuple[np.ndarray, float]:
     """A damped step within the bounds and the decrease of the quadratic model that it promises."""
-    diagonal = np.diag(system.normal)
-    ridge = damping * np.maximum(diagonal, 1e-6 / scale**2) + 1e-9 / scale**2
+    ridge = damping * np.maximum(np.diag(normal), 1e-6 / scale**2) + 1e-9 / scale**2
     stopped = np.zeros(len(x), bool)
     step = np.zeros(len(x))
     for _ in range(8):  # those that would cross a bound stop there, the others are solved again
@@ -282,8 +275,8 @@ def _step(
         if not active.any():
             break
         units = scale[active]
-        matrix = (system.normal[np.ix_(active, active)] + np.diag(ridge[active])) * np.outer(units, units)
-        push = -system.gradient[active] - system.normal[np.ix_(active, stopped)] @ step[stopped]
+        matrix = (normal[np.ix_(active, active)] + np.diag(ridge[active])) * np.outer(units, units)
+        push = -gradient[active] - normal[np.ix_(active, stopped)] @ step[stopped]
         step[active] = units * np.linalg.lstsq(matrix, push * units, rcond=1e-14)[0]
         crossing = active & ((x + step < lower) | (x + step > upper))
         if not crossing.any():
@@ -291,13 +284,9 @@ def _step(
         step[crossing] = np.clip(x + step, lower, upper)[crossing] - x[crossing]
         stopped |= crossing
     step = np.clip(x + step, lower, upper) - x
-    promise = -(system.gradient @ step + 0.5 * step @ system.normal @ step)
-    return step, float(promise)
+    return step, float(-(gradient @ step + 0.5 * step @ normal @ step))
 
 
 def _eliminate(normal: np.ndarray, p: int) -> np.ndarray:
     """The normal matrix of the first p unknowns with the others marginalised (Schur complement)."""
-    if normal.shape[0] == p:
-        return normal.copy()
-    rest = normal[p:, p:]
-    return normal[:p, :p] - normal[:p, p:] @ np.linalg.solve(rest, normal[p:, :p])
+    return normal[:p, :p] - normal[:p, p:] @ np.linalg.solve(normal[p:, p:], normal[p:, :p])

@@ -106,8 +106,6 @@ class Structure:
 
     def values(self, theta: Theta) -> np.ndarray:
         """The vector for `theta`; what it lacks stands at the start."""
-        if not self.names:
-            return np.zeros(0)
         return np.array([theta.get(p.name, p.value) for p in self.parameters])
 
     def corrections(self, theta: Theta) -> tuple[Correction, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,7 @@ from lacuna.estimation.solve import solve
 from lacuna.system import Record
 
 _UNDETERMINED = 3.0  # a direction whose standard deviation exceeds this many scales is not determined
+_REFITTED = 8  # iterations, beside a parameter that is moved
 
 
 @dataclass(frozen=True)
@@ -47,31 +47,21 @@ class Uncertainty:
         sd = np.sqrt(np.diag(self.covariance))
         matrix = self.covariance / np.outer(sd, sd)
         names = [e.name for e in self.estimates]
-        pairs = [
-            (names[i], names[j], float(matrix[i, j]))
-            for i in range(len(names))
-            for j in range(i)
-            if abs(matrix[i, j]) > above
-        ]
+        places = zip(*np.tril_indices(len(names), -1), strict=True)
+        pairs = [(names[i], names[j], float(matrix[i, j])) for i, j in places if abs(matrix[i, j]) > above]
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def uncertainty(fitted: Fit, *, confidence: float = 0.9, dispersion: float | None = None) -> Uncertainty:
-    """Quadratic intervals of all fitted parameters.
-
-    `dispersion` inflates the covariance where the residual exceeds the floor; by default it is the mean
-    weighted square residual, at least 1, so that a model that does not fit does not claim to know its
-    parameters well.
-    """
+def uncertainty(fitted: Fit, *, confidence: float = 0.9) -> Uncertainty:
+    """Quadratic intervals of all fitted parameters. The mean weighted square residual inflates the covariance where it
+    is above 1: a model that does not fit does not claim to know its parameters well."""
     structure, solution = fitted.structure, fitted.solution
     scales = structure.scales()[list(solution.free)]
     normal = solution.normal * np.outer(scales, scales)
     values, vectors = np.linalg.eigh(0.5 * (normal + normal.T))
-    floor = _UNDETERMINED**-2.0
-    open_ = values < floor
+    open_ = values < _UNDETERMINED**-2.0
     inverse = (vectors / np.maximum(values, 1e-6)) @ vectors.T
-    dispersion = _dispersion(fitted) if dispersion is None else dispersion
-    covariance = dispersion * inverse * np.outer(scales, scales)
+    covariance = _dispersion(fitted) * inverse * np.outer(scales, scales)
     half = ndtri(0.5 + confidence / 2)
     loose = (vectors[:, open_] ** 2).sum(axis=1) > 0.1
     at_bound = fitted.at_bound
@@ -101,9 +91,7 @@ def uncertainty(fitted: Fit, *, confidence: float = 0.9, dispersion: float | Non
     return Uncertainty(tuple(estimates), covariance, undetermined)
 
 
-def profile_interval(
-    fitted: Fit, name: str, *, confidence: float = 0.9, max_iterations: int = 8
-) -> tuple[float, float]:
+def profile_interval(fitted: Fit, name: str, *, confidence: float = 0.9) -> tuple[float, float]:
     """Profile-likelihood interval of one parameter: how far it can move, all others refitted, before the
     likelihood ratio forbids it. Costs about 10 refits; for parameters whose cost is not a parabola."""
     structure, solution = fitted.structure, fitted.solution
@@ -114,21 +102,11 @@ def profile_interval(
     sd = float(np.sqrt(max(marginal, 1e-12 * structure.scales()[index] ** 2)))
     others = tuple(i for i in solution.free if i != index)
     parameter = structure.parameters[index]
-    ends = []
-    for sign, bound in ((-1, parameter.lower), (1, parameter.upper)):
-        ends.append(_walk_out(fitted, index, others, sign * sd, bound, limit, max_iterations))
-    return ends[0], ends[1]
+    lower = _walk_out(fitted, index, others, -sd, parameter.lower, limit)
+    return lower, _walk_out(fitted, index, others, sd, parameter.upper, limit)
 
 
-def _walk_out(
-    fitted: Fit,
-    index: int,
-    others: tuple[int, ...],
-    stride: float,
-    bound: float,
-    limit: float,
-    max_iterations: int,
-) -> float:
+def _walk_out(fitted: Fit, index: int, others: tuple[int, ...], stride: float, bound: float, limit: float) -> float:
     """Step outwards until the cost has risen by `limit`, then interpolate the square root of the rise,
     which is straight where the cost is a parabola."""
     here, rise, point = float(fitted.solution.point.values[index]), 0.0, fitted.solution.point
@@ -137,7 +115,7 @@ def _walk_out(
         ahead = min(ahead, bound) if stride > 0 else max(ahead, bound)
         moved = point.values.copy()
         moved[index] = ahead
-        solution = solve(fitted.problem, Point(moved, point.nuisances), free=others, max_iterations=max_iterations)
+        solution = solve(fitted.problem, Point(moved, point.nuisances), free=others, max_iterations=_REFITTED)
         next_rise = max(solution.cost - fitted.cost, rise + 1e-12)
         if next_rise >= limit:
             share = (np.sqrt(limit) - np.sqrt(rise)) / (np.sqrt(next_rise) - np.sqrt(rise))
@@ -159,6 +137,6 @@ def pieces_of(trial: Record, floor: NoiseFloor) -> float:
 
 
 def _dispersion(fitted: Fit) -> float:
-    residuals: Sequence[np.ndarray] = fitted.problem.residuals(fitted.solution.point)
+    residuals = fitted.problem.residuals(fitted.solution.point)
     freedom = max(1.0, effective_samples(fitted) - len(fitted.solution.free))
     return max(1.0, sum(float(r @ r) for r in residuals) / freedom)
