@@ -11,12 +11,14 @@ import numpy as np
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import at_full_size, rms
 from lacuna.diagnosis.split import Split
-from lacuna.estimation.fit import Fit, evaluate_on
+from lacuna.estimation.fit import Fit, evaluate_on, fit, starting_point
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
+from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 from lacuna.system import Record
 
 LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
+_CONTINUED = 1e-3  # of the cost: where a refit with fewer effects may stop
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +136,16 @@ def _outside(plausible: tuple[float, float], value: float) -> float:
 
 def judge(fitted: Fit, split: Split, policy: Policy, near: Fit | None = None) -> Candidate:
     return Candidate(fitted, evaluate_on(fitted, split.judging, near=near), policy)
+
+
+def refitted_without(candidate: Candidate, effects: Sequence[str], split: Split) -> Candidate:
+    """`candidate` with these of its effects only, and all its curves, fitted from where it stands."""
+    parent = candidate.fitted
+    kept = tuple(e for e in candidate.effects if e in effects)
+    structure = Structure(parent.structure.system, kept, parent.structure.sites)
+    start = [starting_point(parent, structure)]
+    fitted = fit(structure, split.fit, parent.problem.floor, starts=start, relative=_CONTINUED)
+    return judge(fitted, split, candidate.policy, near=candidate.checked)
 
 
 def sharpened_floor(candidate: Candidate, split: Split, floor: NoiseFloor) -> NoiseFloor:

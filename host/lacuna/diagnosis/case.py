@@ -6,12 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from functools import wraps
 from typing import Any, TypeVar
 
-from lacuna.diagnosis.candidate import (
-    LOWER,
-    Candidate,
-    judge,
-    sharpened_floor,
-)
+from lacuna.diagnosis.candidate import LOWER, Candidate, judge, sharpened_floor
 from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, met_by_chance
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.race import continued, helps_at_once
@@ -19,6 +14,7 @@ from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
+from lacuna.estimation.clustered import intervals
 from lacuna.estimation.fit import (
     Fit,
     at_its_misfit,
@@ -31,7 +27,6 @@ from lacuna.estimation.fit import (
     renewed,
     spread_starts,
 )
-from lacuna.estimation.intervals import intervals
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
 from lacuna.estimation.structure import Structure
@@ -43,7 +38,6 @@ _HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much
 _DOUBTFUL = 1.5  # and no last digits of it so much
 _ASTRAY = 1.1  # times the error on conditions never fitted
 _FITS = ("on_known", "settled", "intervals", "converged")  # questions whose answers no rule of decision changes
-
 
 Answer = TypeVar("Answer")
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from lacuna.check import check
-from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.cross_fit import CrossFitted, cross_fitted, is_due
 from lacuna.diagnosis.decide import Choice, choose, dispersion_of, weigh
 from lacuna.diagnosis.doubts import (
@@ -35,11 +34,10 @@ from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import Search, search
-from lacuna.diagnosis.sign import impossible_signs
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
 from lacuna.diagnosis.stopped import STOPPED, Found, Stoppable
-from lacuna.diagnosis.warn import warnings_of
+from lacuna.diagnosis.warn import impossible_signs, warnings_of
 from lacuna.diagnosis.workers import OnProgress, Workers
 from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.decide import Choice, Comparison, weigh
 from lacuna.diagnosis.search import Search
 from lacuna.system import Effect

@@ -8,7 +8,7 @@ from lacuna.diagnosis.candidate import judge
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Choice, weigh
 from lacuna.diagnosis.race import continued, to_the_end
-from lacuna.diagnosis.search import Search, reweighed
+from lacuna.diagnosis.search import Search, keep_best, reweighed
 from lacuna.diagnosis.workers import Workers
 
 _FINISHED = 3  # of the most promising, to the end
@@ -31,9 +31,7 @@ def explain_nuisances(case: Case, found: Search, choice: Choice, workers: Worker
     promising = [c for c in grown if parent.cost - c.cost > policy.gain][:_FINISHED]
     finished = to_the_end(promising, case.split, workers)
     tried = {frozenset(c.effects): c for c in found.tried}
-    for one in (*grown, *finished):
-        same = frozenset(one.effects)
-        tried[same] = min(tried.get(same, one), one, key=lambda c: c.cost)
+    keep_best(tried, (*grown, *finished))
     found = replace(found, tried=tuple(tried.values()))
     offered = [tried[frozenset(c.effects)] for c in finished]
     able = [c for c in offered if len(fresh) * case.met_by_chance(parent, c) < policy.condition_chance]

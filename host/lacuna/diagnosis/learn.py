@@ -79,12 +79,10 @@ def learn_correction(
 
 
 def _best_grown(
-    parents: Sequence[Candidate],
-    promises: Sequence[_Promise],
-    split: Split,
-    policy: Policy,
-    workers: Workers,
+    parents: Sequence[Candidate], promises: Sequence[_Promise], split: Split, policy: Policy, workers: Workers
 ) -> Candidate | None:
+    """The best of the curves promised on any of `parents`, fitted to the end, if it takes away its share of what the
+    best of these leaves."""
     before = min(parents, key=lambda c: c.checked.cost)
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
     names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
@@ -94,29 +92,17 @@ def _best_grown(
         for p in promises
     ]
     solutions = workers.map("learning a curve for", names, _coarse, jobs)
-    grown = [
-        judge(Fit(p.problem, solution, 1, 1), split, policy) for p, solution in zip(promises, solutions, strict=True)
-    ]
-    return _best_of(grown, parents, split, policy)
-
-
-def _best_of(
-    grown: Sequence[Candidate], parents: Sequence[Candidate], split: Split, policy: Policy
-) -> Candidate | None:
-    """The best of `grown`, fitted to the end, if it takes away its share of what the best of its parents leaves."""
-    if not grown:
+    fits = [Fit(p.problem, solution, 1, 1) for p, solution in zip(promises, solutions, strict=True)]
+    best = min((judge(fit, split, policy) for fit in fits), key=lambda c: c.checked.cost, default=None)
+    left = max(before.checked.cost - 0.5 * effective_samples(before.checked), 0.0)
+    if best is None or before.checked.cost - best.checked.cost < policy.curve * left:
         return None
-    before, best = (min(some, key=lambda c: c.checked.cost) for some in (parents, grown))
-    if before.checked.cost - best.checked.cost < policy.curve * _excess(before.checked):
-        return None
-    best = min(best, judge(_refined(best.fitted), split, policy), key=lambda c: c.checked.cost)
+    # to the end, from where the coarse fit stands: a curve leads the others nowhere else
+    problem, begun = best.fitted.problem, best.fitted.solution.point
+    refined = judge(Fit(problem, solve(problem, begun, **_REFINED), 1, 1), split, policy)
+    best = min(best, refined, key=lambda c: c.checked.cost)
     # a fit may not buy small residuals with large ones, which its cost compresses
     return best if best.checked_error < before.checked_error else None
-
-
-def _excess(fit: Fit) -> float:
-    """Of a fit's cost, what noise at the floor would not leave."""
-    return max(fit.cost - 0.5 * effective_samples(fit), 0.0)
 
 
 def _coarse(problem: Problem, start: Point, cold_values: np.ndarray | None) -> Solution:
@@ -125,11 +111,6 @@ def _coarse(problem: Problem, start: Point, cold_values: np.ndarray | None) -> S
     if cold_values is not None:
         found.append(cold(problem, cold_values))
     return min(found, key=lambda s: s.cost)
-
-
-def _refined(coarse: Fit) -> Fit:
-    """To the end, from where the coarse fit stands: a curve leads the others nowhere else."""
-    return Fit(coarse.problem, solve(coarse.problem, coarse.solution.point, **_REFINED), 1, 1)
 
 
 def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers: Workers) -> list[_Promise]:
@@ -158,5 +139,5 @@ def holds(corrected: Fit, before: Fit, split: Split) -> bool:
     """Whether the trials that informed nothing are predicted better, too."""
     if not split.final:
         return False
-    on_final = (rms(evaluate_on(fit, split.final).scaled_residuals()) for fit in (corrected, before))
-    return next(on_final) < next(on_final)
+    mine, others = (rms(evaluate_on(fit, split.final).scaled_residuals()) for fit in (corrected, before))
+    return mine < others

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.decide import Choice
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search

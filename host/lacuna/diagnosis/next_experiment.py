@@ -39,13 +39,10 @@ def next_experiment(rivals: Sequence[Candidate], floor: NoiseFloor, dispersion: 
             expected_gain(a, b, offer, floor) / dispersion for k, a in enumerate(predictions) for b in predictions[:k]
         ]
         if min(gains) > best.gain:
-            names = tuple(sorted({name for c in rivals for name in c.effects} - _shared(rivals)))
-            best = NextExperiment(names, offer.experiment, dict(offer.settings), float(min(gains)))
+            every = {name for c in rivals for name in c.effects}
+            names = sorted(name for name in every if not all(name in c.effects for c in rivals))
+            best = NextExperiment(tuple(names), offer.experiment, dict(offer.settings), float(min(gains)))
     return best if best.gain > _TELLS_APART else NextExperiment()
-
-
-def _shared(rivals: Sequence[Candidate]) -> set[str]:
-    return set.intersection(*(set(c.effects) for c in rivals))
 
 
 def _predict(candidate: Candidate, offer: CandidateExperiment) -> Channels:

@@ -7,7 +7,7 @@ nuisance of each run takes it up. The model lacks it all the same, since no run 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from scipy.special import fdtrc
 from lacuna.diagnosis.policy import Policy
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
+from lacuna.system import Parameter, Record
 
 _DEALT = 2000
 
@@ -27,6 +28,27 @@ class Followed(NamedTuple):
 
     nuisance: str
     share: float
+
+
+class Run(NamedTuple):
+    """What a trial has of a nuisance."""
+
+    trial: Record
+    nuisance: Parameter
+    value: float
+
+    @property
+    def away(self) -> float:
+        """From what is expected, in standard deviations."""
+        return (self.value - self.nuisance.value) / self.nuisance.step_scale
+
+
+def runs_of(fits: Sequence[Fit]) -> Iterator[Run]:
+    """Every nuisance of every trial of these fits, but for an effect's own (a phase): that may do as it likes."""
+    for fit in fits:
+        every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
+        for trial, values, parameters in every:
+            yield from (Run(trial, p, float(v)) for p, v in zip(parameters, values, strict=True) if "." not in p.name)
 
 
 def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tuple[Followed, ...]:
@@ -73,12 +95,8 @@ def _between(runs: Runs, followed: Sequence[Followed]) -> float:
 def by_condition(fits: Sequence[Fit]) -> Runs:
     """Of each nuisance, by condition its values in standard deviations from what is expected, an entry a run."""
     found: dict[str, dict[object, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for fit in fits:
-        every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
-        for trial, values, parameters in every:
-            for value, p in zip(values, parameters, strict=True):
-                if "." not in p.name:  # an effect's own (a phase) may do as it likes
-                    found[p.name][trial.experiment, trial.condition].append((value - p.value) / p.step_scale)
+    for run in runs_of(fits):
+        found[run.nuisance.name][run.trial.experiment, run.trial.condition].append(run.away)
     return {name: [np.array(runs) for runs in conditions.values()] for name, conditions in found.items()}
 
 

@@ -25,23 +25,13 @@ _LONGEST = 3.0  # times a secant, that it is followed: further it says nothing
 _ABSORBED = 0.02  # a change in the residual of which less than this share is left after the parent's is absorbed
 
 
-class Secant(NamedTuple):
-    """An effect more at one of its sizes: where a fit would begin."""
-
-    problem: Problem
-    start: Point
-
-    @property
-    def effect(self) -> str:
-        return self.problem.structure.effects[-1]
-
-
 class Promise(NamedTuple):
-    """A set of effects, where a smaller set would go on with it, and the log-likelihood that it promises to gain."""
+    """A set of effects, where a smaller set would go on with it, and the log-likelihood that it promises to gain, once
+    that is known."""
 
     problem: Problem
     start: Point
-    gain: float
+    gain: float = 0.0
 
     @property
     def effect(self) -> str:
@@ -71,12 +61,12 @@ class Screened:
 
 @dataclass(frozen=True)
 class Scores:
-    """Of every secant, shapes (m,): `whole`, the norm of what it changes the residual by; of what is left of that after
-    the parent's own parameters the `squares`, and `push`, its product with what the parent leaves, negative where it
-    takes away from it. `square`: of what the parent leaves."""
+    """Of every secant (an effect more at one of its sizes), shapes (m,): `whole`, the norm of what it changes the
+    residual by; of what is left of that after the parent's own parameters the `squares`, and `push`, its product with
+    what the parent leaves, negative where it takes away from it. `square`: of what the parent leaves."""
 
     parent: Fit
-    secants: tuple[Secant, ...]
+    secants: tuple[Promise, ...]
     whole: np.ndarray
     squares: np.ndarray
     push: np.ndarray
@@ -99,7 +89,7 @@ class Scores:
         for k, secant in enumerate(self.secants):
             if secant.effect not in best or self.gains[k] > self.gains[best[secant.effect]]:
                 best[secant.effect] = k
-        found = [Promise(*self.secants[k], float(self.gains[k])) for k in best.values()]
+        found = [self.secants[k]._replace(gain=float(self.gains[k])) for k in best.values()]
         return sorted(found, key=lambda one: -one.gain)
 
     def screened(self) -> tuple[Screened, ...]:
@@ -124,7 +114,7 @@ def score(parent: Fit, effects: Sequence[str], workers: Workers) -> Scores:
         for e, one in zip(effects, problems, strict=True)
     ]
     moved = workers.map("scoring", [p.structure.effects for p in problems], _moved, jobs)
-    secants = tuple(Secant(one, start) for one, (begun, _) in zip(problems, moved, strict=True) for start in begun)
+    secants = tuple(Promise(one, start) for one, (begun, _) in zip(problems, moved, strict=True) for start in begun)
     changes = np.array([row - reference for _, rows in moved for row in rows]).reshape(len(secants), len(reference)).T
     left = changes - basis @ (basis.T @ changes)
     return Scores(

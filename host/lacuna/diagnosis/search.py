@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from lacuna.diagnosis.candidate import LOWER, Candidate, judge, sharpened_floor
+from lacuna.diagnosis.candidate import LOWER, Candidate, judge, refitted_without, sharpened_floor
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.continued import refitted_without
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.race import NEAR, joined, race
 from lacuna.diagnosis.score import Promise, Scores, Screened, score
@@ -82,7 +81,7 @@ def search(
         scores, tried[frozenset()] = score(better.fitted, list(case.system.effects), workers), better
         begun = {one.effects for one in found}  # cold: they owe nothing to the base model
         found += raced(better, [e for e in _singles(case, scores) if e.problem.structure.effects not in begun])
-    _keep(tried, found)
+    keep_best(tried, found)
     for size in range(1, LARGEST_SET + 1):
         ranked = _ranked(tried, size)
         if not ranked:
@@ -103,11 +102,12 @@ def search(
         promises = _larger(case, tried, ranked, workers) if size < LARGEST_SET else []
         if not promises:
             break
-        _keep(tried, raced(ranked[0], promises))
+        keep_best(tried, raced(ranked[0], promises))
     return Search(tried[frozenset()], floor, tuple(tried.values()), scores.screened(), tuple(freed))
 
 
-def _keep(tried: dict[frozenset[str], Candidate], found: Iterable[Candidate]) -> None:
+def keep_best(tried: dict[frozenset[str], Candidate], found: Iterable[Candidate]) -> None:
+    """Put what was found among what was `tried`, by its effects, where it is the best of these."""
     for one in found:
         same = frozenset(one.effects)
         tried[same] = min(tried.get(same, one), one, key=lambda c: c.cost)

@@ -44,9 +44,10 @@ class Signature:
 def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *, unshared: str = "") -> Signature:
     """The signature of the residual of `fitted`, given its test for structure, the drifts over the session, and whether
     repeats differ by what is no noise."""
-    top, found = remainder.largest, set(remainder.found)
+    visible = {*remainder.found, *(key for key, z in remainder.z.items() if z > _VISIBLE)}
+    least = _SHARE_OF_LARGEST * remainder.largest
     places = sorted(
-        (key for key in found | _visible(remainder) if remainder.shared[key] > _SHARE_OF_LARGEST * top),
+        (key for key in visible if remainder.shared[key] > least),
         key=lambda key: (-remainder.shared[key], key),
     )
     experiments = tuple(dict.fromkeys(experiment for experiment, _ in places))
@@ -55,20 +56,8 @@ def describe(fitted: Fit, remainder: Remainder, drifts: Sequence[Drift] = (), *,
     depends_on = list(dict.fromkeys(q for d in dependences for q in d.quantities))[:_MOST_NAMED]
     if drifts:
         depends_on.append("order of the session")
-    return Signature(
-        experiments,
-        tuple(depends_on),
-        tuple(dependences),
-        _sentence(places, remainder, dependences, drifts, unshared, fitted),
-    )
-
-
-def _visible(remainder: Remainder) -> set[tuple[str, str]]:
-    return {key for key, z in remainder.z.items() if z > _VISIBLE}
-
-
-def _repeated(fitted: Fit) -> bool:
-    return any(noise.repeats for noise in fitted.problem.floor.channels.values())
+    text = _sentence(places, remainder, dependences, drifts, unshared, fitted)
+    return Signature(experiments, tuple(depends_on), tuple(dependences), text)
 
 
 _Rows = list[tuple[np.ndarray, Mapping[str, np.ndarray]]]
@@ -94,23 +83,19 @@ def _finite(quantities: Mapping[str, np.ndarray], trial: Record) -> dict[str, np
 
 def _dependence(key: tuple[str, str], rows: _Rows) -> Dependence | None:
     """The quantity, or the pair of them, whose binned mean made from every other trial predicts the rest best."""
-    half = len(rows) // 2
-    if half == 0:
-        return None
-    make, check = rows[::2], rows[1::2]
     names = [n for n in rows[0][1] if all(n in quantities for _, quantities in rows)]
-    if not names:  # the system offers nothing that a residual may depend on
+    if len(rows) < 2 or not names:  # without names the system offers nothing that a residual may depend on
         return None
-    singles: dict[tuple[str, ...], float] = {(n,): _predicted_share(make, check, (n,)) for n in names}
-    best = max(singles, key=singles.__getitem__)
-    found, share = best, singles[best]
-    pairs: dict[tuple[str, ...], float] = {
-        (*best, n): _predicted_share(make, check, (*best, n)) for n in names if n not in best
-    }
-    if pairs:
-        pair = max(pairs, key=pairs.__getitem__)
-        if pairs[pair] > share + _WORTH_NAMING:
-            found, share = pair, pairs[pair]
+
+    def best_of(sets: list[tuple[str, ...]]) -> tuple[tuple[str, ...], float]:
+        shares = [_predicted_share(rows[::2], rows[1::2], one) for one in sets]
+        return max(zip(sets, shares, strict=True), key=lambda one: one[1])
+
+    found, share = best_of([(n,) for n in names])
+    if pairs := [(*found, n) for n in names if n not in found]:
+        pair, share_of_pair = best_of(pairs)
+        if share_of_pair > share + _WORTH_NAMING:
+            found, share = pair, share_of_pair
     return Dependence(*key, found, share) if share > _WORTH_NAMING else None
 
 
@@ -165,7 +150,8 @@ def _sentence(
     unshared: str,
     fitted: Fit,
 ) -> str:
-    repeated, experiments = _repeated(fitted), [t.experiment for t in fitted.problem.trials]
+    repeated = any(noise.repeats for noise in fitted.problem.floor.channels.values())
+    experiments = [t.experiment for t in fitted.problem.trials]
     if not places and not drifts and not unshared:
         known = "the differences between repeats" if repeated else "the noise"
         return f"The residual contains nothing beyond {known}.{_cannot_tell(remainder, experiments)}"

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.score import score
-from lacuna.diagnosis.search import Search, reweighed
+from lacuna.diagnosis.search import Search, keep_best, reweighed
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 
@@ -52,10 +52,8 @@ class Found:
         """What the search would have returned: the best candidate for each set, all against the latest floor."""
         floor = (self.candidates[-1] if self.candidates else base).fitted.problem.floor
         found: dict[frozenset[str], Candidate] = {}
-        for one in (base, *self.candidates):
-            same = one if one.fitted.problem.floor is floor else reweighed(one, split, floor)
-            known = found.setdefault(frozenset(one.effects), same)
-            found[frozenset(one.effects)] = min(known, same, key=lambda c: c.cost)
+        all_of_them = (base, *self.candidates)
+        keep_best(found, (c if c.fitted.problem.floor is floor else reweighed(c, split, floor) for c in all_of_them))
         first = found[frozenset()]
         screened = score(first.fitted, list(first.fitted.structure.system.effects), Workers(lambda _: None)).screened()
         return Search(first, floor, tuple(found.values()), screened)

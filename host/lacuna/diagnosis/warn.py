@@ -1,16 +1,17 @@
-"""Reasons to doubt a fit: parameters at bounds, undetermined directions, failed predictions."""
+"""Reasons to doubt a fit: parameters at bounds, undetermined directions, failed predictions, impossible signs."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from lacuna.check.numbers import listed
+from lacuna.diagnosis.nuisances import Run, runs_of
+from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import failed
+from lacuna.diagnosis.score import score
 from lacuna.diagnosis.split import Split
+from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import Estimate, uncertainty
-from lacuna.system import Parameter
 
 _NEAR_LIMIT = 3.5  # standard deviations from a nuisance's mean: it probably absorbs model error
 
@@ -56,16 +57,12 @@ def _parameters(fitted: Fit) -> list[str]:
 
 def _strayed(fits: list[Fit]) -> list[str]:
     """Nuisances far from what is expected, in single trials or, by less, in all of them."""
-    runs: dict[str, list[_Run]] = {}
-    for fit in fits:
-        every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
-        for trial, values, parameters in every:
-            for value, p in zip(values, parameters, strict=True):
-                if "." not in p.name:  # an effect's own (a phase) may do as it likes
-                    runs.setdefault(p.name, []).append(_Run(trial.name, float(value), p))
+    runs: dict[str, list[Run]] = {}
+    for run in runs_of(fits):
+        runs.setdefault(run.nuisance.name, []).append(run)
     found = []
     for name, each in runs.items():
-        if far := [one.trial for one in each if abs(one.away) > _NEAR_LIMIT]:
+        if far := [one.trial.name for one in each if abs(one.away) > _NEAR_LIMIT]:
             found.append(
                 f"{name} is more than {_NEAR_LIMIT:g} standard deviations from what is expected in {listed(far)}: it"
                 " probably absorbs model error."
@@ -81,17 +78,25 @@ def _strayed(fits: list[Fit]) -> list[str]:
     return found
 
 
-class _Run(NamedTuple):
-    """What a trial has of a nuisance."""
-
-    trial: str
-    value: float
-    nuisance: Parameter
-
-    @property
-    def away(self) -> float:
-        """From what is expected, in standard deviations."""
-        return (self.value - self.nuisance.value) / self.nuisance.step_scale
+def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
+    """A sentence for each effect with one size, absent at a bound, that the residual of `fitted` would push beyond that
+    bound: if to first order it removes more than the policy's share of the residual."""
+    system, found = fitted.structure.system, []
+    able = [
+        name
+        for name, e in system.effects.items()
+        if name not in fitted.structure.effects
+        and e.sizes == 1
+        and e.absent in (e.parameters[0].lower, e.parameters[0].upper)
+    ]
+    for one in score(fitted, able, Workers(lambda _: None)).screened() if able else ():
+        if one.wrong_sign > policy.share:
+            effect = system.effects[one.effect]
+            size = effect.parameters[0]
+            told, typical = (system.told(effect.full_name(size), value) for value in (effect.absent, size.value))
+            side, bound = "below" if told < typical else "above", f"{told:g} {size.unit}".rstrip()
+            found.append(f"{one.effect} would fit with a {size.name} {side} {bound}, which its bounds forbid.")
+    return found
 
 
 def _bound(fitted: Fit, at: Estimate) -> float:

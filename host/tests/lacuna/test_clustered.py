@@ -4,9 +4,8 @@ import numpy as np
 
 import lacuna
 from lacuna import Parameter
-from lacuna.estimation.clustered import clustered_covariance
+from lacuna.estimation.clustered import clustered_covariance, intervals
 from lacuna.estimation.fit import fit
-from lacuna.estimation.intervals import intervals
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
