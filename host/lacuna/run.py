@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -72,19 +73,17 @@ def diagnose(
         shown(what)
 
     system, in_steps = _in_steps(system)
-    how: dict[str, Any] = {
-        "seed": seed,
-        "starts": starts,
-        "policy": policy,
-        "suspected": tuple(suspected),
-        "on_progress": reported,
-    }
     try:
         with _workers(n_jobs, executor) as workers:
-
-            def answer(one: System) -> Diagnosis:
-                return engine.diagnose(one, **how, executor=workers)
-
+            answer = partial(
+                engine.diagnose,
+                seed=seed,
+                starts=starts,
+                policy=policy,
+                suspected=tuple(suspected),
+                on_progress=reported,
+                executor=workers,
+            )
             found = answer(system)
             raised: Mapping[tuple[str, str], float] = {}
             if isinstance(system, FunctionSystem):
@@ -152,7 +151,7 @@ def _cautioned(
     advised = {
         channel: float(f"{seconds:.2g}")
         for channel, seconds in left_s.items()
-        if seconds > 0.0 and not any(system.noise_time_s(*k) for k in _keys(found, channel))
+        if seconds > 0.0 and not any(system.noise_time_s(*key) for key in levels if key[1] == channel)
     }
     if advised and isinstance(system, FunctionSystem) and found.effects:
         named, still = ({e.name for e in one.effects} for one in (found, answer(system.with_noise_time(advised))))
@@ -163,10 +162,6 @@ def _cautioned(
         for channel, seconds in advised.items()
     ]
     return replace(found, warnings=(*doubted, *found.warnings, *said)) if said or doubted else found
-
-
-def _keys(found: Diagnosis, channel: str) -> list[tuple[str, str]]:
-    return [key for key in found.search.floor.channels if key[1] == channel]
 
 
 def with_records(system: System, records: Any) -> FunctionSystem:

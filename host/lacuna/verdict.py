@@ -39,18 +39,16 @@ class CompletedModel:
             self.theta |= {name: values[name] for name in system.held.of(self._effects)}
 
     def __call__(self, record: Any, theta: Mapping[str, float] | None = None) -> Any:
-        if not isinstance(self._system, FunctionSystem):
-            own = {p.name: p.value for p in self._system.nuisances(record)}
-            return self._system.predict(
-                self._theta | own | dict(theta or {}), self._effects, record, corrections=self._corrections
-            )
-        record = _one(record, self._system.outputs)
-        own = {p.name: p.value for p in self._system.nuisances(record)}
-        values = self._system.values(self._theta | own, self._corrections)
-        if unknown := set(theta or {}) - set(values):
+        system, given = self._system, dict(theta or {})
+        record = _one(record, system.outputs) if isinstance(system, FunctionSystem) else record
+        fitted = self._theta | {p.name: p.value for p in system.nuisances(record)}
+        if not isinstance(system, FunctionSystem):
+            return system.predict(fitted | given, self._effects, record, corrections=self._corrections)
+        values = system.values(fitted, self._corrections)
+        if unknown := set(given) - set(values):
             raise MisuseError(f"no parameter {', '.join(sorted(unknown))}; there are {', '.join(values)}.")
         try:
-            return self._system.simulated(record, Values(values | dict(theta or {})))
+            return system.simulated(record, Values(values | given))
         except KeyError as error:  # of a record, or of the model's own
             raise MisuseError(f"the model finds no {error.args[0]}.") from error
 
@@ -85,11 +83,7 @@ class Verdict:
         self.theta = self.model.theta
         self.nuisances = _nuisances(fitted)
         self.record = as_record(self.diagnosis)
-        self.error = {
-            "before": diagnosis.before.held_out,
-            "after": diagnosis.after.held_out,
-            "floor": diagnosis.floor.held_out,
-        }
+        self.error = {side: getattr(diagnosis, side).held_out for side in ("before", "after", "floor")}
 
     def __repr__(self) -> str:
         named = "".join(f", {e.name}" for e in self.effects)
@@ -105,11 +99,7 @@ class Verdict:
         from lacuna.report.diagnosis import diagnosis_page
         from lacuna.report.page import render
 
-        path = Path(path)
-        unfinished = path.with_name(path.name + ".unfinished")
-        unfinished.write_text(render(diagnosis_page(self.system.name, self.record, self.diagnosis)), encoding="utf-8")
-        unfinished.replace(path)
-        return path
+        return _written(path, render(diagnosis_page(self.system.name, self.record, self.diagnosis)))
 
     def to_frame(self, what: str = "parameters") -> Any:
         """A pandas DataFrame: the `parameters` of the completed model with their 90 % intervals, or the explanations
@@ -120,12 +110,8 @@ class Verdict:
     def save(self, path: str | Path) -> Path:
         """Write the verdict as JSON, to be read again with `lacuna.load`; return its path. The completed model is a
         function of yours with the values in `theta`."""
-        path = Path(path)
         kept = {"system": self.system.name, "record": self.record, "theta": dict(self.theta), "text": str(self)}
-        unfinished = path.with_name(path.name + ".unfinished")
-        unfinished.write_text(json.dumps(kept, indent=1), encoding="utf-8")
-        unfinished.replace(path)
-        return path
+        return _written(path, json.dumps(kept, indent=1))
 
     def plot(self) -> Any:
         """A Matplotlib figure: error before and after, what was tried, and the worst predicted held-out records."""
@@ -162,6 +148,15 @@ def load(path: str | Path) -> SavedVerdict:
         return SavedVerdict(kept)
     except (ValueError, KeyError, TypeError) as error:
         raise MisuseError(f"{path} is no verdict that `Verdict.save` wrote.") from error
+
+
+def _written(path: str | Path, text: str) -> Path:
+    """`path`, once all of the text is there."""
+    path = Path(path)
+    unfinished = path.with_name(path.name + ".unfinished")
+    unfinished.write_text(text, encoding="utf-8")
+    unfinished.replace(path)
+    return path
 
 
 def _frame(record: Mapping[str, Any], theta: Mapping[str, float], what: str) -> Any:

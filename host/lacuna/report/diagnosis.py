@@ -10,20 +10,18 @@ from lacuna.report.evidence import draw_errors, draw_learnt, draw_weights
 from lacuna.report.measured import floor_sentence, measured_rows
 from lacuna.report.overview import draw_held_out, draw_tried
 from lacuna.report.page import Page, PageTable, Section, both_palettes
-from lacuna.report.sentence import number_in_words, own_form, share_in_words, verdict_sentence
+from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
 
 
 def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None = None) -> Page:
     """The page for a `record` (of `as_record`); with the diagnosis itself also what was measured, and traces."""
     error, effects = record["error"], record["effects"]
-    facts = [
-        (
-            number_in_words(error["before"]["held_out"], ".2f"),
-            "error of the base model on trials not fitted, in units of the noise",
-        ),
-        (number_in_words(error["after"]["held_out"], ".2f"), "after"),
-        (number_in_words(error["noise_floor"]["held_out"], ".2f"), "noise floor"),
-    ]
+    meanings = {
+        "before": "error of the base model on trials not fitted, in units of the noise",
+        "after": "after",
+        "noise_floor": "noise floor",
+    }
+    facts = [(number_in_words(error[side]["held_out"], ".2f"), meaning) for side, meaning in meanings.items()]
     sections = [
         *_evidence(effects),
         *([_measured(found)] if found else []),
@@ -32,10 +30,9 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
         *([_held_out(found)] if found else []),
         *([Section("What the named effects leave", (record["remainder"]["text"],))] if effects else []),
         *_rejected(record),
-        *_warnings(record["warnings"]),
+        *([Section("Before you believe it", tuple(record["warnings"]))] if record["warnings"] else []),
         *(_learnt(curve) for curve in record["learnt"]),
         *_open(record),
-        *_next(record["next_experiment"]),
     ]
     lead = verdict_sentence(record["verdict"], effects, record["remainder"], nearest=record["nearest"])
     return Page(f"Diagnosis of {name}", lead, sections, facts=facts)
@@ -83,10 +80,6 @@ def _rejected(record: Mapping[str, Any]) -> list[Section]:
     return [Section("Also tried, and rejected", (why,), (table,), figures=(tried,))]
 
 
-def _warnings(warnings: Sequence[str]) -> list[Section]:
-    return [Section("Before you believe it", tuple(warnings))] if warnings else []
-
-
 def _learnt(curve: Mapping[str, Any]) -> Section:
     text = f"Added to the model: a curve for {curve['term']}."
     figure = both_palettes(lambda stream, dark: draw_learnt(curve, stream, dark), f"the curve over {curve['variable']}")
@@ -94,21 +87,15 @@ def _learnt(curve: Mapping[str, Any]) -> Section:
 
 
 def _open(record: Mapping[str, Any]) -> list[Section]:
-    """What the data do not show, or cannot tell apart."""
+    """What the data do not show, or cannot tell apart, and what would tell."""
     sections = []
     if hidden := record["not_detectable_here"]:
         sections.append(Section("Not detectable in this data", (", ".join(hidden),)))
     if indistinct := [(e["name"], ", ".join(e["confusable_with"])) for e in record["effects"] if e["confusable_with"]]:
         sections.append(Section("What this data cannot tell", tables=(PageTable(("named", "could be"), indistinct),)))
+    if coming := next_in_words(record["next_experiment"]):
+        sections.append(Section("Next experiment", (coming,)))
     return sections
-
-
-def _next(coming: Mapping[str, Any]) -> list[Section]:
-    if not coming["experiment"]:
-        return []
-    settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
-    text = f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
-    return [Section("Next experiment", (text,))]
 
 
 def _words(name: str) -> str:

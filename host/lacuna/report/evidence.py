@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lacuna.report.style import figure_style
+from lacuna.report.style import drawn
 
 
 def draw_errors(error: Mapping[str, Any], path: Path | BytesIO, dark: bool = False) -> None:
@@ -18,10 +18,7 @@ def draw_errors(error: Mapping[str, Any], path: Path | BytesIO, dark: bool = Fal
     before, after = _bars(error["before"]), _bars(error["after"])
     names = [name for name in before if name in after]
     rows = np.arange(len(names))[::-1]
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axis = plt.subplots(figsize=(7.2, 0.55 * len(names) + 1.1))
+    with drawn(path, dark, (7.2, 0.55 * len(names) + 1.1)) as (axis, palette):
         for row, name in zip(rows, names, strict=True):
             axis.plot([before[name], after[name]], [row, row], color=palette.quiet, linewidth=1.5, zorder=1)
         axis.scatter(
@@ -34,16 +31,11 @@ def draw_errors(error: Mapping[str, Any], path: Path | BytesIO, dark: bool = Fal
         axis.set_ylim(-0.6, len(names) - 0.4)
         axis.set_xlabel("RMS residual in units of the noise")
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        figure.savefig(path, format=_format(path))
-        plt.close(figure)
 
 
 def draw_weights(effects: Sequence[Mapping[str, Any]], path: Path | BytesIO, dark: bool = False) -> None:
     """The weight of each effect named (`effects` of `bifa diagnose --json`), confusable ones beside it."""
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axis = plt.subplots(figsize=(7.2, 0.5 * max(len(effects), 1) + 0.9))
+    with drawn(path, dark, (7.2, 0.5 * max(len(effects), 1) + 0.9)) as (axis, palette):
         rows = np.arange(len(effects))[::-1]
         axis.barh(rows, [effect["probability"] for effect in effects], height=0.55, color=palette.after)
         for row, effect in zip(rows, effects, strict=True):
@@ -54,16 +46,11 @@ def draw_weights(effects: Sequence[Mapping[str, Any]], path: Path | BytesIO, dar
         axis.set_xlim(0, 1.25)
         axis.set_xticks([0, 0.5, 1])
         axis.set_xlabel("weight")
-        figure.savefig(path, format=_format(path))
-        plt.close(figure)
 
 
 def draw_learnt(curve: Mapping[str, Any], path: Path | BytesIO, dark: bool = False) -> None:
     """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axis = plt.subplots(figsize=(7.2, 2.4))
+    with drawn(path, dark, (7.2, 2.4)) as (axis, palette):
         axis.axhline(0.0, color=palette.quiet, linewidth=0.8)
         for row, values in curve["rows"].items():
             axis.plot(np.linspace(curve["lower"], curve["upper"], len(values)), values, label=row)
@@ -71,8 +58,6 @@ def draw_learnt(curve: Mapping[str, Any], path: Path | BytesIO, dark: bool = Fal
         axis.set_ylabel(f"added ({curve['unit']})" if curve["unit"] else "added (relative)")
         if len(curve["rows"]) > 1:
             axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        figure.savefig(path, format=_format(path))
-        plt.close(figure)
 
 
 def _bars(side: Mapping[str, Any]) -> dict[str, float]:
@@ -80,7 +65,3 @@ def _bars(side: Mapping[str, Any]) -> dict[str, float]:
     if side.get("held_out_conditions") is not None:
         bars["conditions not fitted"] = side["held_out_conditions"]
     return bars | {name.replace("_", " "): value for name, value in side.get("by_experiment", {}).items()}
-
-
-def _format(path: Path | BytesIO) -> str:
-    return path.suffix[1:] if isinstance(path, Path) else "png"

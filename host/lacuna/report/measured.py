@@ -13,7 +13,7 @@ Row = tuple[str, str, str, str, str]
 def measured_rows(diagnosis: Diagnosis) -> list[Row]:
     """By experiment and channel: records, conditions, floor, and samples that count as one."""
     groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
-    for trial in _trials(diagnosis):
+    for trial in diagnosis.base.structure.system.trials:
         for channel in trial.channels:
             groups[trial.experiment, channel].append(trial)
     rows = []
@@ -53,7 +53,3 @@ def _pairs(count: int) -> str:
 def _noise_time(diagnosis: Diagnosis, channel: str) -> float:
     system = diagnosis.base.structure.system
     return max(system.noise_time_s(*key) for key in diagnosis.search.floor.channels if key[1] == channel)
-
-
-def _trials(diagnosis: Diagnosis) -> tuple[Record, ...]:
-    return diagnosis.base.structure.system.trials

@@ -10,7 +10,7 @@ import numpy as np
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.estimation.fit import evaluate_on
-from lacuna.report.style import Palette, figure_style, look
+from lacuna.report.style import Palette, drawn, look
 from lacuna.system import Channels, Record
 
 _SHOWN = 2  # records
@@ -34,25 +34,16 @@ def overview(record: Mapping[str, Any], diagnosis: Diagnosis) -> Any:
 def draw_held_out(diagnosis: Diagnosis, stream: BytesIO, dark: bool = False) -> None:
     """Measured and predicted, and the residual, of the records that were predicted worst before."""
     shown = held_out(diagnosis)[: _SHOWN + 1]
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axes = plt.subplots(len(shown), 2, figsize=(9.0, 1.9 * len(shown)), squeeze=False, layout="constrained")
+    size = (9.0, 1.9 * len(shown))
+    with drawn(stream, dark, size, len(shown), 2, squeeze=False, layout="constrained") as (axes, palette):
         for k, (pair, one) in enumerate(zip(axes, shown, strict=True)):
             _traces_on(list(pair), palette, one, k == 0)
-        figure.savefig(stream, format="png")
-        plt.close(figure)
 
 
 def draw_tried(record: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
     """What each explanation tried leaves, on a logarithmic axis."""
-    with figure_style(dark) as palette:
-        import matplotlib.pyplot as plt
-
-        figure, axis = plt.subplots(figsize=(7.2, 0.4 * min(len(record["tried"]), _TRIED) + 1.2))
+    with drawn(stream, dark, (7.2, 0.4 * min(len(record["tried"]), _TRIED) + 1.2)) as (axis, palette):
         tried_on(axis, palette, record)
-        figure.savefig(stream, format="png")
-        plt.close(figure)
 
 
 def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:

@@ -27,6 +27,14 @@ def number_in_words(value: float | None, digits: str = ".4g") -> str:
     return "-" if value is None else format(value, digits)
 
 
+def next_in_words(coming: Mapping[str, Any]) -> str:
+    """What the next experiment would separate; empty where there is none."""
+    if not coming["experiment"]:
+        return ""
+    settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
+    return f"{coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}."
+
+
 def verdict_sentence(
     verdict: str,
     effects: Sequence[Mapping[str, Any]],

@@ -8,7 +8,7 @@ from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.report.measured import floor_sentence
-from lacuna.report.sentence import number_in_words, own_form, share_in_words, verdict_sentence
+from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
 
 _WIDTH, _LINES = 100, 40
 _WARNINGS, _TRIED = 6, 4
@@ -16,16 +16,14 @@ _WARNINGS, _TRIED = 6, 4
 
 def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str:
     """At most `_LINES` lines of at most `_WIDTH` characters."""
-    lines = [f"{name}: {record['verdict']}", *_wrapped(_sentence(record)), ""]
+    sentence = verdict_sentence(record["verdict"], record["effects"], record["remainder"], nearest=record["nearest"])
+    lines = [f"{name}: {record['verdict']}", *_wrapped(sentence), ""]
     lines += _effects(record)
     lines += _errors(record["error"])
     lines += _wrapped(floor_sentence(diagnosis))
-    lines += ["", *_where(record)]
-    lines += _unnamed(record["verdict"], diagnosis.final.structure.effects)
-    lines += _learnt(record["learnt"])
-    lines += _nearest(record)
-    lines += _unseen(record["not_detectable_here"])
-    lines += _next(record["next_experiment"])
+    lines.append("")
+    for said in (*_where(record), *_more(record, diagnosis.final.structure.effects)):
+        lines += _wrapped(said)
     warnings = record["warnings"]
     lines += [line for one in warnings[:_WARNINGS] for line in _wrapped(one, "! ")]
     if len(warnings) > _WARNINGS:
@@ -33,19 +31,15 @@ def screen_of(name: str, record: Mapping[str, Any], diagnosis: Diagnosis) -> str
     return "\n".join(lines if len(lines) <= _LINES else [*lines[: _LINES - 1], "... all of it: verdict.report(...)"])
 
 
-def _sentence(record: Mapping[str, Any]) -> str:
-    return verdict_sentence(record["verdict"], record["effects"], record["remainder"], nearest=record["nearest"])
-
-
 def _where(record: Mapping[str, Any]) -> Iterator[str]:
     """Where what is missing shows: of an explanation what it leaves, and first where that was if no error showed it."""
     lacking = record["signature"]["text"]
     if record["verdict"] != "identified":
-        yield from _wrapped(lacking)
+        yield lacking
         return
     if record["remainder"]["share_of_gap"] is None:
-        yield from _wrapped(f"What was missing: {lacking}")
-    yield from _wrapped(f"What is left: {record['remainder']['text']}")
+        yield f"What was missing: {lacking}"
+    yield f"What is left: {record['remainder']['text']}"
 
 
 def _wrapped(text: str, mark: str = "") -> list[str]:
@@ -80,36 +74,21 @@ def _errors(error: Mapping[str, Any]) -> Iterator[str]:
             yield f"  {label:40}" + "".join(f"{number_in_words(v):>10}" for v in values)
 
 
-def _unnamed(verdict: str, effects: Sequence[str]) -> list[str]:
-    if verdict != "unexplained" or not effects:
-        return []
-    return _wrapped(f"In the errors after and in the completed model, though not named: {', '.join(effects)}.")
-
-
-def _learnt(curves: Sequence[Mapping[str, Any]]) -> list[str]:
-    if not curves:
-        return []
-    added = " and ".join(f"{curve['term']} over {curve['variable']}" for curve in curves)
-    one = "a learnt curve" if len(curves) == 1 else "learnt curves"
-    return _wrapped(f"In the errors after and in the completed model: {one}, {added}.")
-
-
-def _nearest(record: Mapping[str, Any]) -> list[str]:
-    if record["verdict"] == "none" or not record["nearest"]:
-        return []
-    near = record["nearest"][:_TRIED]
-    if near[0]["share_of_gap"] is None:
-        return _wrapped(f"Also tried: {', '.join(' + '.join(r['effects']) for r in near)}.")
-    each = (f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in near)
-    return _wrapped(f"Also tried, with what each would close: {', '.join(each)}.")
-
-
-def _unseen(effects: Sequence[str]) -> list[str]:
-    return _wrapped(f"These data would hardly show: {', '.join(effects)}.") if effects else []
-
-
-def _next(coming: Mapping[str, Any]) -> list[str]:
-    if not coming["experiment"]:
-        return []
-    settings = ", ".join(f"{k} {v}" for k, v in coming["settings"].items())
-    return _wrapped(f"Next: {coming['experiment']} ({settings}) would separate {', '.join(coming['separates'])}.")
+def _more(record: Mapping[str, Any], effects: Sequence[str]) -> Iterator[str]:
+    """What else the completed model has (`effects`, and what was learnt), what was tried, and what to do next."""
+    if record["verdict"] == "unexplained" and effects:
+        yield f"In the errors after and in the completed model, though not named: {', '.join(effects)}."
+    if curves := record["learnt"]:
+        added = " and ".join(f"{curve['term']} over {curve['variable']}" for curve in curves)
+        one = "a learnt curve" if len(curves) == 1 else "learnt curves"
+        yield f"In the errors after and in the completed model: {one}, {added}."
+    near = record["nearest"][:_TRIED] if record["verdict"] != "none" else []
+    if near and near[0]["share_of_gap"] is None:
+        yield f"Also tried: {', '.join(' + '.join(r['effects']) for r in near)}."
+    elif near:
+        each = (f"{' + '.join(r['effects'])} ({share_in_words(r['share_of_gap'])})" for r in near)
+        yield f"Also tried, with what each would close: {', '.join(each)}."
+    if hidden := record["not_detectable_here"]:
+        yield f"These data would hardly show: {', '.join(hidden)}."
+    if coming := next_in_words(record["next_experiment"]):
+        yield f"Next: {coming}"
