@@ -131,8 +131,7 @@ class FunctionSystem(System):
                     " bounds be 0, or both on the same side of it."
                 )
             self._coordinates |= coordinates
-            typical = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
-            self._off |= typical | dict.fromkeys(effect.size_names, effect.absent)
+            self._off |= effect.typical | dict.fromkeys(effect.size_names, effect.absent)
         self._nuisances = nuisances if callable(nuisances) else tuple(nuisances)
         self._regressors = regressors or _regressors
         for what, told in (("accuracy", accuracy), ("sensor_noise", sensor_noise), ("noise_time_s", noise_time_s)):
@@ -168,37 +167,33 @@ class FunctionSystem(System):
             _check_known(what, told, outputs)
         if isinstance(self._noise_time_s, Mapping):
             _check_known("noise_time_s", self._noise_time_s, outputs)
+        return self._with(trials=trials)
+
+    def _with(self, **changes: Any) -> FunctionSystem:
         other = copy(self)
-        other.trials = trials
+        vars(other).update(changes)
         return other
 
     def with_floor(self, least: Mapping[tuple[str, str], float]) -> FunctionSystem:
         """The same system, with lower bounds on its noise floors, by experiment and output."""
-        other = copy(self)
-        other._raised = dict(least)
-        return other
+        return self._with(_raised=dict(least))
 
     def with_test(self, names: Iterable[str]) -> FunctionSystem:
         """The same system, the records of these names as the test."""
-        other = copy(self)
-        other._test = tuple(names)
-        return other
+        return self._with(_test=tuple(names))
 
     def with_noise_time(self, seconds: Mapping[str, float]) -> FunctionSystem:
         """The same system, with a declared correlation time of the noise of each output."""
-        other = copy(self)
-        other._noise_time_s, other.estimates_noise_time = dict(seconds), False
-        return other
+        return self._with(_noise_time_s=dict(seconds), estimates_noise_time=False)
 
     def with_grains(self, grains: Mapping[str, float]) -> FunctionSystem:
         """The same system, with `Parameter.grain` by full name, as fitted."""
-        other = copy(self)
-        other.parameters = tuple(replace(p, grain=grains.get(p.name, 0.0)) for p in self.parameters)
-        other.effects = {
+        effects = {
             name: replace(e, parameters=tuple(replace(p, grain=grains.get(e.full_name(p), 0.0)) for p in e.parameters))
             for name, e in self.effects.items()
         }
-        return other
+        parameters = tuple(replace(p, grain=grains.get(p.name, 0.0)) for p in self.parameters)
+        return self._with(parameters=parameters, effects=effects)
 
     # -- in the person's parameters ---------------------------------------------------------------------------
 
@@ -250,11 +245,11 @@ class FunctionSystem(System):
         """A model that fills one array of its own again and again is called by one thread at a time."""
         if self._refills:
             with _ONE_AT_A_TIME:
-                return _copy_all(self.simulate(record, values))
+                return _copy(self.simulate(record, values))
         found = self.simulate(record, values)
         self._refills = _shares(found, self._last)
         self._last = found
-        return _copy_all(found)
+        return _copy(found)
 
     def run(self, record: Record, values: Values) -> Channels:
         """The result of `simulate`, in whatever form, as channels by name."""
@@ -360,41 +355,30 @@ class FunctionSystem(System):
         return self._experiments
 
 
-def _copy_all(found: Any) -> Any:
+def _copy(found: Any) -> Any:
+    """Of a column, or of every one by its name, as far as these are arrays."""
     if isinstance(found, Mapping):
         return {name: _copy(column) for name, column in found.items()}
-    return _copy(found)
+    return found.copy() if isinstance(found, np.ndarray) else found
 
 
 def _shares(found: Any, earlier: Any) -> bool:
     """Whether two results of a model lie in the same memory."""
-    one, other = (list(f.values()) if isinstance(f, Mapping) else [f] for f in (found, earlier))
-    return any(
-        isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.may_share_memory(a, b)
-        for a in one
-        for b in other
-    )
-
-
-def _copy(column: Any) -> Any:
-    return column.copy() if isinstance(column, np.ndarray) else column
+    both = (f.values() if isinstance(f, Mapping) else [f] for f in (found, earlier))
+    one, other = ([column for column in columns if isinstance(column, np.ndarray)] for columns in both)
+    return any(np.may_share_memory(a, b) for a in one for b in other)
 
 
 def _copied(record: Record) -> Record:
-    inputs = {name: _copy(column) for name, column in record.inputs.items()}
-    channels = {name: _copy(column) for name, column in record.channels.items()}
+    inputs, channels = _copy(record.inputs), _copy(record.channels)
     return replace(record, time_s=_copy(record.time_s), inputs=inputs, channels=channels)
 
 
 def _changed(before: Record, after: Record) -> str | None:
     """The name of a column whose samples are not what they were."""
-    if not _is_same(before.time_s, after.time_s):
-        return "time_s"
-    for old, new in ((before.inputs, after.inputs), (before.channels, after.channels)):
-        for name, column in old.items():
-            if not _is_same(column, new.get(name)):
-                return name
-    return None
+    old, new = (({"time_s": r.time_s}, r.inputs, r.channels) for r in (before, after))
+    pairs = ((name, was, now.get(name)) for were, now in zip(old, new, strict=True) for name, was in were.items())
+    return next((name for name, was, now in pairs if not _is_same(was, now)), None)
 
 
 def _is_same(one: Any, other: Any) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -86,14 +87,8 @@ def read(data: Any) -> list[Record | Table]:
             )
         return [_table(one, str(name)) for name, one in data.items()]
     if isinstance(data, Iterable):
-        return [found for place, one in enumerate(data) for found in _one_of_many(one, place)]
+        return [_table(one, f"record {place + 1}") for place, one in enumerate(data)]
     raise RecordError(f"records cannot be read from {type(data).__name__}: give arrays, tables or a folder of CSV.")
-
-
-def _one_of_many(one: Any, place: int) -> list[Record | Table]:
-    if isinstance(one, Record | Table):
-        return [one]
-    return [_table(one, f"record {place + 1}")]
 
 
 def _is_table(data: Any) -> bool:
@@ -129,7 +124,7 @@ def _parts(data: Any) -> list[tuple[str, Any]]:
 
 
 def _table(data: Any, name: str) -> Record | Table:
-    return data if isinstance(data, Record) else _of_columns(data, name)
+    return data if isinstance(data, Record | Table) else _of_columns(data, name)
 
 
 def _of_columns(data: Any, name: str) -> Table:
@@ -285,11 +280,10 @@ def _stem(stem: str) -> tuple[str, int | None]:
 def _refuse_settings(tables: Mapping[str, Table]) -> None:
     """Names that differ by a number are taken for repeats; a number that does not count them may well be a setting,
     whose effect would pass for noise. Raises RecordError."""
-    numbers: dict[str, list[int]] = {}
-    for stem in tables:
-        condition, count = _stem(stem)
+    numbers: dict[str, list[int]] = defaultdict(list)
+    for condition, count in map(_stem, tables):
         if count is not None:
-            numbers.setdefault(condition, []).append(count)
+            numbers[condition].append(count)
     for condition, found in numbers.items():
         found.sort()
         if len(found) > 1 and found not in (list(range(len(found))), list(range(1, len(found) + 1))):
@@ -327,7 +321,7 @@ def numbers_alone(file: Path) -> dict[str, np.ndarray] | None:
             values = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
         except ValueError:
             return None
-    plain = all(names) and len(set(names)) == len(names) and not any(_number(name) is not None for name in names)
+    plain = all(names) and len(set(names)) == len(names) and not any(_of_cell(name) is not None for name in names)
     if not plain or names[0].startswith("#") or values.shape[1] != len(names) or not np.isfinite(values).all():
         return None
     return {name: values[:, place].copy() for place, name in enumerate(names)}
@@ -368,7 +362,7 @@ def _lines(file: Path) -> list[tuple[int, list[str]]]:
     if not found:
         raise RecordError(f"{file.name} is empty.")
     first, cells = found[0]
-    if all(_number(value) is not None for cell in cells for value in cell.split()):
+    if all(_of_cell(value) is not None for cell in cells for value in cell.split()):
         return [_names_in_remark([row for line, row in written if line < first], cells, file, first), *found]
     return found
 
@@ -379,11 +373,11 @@ def _encoding(file: Path) -> str:
     try:
         raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        found = f"byte 0x{raw[error.start]:02x} is not UTF-8"
+        line, byte = raw.count(b"\n", 0, error.start) + 1, raw[error.start]
     return (
-        f"{file.name}, line {line}: {found}; save it as UTF-8 text (what begins with 0xff or 0xfe is UTF-16, as"
-        " spreadsheets write it), or read it with pandas, read_csv(..., encoding=...), and give the table."
+        f"{file.name}, line {line}: byte 0x{byte:02x} is not UTF-8; save it as UTF-8 text (what begins with 0xff or"
+        " 0xfe is UTF-16, as spreadsheets write it), or read it with pandas, read_csv(..., encoding=...), and give the"
+        " table."
     )
 
 
@@ -395,7 +389,7 @@ def _is_remark(row: Sequence[str], width: int) -> bool:
 def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path, line: int) -> tuple[int, list[str]]:
     """The columns' names, where numpy.savetxt wrote them as a remark right above the first row of numbers, `cells`."""
     names = [cell.lstrip("#").strip() for cell in remarks[-1]] if remarks else []
-    parted = all(_number(cell) is not None for cell in cells)
+    parted = all(_of_cell(cell) is not None for cell in cells)
     if parted and len(names) == len(cells) and any(time in names for time in _TIMES):
         return line - 1, names
     raise RecordError(
@@ -406,7 +400,7 @@ def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path,
 
 def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) -> np.ndarray:
     """Numbers, NaN where a cell is empty, 1 and 0 where it is true or false; of labels it may be text."""
-    values = [_number(cell) for cell in cells]
+    values = [_of_cell(cell) for cell in cells]
     if None not in values:
         return np.array(values)
     if name in _LABELS:
@@ -418,10 +412,6 @@ def _typed(cells: Sequence[str], file: Path, lines: Sequence[int], name: str) ->
     if not any(value is not None and np.isfinite(value) for value in values):
         raise RecordError(f"{where} is text, not a number: write numbers, or leave the column out.")
     raise RecordError(f"{where} is not a number.")
-
-
-def _number(cell: str) -> float | None:
-    return _of_cell(cell)
 
 
 # -- one long record ------------------------------------------------------------------------------------------
@@ -450,8 +440,7 @@ def windows(
     phase of each `period` of a periodic input are repeats of one another; without it there are none. Raises
     RecordError.
     """
-    (table,) = _tables(data)
-    _increases(table)
+    table = _one_long(data)
     time = table.time_s - table.time_s[0]
     sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     every = seconds if every is None else every
@@ -480,10 +469,9 @@ def segments(data: Any, count: int = 10) -> list[Table]:
     """One long record as `count` stretches of one free run: each is simulated from the run's beginning to its own end
     and compared on its own samples. For records whose initial state is known only at the start; costs about half of
     `count` times a simulation of the whole. Raises RecordError."""
-    (table,) = _tables(data)
+    table = _one_long(data)
     if not isinstance(count, int) or count < 3:
         raise RecordError(f"record {table.name}: {count!r} segments; a diagnosis needs a whole number, 3 or more.")
-    _increases(table)
     ends = np.linspace(0, len(table.time_s), count + 1).astype(int)
     if len(table.time_s) < count * _FEWEST:
         raise RecordError(f"record {table.name} has {len(table.time_s)} samples: too few for {count} segments.")
@@ -505,12 +493,6 @@ def falling(time_s: np.ndarray) -> str:
     return f"time does not increase from sample {at[0]} ({before:g} s) to the next ({after:g} s)"
 
 
-def _increases(table: Table) -> None:
-    """Windows and segments are cut by time. Raises RecordError."""
-    if said := falling(table.time_s):
-        raise RecordError(f"record {table.name}: {said}: sort it by time, or give its parts one by one.")
-
-
 def _part(table: Table, name: str) -> str:
     """The name of a part of a record: with the record's own, if it has one, so that parts of several go together."""
     return f"{table.labels['name']}, {name}" if "name" in table.labels else name
@@ -530,8 +512,11 @@ def _along(column: Any, table: Table) -> bool:
     return np.shape(column) == table.time_s.shape
 
 
-def _tables(data: Any) -> list[Table]:
+def _one_long(data: Any) -> Table:
+    """The record that windows and segments are cut from, by time. Raises RecordError."""
     found = [one for one in read(data) if isinstance(one, Table)]
     if len(found) != 1:
         raise RecordError("give one long record to be cut.")
-    return found
+    if said := falling(found[0].time_s):
+        raise RecordError(f"record {found[0].name}: {said}: sort it by time, or give its parts one by one.")
+    return found[0]

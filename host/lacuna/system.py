@@ -127,6 +127,11 @@ class Effect:
         return not self.experiments or trial.experiment in self.experiments
 
     @property
+    def typical(self) -> dict[str, float]:
+        """The typical value of each of its parameters, those of each trial's own included, by full names."""
+        return {self.full_name(p): p.value for p in (*self.parameters, *self.own)}
+
+    @property
     def size_names(self) -> tuple[str, ...]:
         """The full names of the parameters that size the effect."""
         return tuple(self.full_name(p) for p in self.parameters[: self.sizes])
@@ -172,15 +177,15 @@ def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
     return list(groups.values())
 
 
-def middle_conditions(trials: Sequence[Record], fewest: int = 3) -> tuple[tuple[str, Hashable], ...]:
-    """Of each experiment with so many repeated conditions the one between the others, by the mean of what was measured
-    first: what is never fitted where nobody has said what should be."""
+def middle_conditions(trials: Sequence[Record]) -> tuple[tuple[str, Hashable], ...]:
+    """Of each experiment with three repeated conditions or more the one between the others, by the mean of what was
+    measured first: what is never fitted where nobody has said what should be."""
     means: dict[str, dict[Hashable, float]] = defaultdict(dict)
     for members in groups_of_repeats(trials):
         if len(members) > 1:
             samples = np.concatenate([next(iter(t.channels.values())) for t in members])
             means[members[0].experiment][members[0].condition] = float(np.nanmean(samples))
-    many = {experiment: each for experiment, each in means.items() if len(each) >= fewest}
+    many = {experiment: each for experiment, each in means.items() if len(each) >= 3}
     return tuple((experiment, sorted(each, key=each.__getitem__)[len(each) // 2]) for experiment, each in many.items())
 
 
@@ -208,11 +213,8 @@ class CorrectionSite:
 
 @dataclass(frozen=True)
 class Correction:
-    """A learnt curve at a site: `table` holds its values on a uniform grid from the site's lower to its
-    upper end.
-
-    Shape (rows of the site, n). Interpolate linearly.
-    """
+    """A learnt curve at a site: `table`, shape (rows of the site, n), holds its values on a uniform grid from the
+    site's lower to its upper end. Interpolate linearly."""
 
     site: str
     table: np.ndarray
@@ -277,9 +279,8 @@ class System(Protocol):
     at_once: int = 1  # trials that `predict_trials` simulates at little more than the cost of one
     forks: bool = False  # whether a fork of this process may simulate: not if it has threads or devices of its own
     tells_of_all: bool = False  # whether parameters are told from a fit to every record, those too that judged
-    nuisances_per_run: bool = (
-        False  # whether each run draws its own, so that repeats share nothing of them (`nuisances.py`)
-    )
+    # whether each run draws its own nuisances, so that repeats share nothing of them (`nuisances.py`)
+    nuisances_per_run: bool = False
 
     def predict_trials(
         self,

@@ -30,9 +30,8 @@ def _each(system: System) -> Iterator[tuple[str, Parameter, tuple[str, ...], The
     for p in system.parameters:
         yield p.name, p, (), start
     for effect in system.effects.values():
-        typical = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
         for p in effect.parameters:
-            yield effect.full_name(p), p, (effect.name,), start | typical
+            yield effect.full_name(p), p, (effect.name,), start | effect.typical
 
 
 def _width(

@@ -24,7 +24,7 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
     Raises MisuseError."""
     start = initial(system)
     predictions = {t.name: predicted(system, start, (), t) for t in trials}
-    failed = [t.name for t in trials if _fails(t, predictions[t.name])]
+    failed = [t.name for t in trials if _failing(t, predictions[t.name]) is not None]
     if len(failed) == len(trials):
         raise MisuseError(
             f"trial {failed[0]}, channel {_failing(trials[0], predictions[failed[0]])}: the prediction is NaN, as in"
@@ -92,10 +92,7 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
     """An effect at the size at which it is absent leaves the base model's prediction unchanged."""
     firsts = {t.experiment: t for t in reversed(trials)}
     for name, effect in system.effects.items():
-        off = {effect.full_name(p): p.value for p in effect.parameters} | dict.fromkeys(
-            effect.size_names, effect.absent
-        )
-        off |= {effect.full_name(p): p.value for p in effect.own}
+        off = effect.typical | dict.fromkeys(effect.size_names, effect.absent)
         for trial in firsts.values():
             if not effect.shows_in(trial):
                 continue
@@ -130,7 +127,6 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
     """Effects that change no prediction, at none of the sizes that fits begin at."""
     found = []
     for name, effect in system.effects.items():
-        values = {effect.full_name(p): p.value for p in (*effect.parameters, *effect.own)}
         sizes = [
             {
                 effect.full_name(p): min(max(effect.absent + by * (p.value - effect.absent), p.lower), p.upper)
@@ -143,7 +139,7 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
             differ(column, predictions[t.name][c], 0.0)
             for t in seen
             for size in sizes
-            for c, column in _sought(system, dict(start) | values | size, name, t).items()
+            for c, column in _sought(system, dict(start) | effect.typical | size, name, t).items()
         ):
             found.append(
                 f"Effect {name} changes no prediction, at none of its sizes that fits begin at: does the model use it,"
@@ -154,9 +150,8 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
 
 def _sought(system: System, theta: Theta, effect: str, trial: Record) -> Channels:
     """A prediction far from what is known: where there is none, that is a change."""
-    (found,) = system.predict_trials(
-        [dict(theta) | {p.name: p.value for p in system.nuisances(trial)}], (effect,), [trial]
-    )
+    theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
+    (found,) = system.predict_trials([theta], (effect,), [trial])
     return {name: found[name] for name in trial.channels}
 
 
@@ -172,10 +167,6 @@ def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: M
         ):
             idle.append(p.name)
     return idle
-
-
-def _fails(trial: Record, prediction: Channels) -> bool:
-    return _failing(trial, prediction) is not None
 
 
 def _failing(trial: Record, prediction: Channels) -> str | None:

@@ -14,8 +14,8 @@ _FEWEST_TRIALS = 3
 def check_names(system: System, trials: Sequence[Record]) -> None:
     if len(trials) < _FEWEST_TRIALS:
         raise TooLittleDataError(
-            f"{_counted(len(trials), 'trial')} given: a diagnosis needs at least {_FEWEST_TRIALS}, two for fitting and"
-            " one for selection. One long record can be cut into windows."
+            f"{len(trials)} trial{'' if len(trials) == 1 else 's'} given: a diagnosis needs at least {_FEWEST_TRIALS},"
+            " two for fitting and one for selection. One long record can be cut into windows."
         )
     for name in _repeated(t.name for t in trials):
         raise MisuseError(f"trial {name}: more than one trial has this name; names must be unique.")
@@ -41,7 +41,3 @@ def check_names(system: System, trials: Sequence[Record]) -> None:
 
 def _repeated(names: Iterable[str]) -> list[str]:
     return [name for name, count in Counter(names).items() if count > 1]
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"

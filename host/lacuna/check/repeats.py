@@ -142,7 +142,8 @@ def _unlike(group: Sequence[Record], channel: str, apart: np.ndarray, usual: flo
         others = [j for j in range(len(group)) if j != k]
         nearest, alike = apart[k, others].min(), float(np.median(_pairs(apart[np.ix_(others, others)])))
         if nearest > _UNLIKE * max(alike, usual) > 0.0:
-            at = _furthest(trial, group[others[0]], channel)
+            times_s, differs = _difference(trial, group[others[0]], channel)
+            at = trial.time_s[0] + times_s[np.nanargmax(np.abs(differs))]
             yield (
                 f"Trial {trial.name}, channel {channel}: unlike its repeats, from which it differs by {nearest:.3g}"
                 f" (RMS), they from one another by {alike:.2g}; most at {at:.4g} s. If it was recorded otherwise, leave"
@@ -170,11 +171,6 @@ def _difference(one: Record, other: Record, channel: str) -> tuple[np.ndarray, n
     return at, apart
 
 
-def _furthest(one: Record, other: Record, channel: str) -> float:
-    at, apart = _difference(one, other, channel)
-    return float(one.time_s[0] + at[np.nanargmax(np.abs(apart))])
-
-
 def _same_columns(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     return one.keys() == other.keys() and all(np.array_equal(one[name], other[name]) for name in one)
 
@@ -196,13 +192,10 @@ def _number_changed(one: object, other: object) -> bool:
 
 
 def _column_changed(first: Record, other: Record, name: str, spread_of_all: float) -> bool:
-    columns = [np.asarray(trial.inputs[name]) for trial in (first, other)]
-    sampled = all(
-        np.shape(c) == t.time_s.shape and c.dtype.kind in "fiu" for c, t in zip(columns, (first, other), strict=True)
-    )
-    if not sampled or spread_of_all == 0.0:
+    if spread_of_all == 0.0 or not (_is_sampled(first, name) and _is_sampled(other, name)):
         return False
-    return bool(np.sqrt(np.nanmean((columns[0] - _at_times_of(first, other, name)) ** 2)) > _OTHER * spread_of_all)
+    apart = np.asarray(first.inputs[name]) - _at_times_of(first, other, name)
+    return bool(np.sqrt(np.nanmean(apart**2)) > _OTHER * spread_of_all)
 
 
 def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
@@ -212,9 +205,10 @@ def _at_times_of(first: Record, other: Record, name: str) -> np.ndarray:
 def _input_spread(trials: Sequence[Record], name: str) -> float:
     """Over all trials: a measured input may be all noise in one of them."""
     columns = [np.asarray(t.inputs[name]) for t in trials if _is_sampled(t, name)]
-    columns = [column for column in columns if column.dtype.kind in "fiu"]
     return spread(np.concatenate(columns)) if columns else 0.0
 
 
 def _is_sampled(trial: Record, name: str) -> bool:
-    return name in trial.inputs and np.shape(trial.inputs[name]) == trial.time_s.shape
+    """Whether it has a number for each of its times under this name."""
+    column = np.asarray(trial.inputs.get(name))
+    return column.shape == trial.time_s.shape and column.dtype.kind in "fiu"
