@@ -4,24 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import ToySystem, hide
+from toy import NOBODY, case_of, hide
 
 from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis import race as race_module
-from lacuna.diagnosis.candidate import judge
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.linear import remaining_after
-from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import from_elsewhere
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import led_out, search, with_derivatives
-from lacuna.diagnosis.split import split_trials
-from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, fit, reweigh
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
-
-NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 
 
 @pytest.fixture
@@ -29,7 +23,7 @@ def case():
     """The toy; one of its conditions is never fitted."""
     system = hide({}, seed=31)
     first = system.trials[0]
-    return Case(system, split_trials(system.trials, [(first.experiment, first.condition)]), POLICY, 0)
+    return case_of(system, [(first.experiment, first.condition)])
 
 
 def moved(fitted: Fit, by: float) -> Fit:
@@ -104,19 +98,11 @@ def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case):
     assert case.suffices(found.base)
 
 
-class Bench(ToySystem):
-    """Sweeps show all parameters together."""
-
-    def isolates(self, trial):
-        return trial.experiment == "steps"
-
-
 def test_a_set_that_comes_up_as_it_is_weighed_again_can_be_grown():
-    system = hide({"delay.delay_s": 0.03}, seed=32)
-    split = split_trials(system.trials, system.spare())
-    base = Case(system, split, POLICY, 0).fit_base(1)
-    floor = base.problem.floor
-    bare = judge(reweigh(fit(Structure(system, ("delay",)), split.fit, floor), floor, max_iterations=0), split, POLICY)
+    case = case_of(hide({"delay.delay_s": 0.03}, seed=32))
+    floor = case.fit_base(1).problem.floor
+    delayed = fit(Structure(case.system, ("delay",)), case.split.fit, floor)
+    bare = case.judge(reweigh(delayed, floor, max_iterations=0))
     assert not bare.fitted.solution.sensitivities
     assert score(with_derivatives(bare).fitted, ["coulomb"], NOBODY).singles()
 
@@ -132,6 +118,4 @@ def test_what_has_to_be_foreseen_counts_only_where_it_is_so_of_every_pair(monkey
     monkeypatch.setattr(
         case_module, "excess_over", lambda mine, *_: ahead[mine[0][1]] if isinstance(mine[0], tuple) else known[mine[0]]
     )
-    system = hide({})
-    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
-    assert case.exceeds_on_all(*pairs) is exceeds
+    assert case_of(hide({})).exceeds_on_all(*pairs) is exceeds

@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
+from toy import NOBODY, case_of
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.cross_fit import cross_fitted, is_due
-from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.search import Search
-from lacuna.diagnosis.split import split_trials
-from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import fit
 from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
@@ -47,20 +44,18 @@ def records(seed, count, bend=0.0, steps=0.0, **more):
     ]
 
 
-def case_of(*given, **more):
-    trials = with_records(system(), records(*given, **more))
-    return Case(trials, split_trials(trials.trials), POLICY, 0)
+def measured(*given, **more):
+    return case_of(with_records(system(), records(*given, **more)))
 
 
 def judged(case):
     base = case.judge(case.fit_base(1))
-    workers = Workers(lambda _: None)
-    return cross_fitted(case, Search(base, base.fitted.problem.floor, (base,), ()), workers).base
+    return cross_fitted(case, Search(base, base.fitted.problem.floor, (base,), ()), NOBODY).base
 
 
 def test_each_record_is_predicted_by_the_mean_of_the_others():
     """Of a constant, where that is leave-one-out in closed form."""
-    found = judged(case_of(1, 5, steps=0.3))
+    found = judged(measured(1, 5, steps=0.3))
     known = found.fitted.problem.trials
     assert sorted(found.errors) == sorted(trial.name for trial in known)
     sd = found.fitted.problem.floor.channels["run", "y"].sd
@@ -71,8 +66,8 @@ def test_each_record_is_predicted_by_the_mean_of_the_others():
 
 
 def test_it_is_due_where_nothing_is_repeated():
-    assert is_due(case_of(1, 5))
-    assert not is_due(case_of(1, 5, condition="same"))
+    assert is_due(measured(1, 5))
+    assert not is_due(measured(1, 5, condition="same"))
 
 
 def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_with_it():
@@ -87,7 +82,7 @@ def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_
     told = with_records(
         lacuna.System(with_decoys, system().parameters, library, sensor_noise={"y": NOISE}), records(3, 7, bend=0.6)
     )
-    case = Case(told, split_trials(told.trials), POLICY, 0)
+    case = case_of(told)
     base = case.judge(case.fit_base(1))
     floor, known = base.fitted.problem.floor, case.split.fit
     sets = [(), ("bend",), *(("bend", decoy.name) for decoy in decoys)]
@@ -96,7 +91,7 @@ def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_
     assert sum(pair.fitted.cost < alone.fitted.cost for pair in pairs) == 12
     for pair in pairs:  # whatever their parameters cost them
         pair.__dict__["cost"] = min(pair.cost, alone.cost - 1e-3)
-    found = cross_fitted(case, Search(tried[0], floor, tuple(tried), ()), Workers(lambda _: None))
+    found = cross_fitted(case, Search(tried[0], floor, tuple(tried), ()), NOBODY)
     assert found.with_effects(("bend",)) is not None
 
 

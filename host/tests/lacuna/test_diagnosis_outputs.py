@@ -21,9 +21,13 @@ pytestmark = pytest.mark.slow
 KEY = ("sweep", "position_mm")
 
 
-def test_page_says_the_effect_and_loads_nothing():
-    record = as_record(diagnose(hide({"delay.delay_s": 0.02}, seed=30)))
-    page = render(diagnosis_page("toy", record))
+@pytest.fixture(scope="module")
+def found():
+    return diagnose(hide({"delay.delay_s": 0.02}, seed=30))
+
+
+def test_page_says_the_effect_and_loads_nothing(found):
+    page = render(diagnosis_page("toy", as_record(found)))
     assert "delay" in page
     assert "that the model does not explain: position_mm in sweep" in page
     assert 'src="http' not in page
@@ -36,15 +40,14 @@ def test_page_shows_what_was_learnt_where_no_effect_explains_the_data():
     assert curve["rows"][""][-1] * curve["rows"][""][0] < 0.0
 
 
-def test_page_has_an_interval_without_an_end():
-    record = as_record(diagnose(hide({"delay.delay_s": 0.02}, seed=30)))
+def test_page_has_an_interval_without_an_end(found):
+    record = as_record(found)
     (effect,) = record["effects"]
     effect["interval_90"]["delay_s"][1] = None
     assert "to -)" in render(diagnosis_page("toy", record))
 
 
-def test_what_is_named_is_not_what_the_data_would_hardly_show():
-    found = diagnose(hide({"delay.delay_s": 0.02}, seed=30))
+def test_what_is_named_is_not_what_the_data_would_hardly_show(found):
     blind = [replace(s, visible=0.0) for s in found.search.screened]
     found = replace(found, search=replace(found.search, screened=tuple(blind), tried=found.search.tried[:1]))
     hidden = as_record(found)["not_detectable_here"]
@@ -60,8 +63,7 @@ def test_where_something_matters_it_is_told_where():
     assert "position_mm in sweep (0.7 x the floor)" in describe(found.base, small).text
 
 
-def test_final_records_and_a_likelier_set_speak_against_a_verdict():
-    found = diagnose(hide({"delay.delay_s": 0.02}, seed=30))
+def test_final_records_and_a_likelier_set_speak_against_a_verdict(found):
     assert doubts(found.choice, found.split, 0.9, POLICY) == []
     (little,) = doubts(found.choice, found.split, 0.3, POLICY)
     assert "only 30 % is closed" in little

@@ -4,7 +4,7 @@ work is done by a curve at their place, unless their own formula does most of it
 from dataclasses import replace
 
 import pytest
-from toy import hide
+from toy import NOBODY, case_of, hide, with_effect
 
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import weigh
@@ -12,23 +12,15 @@ from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.search import Search
-from lacuna.diagnosis.split import split_trials
-from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import fit, starting_point
-from lacuna.estimation.structure import Structure
 
 OPEN, SURE = (-1.0, 1.0), (0.01, 0.05)  # intervals: one that holds 0, one that does not
 
 
 @pytest.mark.parametrize(("true_s", "stays"), [(0.03, True), (0.0, False)])
 def test_an_effect_with_an_open_interval_stays_only_where_much_is_worse_without_it(monkeypatch, true_s, stays):
-    system = hide({"delay.delay_s": true_s}, seed=33)
-    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
-    base = case.judge(case.fit_base(1))
-    structure, floor = Structure(system, ("delay",)), base.fitted.problem.floor
-    start = [starting_point(base.fitted, structure)]
-    delayed = case.judge(fit(structure, case.split.fit, floor, starts=start))
-    found = Search(base, floor, (base, delayed), ())
+    case = case_of(hide({"delay.delay_s": true_s}, seed=33))
+    base, delayed = with_effect(case, "delay")
+    found = Search(base, base.fitted.problem.floor, (base, delayed), ())
     monkeypatch.setattr(Case, "intervals", lambda self, candidate: dict.fromkeys(candidate.fitted.theta, OPEN))
     _, kept = eliminate(case, found, weigh(found, delayed, POLICY))
     assert kept.candidate.effects == (("delay",) if stays else ())
@@ -45,14 +37,10 @@ def test_an_effect_stays_beside_a_curve_only_if_its_formula_does_most_of_the_wor
     monkeypatch.setattr(Case, "intervals", lambda self, candidate: dict.fromkeys(candidate.fitted.theta, SURE))
     system = hide(truth, seed=34)
     cubic_spring = replace(system.effects["cubic_spring"], freed_at=("spring",))
-    system = replace(system, effects={"cubic_spring": cubic_spring})
-    case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
-    base = case.judge(case.fit_base(1))
-    structure, floor = Structure(system, ("cubic_spring",)), base.fitted.problem.floor
-    start = [starting_point(base.fitted, structure)]
-    cubic = case.judge(fit(structure, case.split.fit, floor, starts=start))
-    freed = free_form(cubic, case.split, policy=POLICY, workers=Workers(lambda _: None))
-    found = Search(base, floor, (base, cubic), (), (freed,))
+    case = case_of(replace(system, effects={"cubic_spring": cubic_spring}))
+    base, cubic = with_effect(case, "cubic_spring")
+    freed = free_form(cubic, case.split, policy=POLICY, workers=NOBODY)
+    found = Search(base, base.fitted.problem.floor, (base, cubic), (), (freed,))
     found, kept = eliminate(case, found, weigh(found, cubic, POLICY))
     assert kept.candidate is (cubic if stays else base)
     if not stays:

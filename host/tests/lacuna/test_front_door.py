@@ -27,11 +27,6 @@ LAG = {"sensor_lag__lag_s": 3.0}
 LIMIT = {"saturation__limit_W": 6.0}
 
 
-@pytest.fixture(scope="module")
-def verdict():
-    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), progress=False)
-
-
 def test_names_what_a_plain_function_lacks(verdict):
     assert verdict.verdict == "identified"
     assert [e.name for e in verdict.effects] == ["sensor_lag"]

@@ -11,13 +11,6 @@ import lacuna
 from lacuna.diagnosis.split import split_trials
 from lacuna.system import Record
 
-LAG = {"sensor_lag__lag_s": 3.0}
-
-
-@pytest.fixture(scope="module")
-def verdict():
-    return lacuna.diagnose(heater.system(), heater.records(seed=1, **LAG), progress=False)
-
 
 def test_parameters_come_as_a_table_with_their_intervals(verdict):
     pytest.importorskip("pandas")
@@ -87,7 +80,7 @@ def test_a_person_says_which_records_are_the_test():
     assert [t.name for t in split.final] == ["a0", "b2"]
     assert not {t.name for t in split.known + split.unseen} & {"a0", "b2"}
     assert len(split.fit + split.judging + split.final) == 6
-    given = heater.records(seed=1, repeats=3, **LAG)
+    given = heater.records(seed=1, repeats=3, sensor_lag__lag_s=3.0)
     found = lacuna.diagnose(heater.system(), given, test=["steps_4W_2", "sweep_10W_3"], progress=False)
     assert [e.name for e in found.effects] == ["sensor_lag"]
     held_out = found.record["held_out"]

@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from toy import hide
+from toy import case_of, hide
 
 from lacuna.diagnosis.candidate import implausibility
-from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Comparison, choose, weigh
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.drift import find_drift
@@ -93,8 +92,7 @@ def test_noise_alone_is_structure_as_seldom_as_the_rule_says():
 @pytest.mark.slow
 def test_drift_chance_a_trend_is_a_drift_where_shuffled_orders_seldom_show_it():
     for drift, found in ((0.0, False), (0.02, True)):
-        system = hide({}, seed=16, repeats=6, drift=drift)
-        case = Case(system, split_trials(system.trials), POLICY, 0)
+        case = case_of(hide({}, seed=16, repeats=6, drift=drift))
         fitted = case.on_known(case.judge(case.fit_base(1)))
         assert bool(find_drift(fitted)) is found
         assert find_drift(fitted, policy=replace(POLICY, drift_chance=1.0)), (

@@ -2,20 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from toy import NOBODY, case_of
 
-from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import COARSE, continued
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.sizes import starts
-from lacuna.diagnosis.split import split_trials
-from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import fit, predictive
 from lacuna.estimation.problem import Point
 from lacuna.estimation.solve import solve
@@ -27,7 +24,6 @@ SD = 0.02  # N
 REPEATS = 4
 SPEEDS_MM_S = (2.0, 5.0, 8.0, 12.0, 20.0)
 HOLDING_N, SLIDING_N = 1.07, 1.0
-NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 
 
 def friction(holding_N, sliding_N, speed_mm_s, fading_mm_s):
@@ -79,20 +75,14 @@ def measured(fading_mm_s: float, seed: int) -> Pulls:
     return Pulls(tuple(trials))
 
 
-class Diagnosed:
-    """A data set with its base fit."""
-
-    def __init__(self, fading_mm_s: float, seed: int):
-        self.system = measured(fading_mm_s, seed)
-        self.case = Case(self.system, split_trials(self.system.trials, self.system.spare()), POLICY, 0)
-
-    @cached_property
-    def base(self):
-        return self.case.judge(self.case.fit_base(1))
+def diagnosed(fading_mm_s: float, seed: int):
+    """A data set, and its base fit."""
+    case = case_of(measured(fading_mm_s, seed))
+    return case, case.judge(case.fit_base(1))
 
 
 def test_what_is_foreseen_of_a_run_is_the_mean_of_its_factors():
-    fitted = Diagnosed(10.0, 1).base.fitted
+    fitted = diagnosed(10.0, 1)[1].fitted
     assert any(abs(values[0] - 1.0) > SCATTER for values in fitted.solution.point.nuisances)
     before = predictive(fitted)
     assert all(values[0] == 1.0 for values in before.solution.point.nuisances)
@@ -102,30 +92,28 @@ def test_what_is_foreseen_of_a_run_is_the_mean_of_its_factors():
 
 @pytest.mark.parametrize(("fading_mm_s", "seed", "found"), [(10.0, 2, "fading"), (0.0, 3, None), (0.0, 4, None)])
 def test_an_effect_that_the_factors_of_each_run_take_up_is_found(fading_mm_s, seed, found):
-    data = Diagnosed(fading_mm_s, seed)
-    left = data.case.remainder(data.case.converged(data.base))
-    assert not left.matters, "nothing of it is left in the residual"
-    assert data.case.hidden(data.base) == found
-    assert data.case.suffices(data.base) is (found is None)
+    case, base = diagnosed(fading_mm_s, seed)
+    assert not case.remainder(case.converged(base)).matters, "nothing of it is left in the residual"
+    assert case.hidden(base) == found
+    assert case.suffices(base) is (found is None)
 
 
 def test_nothing_is_grown_on_an_explanation_with_a_learnt_curve():
-    data = Diagnosed(10.0, 7)
-    curved = Structure(data.system, (), ("friction",))
-    floor = data.base.fitted.problem.floor
-    assert data.case.hidden(data.case.judge(fit(curved, data.case.split.fit, floor))) is None
+    case, base = diagnosed(10.0, 7)
+    curved = Structure(case.system, (), ("friction",))
+    assert case.hidden(case.judge(fit(curved, case.split.fit, base.fitted.problem.floor))) is None
 
 
 def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
     """Steps with derivatives from where both frictions are one would make them one again, whatever the size."""
-    data = Diagnosed(10.0, 8)
-    base = data.base.fitted
+    case, judged = diagnosed(10.0, 8)
+    base = judged.fitted
     holding, sliding = (base.structure.names.index(f"{name}_N") for name in ("holding", "sliding"))
 
     values = base.solution.point.values.copy()
     values[holding] = values[sliding]
     one = replace(base, solution=replace(base.solution, point=Point(values, base.solution.point.nuisances)))
-    structure = Structure(data.system, ("fading",))
+    structure = Structure(case.system, ("fading",))
     begun = starts(one, structure, "fading")
     assert len(begun) == 3
     assert all(each[holding] > each[sliding] for each in begun)

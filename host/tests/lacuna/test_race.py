@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from toy import ToySystem, hide
+from toy import NOBODY, ToySystem, case_of, hide
 
 import lacuna
 from lacuna import Effect, Parameter
@@ -16,8 +16,6 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.race import cold, cold_starts, initial_guess, joined, race, to_the_end
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import search
-from lacuna.diagnosis.split import split_trials
-from lacuna.diagnosis.workers import Workers
 from lacuna.errors import MisuseError
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.problem import Problem
@@ -25,7 +23,6 @@ from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
 
-NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 TIME_S = np.linspace(0.0, 10.0, 200)
 SHAPES = {"a": np.cos(2 * TIME_S), "b": np.cos(3 * TIME_S), "c": np.cos(2 * TIME_S) + np.cos(3 * TIME_S), "d": TIME_S}
 
@@ -42,8 +39,7 @@ def linear(sizes, seed=0, sizes_given=0.02) -> Case:
         records.append({"time_s": TIME_S, "k": k, "y": y + 0.1 * draw.standard_normal(200)})
     effects = [Effect(name, Parameter("size", "", sizes_given, -5.0, 5.0)) for name in SHAPES]
     system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -9.0, 9.0)], effects, sensor_noise={"y": 0.1})
-    system = with_records(system, records)
-    return Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    return case_of(with_records(system, records))
 
 
 def scored(case):
@@ -86,7 +82,7 @@ def test_what_is_suspected_is_fitted_whatever_it_promises():
     ]
     system = with_records(system, records)
     for suspected in ((), ("tone_8",)):
-        case = Case(system, split_trials(system.trials, system.spare()), POLICY, 0, suspected)
+        case = case_of(system, suspected=suspected)
         found = search(case, case.judge(case.fit_base(1)), enough=lambda _: False, workers=NOBODY)
         tried = {c.effects for c in found.tried if "tone_8" in c.effects}
         assert {len(effects) for effects in tried} >= {1, 2} if suspected else not tried
@@ -131,8 +127,7 @@ class Bench(ToySystem):
 
 def bench(effects, seed) -> Case:
     hidden = hide(effects, seed=seed)
-    system = Bench(hidden.trials, hidden.effects)
-    return Case(system, split_trials(system.trials, system.spare()), POLICY, 0)
+    return case_of(Bench(hidden.trials, hidden.effects))
 
 
 def lost(case: Case, effects=()) -> Candidate:
@@ -174,8 +169,7 @@ def test_a_limit_begins_where_it_is_declared_too():
         lacuna.System(simulate, [Parameter("slope", "", 1.0, 0.1, 9.0)], [clip]),
         [{"time_s": TIME_S, "k": k, "y": np.minimum(2.0 * TIME_S, 12.0) + 0.01 * np.cos(9 * TIME_S)} for k in range(5)],
     )
-    case = Case(system, split_trials(system.trials), POLICY, 0)
-    (one,) = score(case.fit_base(1), ["clip"], NOBODY).singles()
+    (one,) = score(case_of(system).fit_base(1), ["clip"], NOBODY).singles()
     declared = [one.problem.structure.theta(values)["clip.limit"] for values in cold_starts(one)]
     assert 0.1 in declared
 

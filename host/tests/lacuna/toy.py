@@ -15,6 +15,13 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.case import Case
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.split import split_trials
+from lacuna.diagnosis.workers import Workers
+from lacuna.estimation.fit import fit, starting_point
+from lacuna.estimation.structure import Structure
 from lacuna.system import (
     CandidateExperiment,
     Channels,
@@ -27,6 +34,7 @@ from lacuna.system import (
     Theta,
 )
 
+NOBODY = Workers(lambda _: None)  # says nothing, and forks nothing
 SAMPLE_S = 0.01
 STEPS_PER_SAMPLE = 8
 RIPPLE_PITCH_M = 0.06
@@ -226,6 +234,20 @@ def hide(
         trials.append(_trial(experiment, size, repeat + 1, order, clean + noise))
     library = {name: e for name, e in _EFFECTS.items() if name not in withhold}
     return ToySystem(tuple(trials), library)
+
+
+def case_of(system: System, spare=None, suspected: Sequence[str] = ()) -> Case:
+    """Any system under diagnosis. `spare`: conditions that are never fitted, if not those that the system spares."""
+    split = split_trials(system.trials, system.spare() if spare is None else spare)
+    return Case(system, split, POLICY, 0, suspected)
+
+
+def with_effect(case: Case, effect: str) -> tuple[Candidate, Candidate]:
+    """The base model fitted, and fitted from there with an effect."""
+    base = case.judge(case.fit_base(1))
+    structure = Structure(case.system, (effect,))
+    start = [starting_point(base.fitted, structure)]
+    return base, case.judge(fit(structure, case.split.fit, base.fitted.problem.floor, starts=start))
 
 
 def draw_base(draw: np.random.Generator) -> dict[str, float]:
