@@ -21,10 +21,8 @@ from lacuna.system import Record, groups_of_repeats
 
 _FOLDS = 5
 _COMPARED = 10  # explanations, the best first
-_REFIT: dict[str, Any] = {
-    "max_iterations": 12,
-    "relative": 1e-5,
-}  # fine: a fit that stays where it was knows what it is to predict
+# Fine: a fit that stays where it was knows what it is to predict.
+_REFIT: dict[str, Any] = {"max_iterations": 12, "relative": 1e-5}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +61,8 @@ def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
     leading, others = near[:_COMPARED], near[_COMPARED:]
     contained = [c for c in others if any(set(c.effects) < set(one.effects) for one in leading)]
     candidates = [found.base, *leading, *contained, *found.freed]
-    folds = _folds(case.split.known)
+    count = min(_FOLDS, len(case.split.known))
+    folds = [case.split.known[k::count] for k in range(count)]
     known = [case.on_known(candidate) for candidate in candidates]
     jobs = [(fit, fold) for fit in known for fold in folds]
     names = [c.effects or ("nothing",) for c in candidates for _ in folds]
@@ -80,11 +79,6 @@ def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
         tried=tuple(judged[c] for c in candidates if c not in found.freed),
         freed=tuple(judged[c] for c in found.freed),
     )
-
-
-def _folds(known: Sequence[Record]) -> list[list[Record]]:
-    count = min(_FOLDS, len(known))
-    return [list(known[k::count]) for k in range(count)]
 
 
 def _left_out(fitted: Fit, fold: Sequence[Record]) -> Fit:

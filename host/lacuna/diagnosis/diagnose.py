@@ -141,8 +141,9 @@ def diagnose(
     shown = choice.explanation if judged.verdict == "identified" else found.base
     followed = followed_by_nothing(case.followed(shown))
     told = _told(case, judged, shown, final)
-    said = (*([STOPPED] if hand.stopped else []), *cautions, *followed, *warnings_of(told, split))
-    return _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
+    said = (*cautions, *followed, *warnings_of(told, split))
+    reported = _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
+    return replace(reported, warnings=(STOPPED, *reported.warnings)) if hand.stopped else reported
 
 
 def decided(case: Case, found: Search, hand: Stoppable) -> tuple[Search, Choice, Assessed]:
@@ -279,12 +280,13 @@ def _reported(
     before = error_of(judged.base, split)
     explained = error_of(judged.explained, split) if identified else before
     closed = share_of_gap(before.held_out, explained.held_out, judged.floor.held_out) if identified else 0.0
+    shown = choice.candidate if identified else found.base
     signature = describe(judged.explained, judged.left, judged.drifts)
     effects = describe_effects(case, found, choice, (before, judged.floor)) if identified else ()
     return Diagnosis(
         verdict=judged.verdict,
         effects=effects,
-        base_parameters=_base_parameters(case, choice, found, judged.verdict),
+        base_parameters={} if judged.verdict == "unexplained" else describe_base(case, shown),
         base=judged.base,
         explained=judged.explained,
         final=final,
@@ -297,9 +299,8 @@ def _reported(
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
-            *(one for one in said if one == STOPPED),
             *_doubts(case, choice, judged, effects, (before, explained)),
-            *(one for one in said if one != STOPPED),
+            *said,
             *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
         ),
         learnt=tuple((case.system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
@@ -368,18 +369,9 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, work
     return final if not split.final or holds(final, judged.explained, split) else judged.explained
 
 
-def _base_parameters(case: Case, choice: Choice, found: Search, verdict: str) -> dict[str, Estimated]:
-    if verdict == "unexplained":
-        return {}
-    return describe_base(case, choice.candidate if verdict == "identified" else found.base)
-
-
 def _next(choice: Choice, found: Search) -> NextExperiment:
     chosen = frozenset(choice.candidate.effects)
-    rivals = [choice.candidate]
-    for effect, others in choice.confusable_with.items():
-        for other in others:
-            rival = found.with_effects(chosen - {effect} | {other})
-            if rival is not None:
-                rivals.append(rival)
-    return next_experiment(rivals, found.floor, dispersion_of(found.tried))
+    exchanges = [(effect, other) for effect, others in choice.confusable_with.items() for other in others]
+    rivals = [found.with_effects(chosen - {effect} | {other}) for effect, other in exchanges]
+    tried = [choice.candidate, *(rival for rival in rivals if rival is not None)]
+    return next_experiment(tried, found.floor, dispersion_of(found.tried))

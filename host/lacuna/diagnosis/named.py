@@ -56,17 +56,11 @@ def describe_effects(case: Case, found: Search, choice: Choice, gap: tuple[Error
     named = []
     for effect, share in _shares(case, found, choice, gap):
         described = fitted.structure.system.effects[effect]
-        named.append(
-            Named(
-                effect,
-                _form(described, choice),
-                {p.name: fitted.theta[described.full_name(p)] for p in described.parameters},
-                {p.name: within[described.full_name(p)] for p in described.parameters},
-                choice.probability[effect],
-                share,
-                choice.confusable_with[effect],
-            )
-        )
+        full = {p.name: described.full_name(p) for p in described.parameters}
+        values = {name: fitted.theta[key] for name, key in full.items()}
+        ends = {name: within[key] for name, key in full.items()}
+        weight, rivals = choice.probability[effect], choice.confusable_with[effect]
+        named.append(Named(effect, _form(described, choice), values, ends, weight, share, rivals))
     return tuple(named)
 
 

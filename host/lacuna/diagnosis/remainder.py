@@ -63,7 +63,7 @@ class Remainder:
     def worst(self) -> float:
         """The largest multiple of what is relevant in any experiment with structure: above 1 something matters."""
         places = [key for key in self.found if self.shared[key] > self.good_enough[key]]
-        return max((self._mean(e) / self.policy.relevance for e in {e for e, _ in places}), default=0.0)
+        return max((self._mean(self.shared, e) / self.policy.relevance for e in {e for e, _ in places}), default=0.0)
 
     @property
     def cannot_tell(self) -> dict[str, float]:
@@ -72,20 +72,15 @@ class Remainder:
         (equivalence), not only what was found."""
         found = {}
         for experiment in {e for e, _ in self.shared} if self.sd else ():
-            keys = [key for key in self.shared if key[0] == experiment]
-            most = {key: max(self.shared[key], 0.0) + _SURELY * self.sd[key] for key in keys}
-            mean = sum(v if v > self.good_enough[key] else 0.0 for key, v in most.items()) / len(keys)
+            most = {key: max(shared, 0.0) + _SURELY * self.sd[key] for key, shared in self.shared.items()}
+            mean = self._mean(most, experiment)
             if mean > self.policy.relevance:
                 found[experiment] = float(np.sqrt(mean))
         return dict(sorted(found.items(), key=lambda one: -one[1]))
 
-    def _mean(self, experiment: str) -> float:
+    def _mean(self, of: Mapping[tuple[str, str], float], experiment: str) -> float:
         """What repeats of an experiment share, over all of its channels; what is good enough counts as nothing."""
-        each = [
-            value if value > self.good_enough[key] else 0.0
-            for key, value in self.shared.items()
-            if key[0] == experiment
-        ]
+        each = [v if v > self.good_enough[key] else 0.0 for key, v in of.items() if key[0] == experiment]
         return sum(each) / len(each)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 
-from lacuna.system import Record
+from lacuna.system import Record, groups_of_repeats
 
 
 @dataclass(frozen=True)
@@ -60,32 +59,24 @@ def split_trials(
     one goes to either in turn; of trials without repeats every fifth is `final` and another fifth selects. None is
     `final` if nothing else could judge, or if it alone has a channel.
     """
-    groups: dict[tuple[str, Hashable], list[Record]] = defaultdict(list)
-    for trial in (t for t in trials if t.name not in test):
-        groups[trial.experiment, trial.condition].append(trial)
-    left_out = set(spare)
     parts: dict[str, list[Record]] = {"fit": [], "select": [], "unseen": [], "final": []}
-    pairs = 0
-    singles = [members[0] for key, members in groups.items() if len(members) == 1 and key not in left_out]
-    for turn, (key, members) in enumerate(groups.items()):
-        if key in left_out:
+    pairs = singles = 0
+    for turn, members in enumerate(groups_of_repeats([t for t in trials if t.name not in test])):
+        first = members[0]
+        if (first.experiment, first.condition) in spare:
             most = max(len(members) - 1, 1)
             parts["unseen"] += members[:most]
             parts["final"] += members[most:]
-            continue
-        if len(members) == 1:
-            continue
-        if len(members) == 2:
+        elif len(members) == 1:
+            parts[("fit", "fit", "select", "fit", "final")[singles % 5]].append(first)
+            singles += 1
+        elif len(members) == 2:
             parts["fit"].append(members[pairs % 2])
             parts["select" if pairs % 2 else "final"].append(members[1 - pairs % 2])
             pairs += 1
-            continue
-        for place, trial in enumerate(members):
-            role = ("final", "select", "fit")[(place + turn) % 3]
-            parts[role].append(trial)
-    for place, trial in enumerate(singles):
-        role = "final" if place % 5 == 4 else "select" if place % 5 == 2 else "fit"
-        parts[role].append(trial)
+        else:
+            for place, trial in enumerate(members):
+                parts[("final", "select", "fit")[(place + turn) % 3]].append(trial)
     if test:
         parts["select"] += parts["final"]
         parts["final"] = [t for t in trials if t.name in test]
