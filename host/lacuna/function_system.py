@@ -376,9 +376,13 @@ def _copied(record: Record) -> Record:
 
 def _changed(before: Record, after: Record) -> str | None:
     """The name of a column whose samples are not what they were."""
-    old, new = (({"time_s": r.time_s}, r.inputs, r.channels) for r in (before, after))
-    pairs = ((name, was, now.get(name)) for were, now in zip(old, new, strict=True) for name, was in were.items())
-    return next((name for name, was, now in pairs if not _is_same(was, now)), None)
+    if not _is_same(before.time_s, after.time_s):
+        return "time_s"
+    for old, new in ((before.inputs, after.inputs), (before.channels, after.channels)):
+        for name, column in old.items():
+            if not _is_same(column, new.get(name)):
+                return name
+    return None
 
 
 def _is_same(one: Any, other: Any) -> bool:

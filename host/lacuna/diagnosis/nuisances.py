@@ -30,7 +30,7 @@ class Followed(NamedTuple):
     share: float
 
 
-class Run(NamedTuple):
+class NuisanceOfRun(NamedTuple):
     """What a trial has of a nuisance."""
 
     trial: Record
@@ -43,12 +43,14 @@ class Run(NamedTuple):
         return (self.value - self.nuisance.value) / self.nuisance.step_scale
 
 
-def runs_of(fits: Sequence[Fit]) -> Iterator[Run]:
+def runs_of(fits: Sequence[Fit]) -> Iterator[NuisanceOfRun]:
     """Every nuisance of every trial of these fits, but for an effect's own (a phase): that may do as it likes."""
     for fit in fits:
         every = zip(fit.problem.trials, fit.solution.point.nuisances, fit.problem.nuisances, strict=True)
         for trial, values, parameters in every:
-            yield from (Run(trial, p, float(v)) for p, v in zip(parameters, values, strict=True) if "." not in p.name)
+            for p, value in zip(parameters, values, strict=True):
+                if "." not in p.name:
+                    yield NuisanceOfRun(trial, p, float(value))
 
 
 def find_followed(fits: Sequence[Fit], *, policy: Policy, seed: int = 0) -> tuple[Followed, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lacuna.check.numbers import listed
-from lacuna.diagnosis.nuisances import Run, runs_of
+from lacuna.diagnosis.nuisances import NuisanceOfRun, runs_of
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.score import score
@@ -57,7 +57,7 @@ def _parameters(fitted: Fit) -> list[str]:
 
 def _strayed(fits: list[Fit]) -> list[str]:
     """Nuisances far from what is expected, in single trials or, by less, in all of them."""
-    runs: dict[str, list[Run]] = {}
+    runs: dict[str, list[NuisanceOfRun]] = {}
     for run in runs_of(fits):
         runs.setdefault(run.nuisance.name, []).append(run)
     found = []
