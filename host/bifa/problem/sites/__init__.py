@@ -24,10 +24,8 @@ def declared(model: Model, curves: Mapping[str, FittedCurve]) -> dict[str, Corre
     """The sites of a model; those over a spring's range have that of its fitted curve, if there is one."""
     springs = {"body": model.body_stiffness, "small": model.small_stiffness}
     fitted = {prefix: curves[prefix].fit if prefix in curves else spring for prefix, spring in springs.items()}
-    ends_m: dict[Range | str, tuple[float, float]] = {
-        prefix: (spring.lower_m, spring.upper_m) for prefix, spring in fitted.items()
-    }
-    return {name: site.declared(ends_m.get(site.over)) for name, site in SITES.items()}
+    ranges = {prefix: Range("displacement (m)", spring.lower_m, spring.upper_m) for prefix, spring in fitted.items()}
+    return {name: site.declared(ranges) for name, site in SITES.items()}
 
 
 def corrected(plant: Plant, corrections: Sequence[Correction], place_in_session: float = 0.0) -> Plant:

@@ -3,26 +3,15 @@
 from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK
 from bifa.problem.sites.site import PLACE, PRESSURE, SPEED, VELOCITY, Range, Site
 
+_STROKE = Range("share of the stroke", 0.0, 1.0)
+_WAYS = ("forward", "backward")
+_GRIP = "friction coefficient of an end, eq. (5), by its"
+
 SITES = (
+    Site("area_stroke", "the area a of eq. (2), by the share of the stroke", _STROKE, "", 0.01),
+    Site("body_damper", "the body's damper, b v in eq. (1)", VELOCITY, "N", 1.0, (STEP, WALK)),
     Site(
-        "area_stroke",
-        "the area a of eq. (2), by the share of the stroke",
-        Range("share of the stroke", 0.0, 1.0),
-        "",
-        0.01,
-        equation=True,
-    ),
-    Site(
-        "body_damper", "the body's damper, b v in eq. (1)", VELOCITY, "N", 1.0, experiments=(STEP, WALK), equation=True
-    ),
-    Site(
-        "body_spring",
-        "force of the large actuator's spring, K(x) in eq. (1)",
-        "body",
-        "N",
-        1.0,
-        experiments=(STATIC, STEP, WALK),
-        equation=True,
+        "body_spring", "force of the large actuator's spring, K(x) in eq. (1)", "body", "N", 1.0, (STATIC, STEP, WALK)
     ),
     Site(
         "filling",
@@ -30,57 +19,19 @@ SITES = (
         PRESSURE,
         "psi/s",
         0.3,
-        rows=("filling", "emptying"),
-        experiments=(STEP, WALK),
-        equation=True,
+        (STEP, WALK),
+        ("filling", "emptying"),
     ),
-    Site(
-        "friction_place",
-        "friction of an end by its place in the pipe, eq. (5)",
-        PLACE,
-        "N",
-        1.0,
-        experiments=(WALK,),
-        knots=129,
-        equation=True,
-    ),
-    Site(
-        "friction_speed",
-        "friction of an end by its speed, eq. (5)",
-        SPEED,
-        "N",
-        1.0,
-        rows=("forward", "backward"),
-        experiments=(WALK,),
-        equation=True,
-    ),
-    Site(
-        "grip_place",
-        "friction coefficient of an end, eq. (5), by its place in the pipe",
-        PLACE,
-        "",
-        0.03,
-        experiments=(WALK,),
-        knots=129,
-        equation=True,
-    ),
-    Site(
-        "grip_speed",
-        "friction coefficient of an end, eq. (5), by its speed",
-        SPEED,
-        "",
-        0.03,
-        rows=("forward", "backward"),
-        experiments=(ANCHOR, WALK),
-        equation=True,
-    ),
+    Site("friction_place", "friction of an end by its place in the pipe, eq. (5)", PLACE, "N", 1.0, (WALK,), knots=129),
+    Site("friction_speed", "friction of an end by its speed, eq. (5)", SPEED, "N", 1.0, (WALK,), _WAYS),
+    Site("grip_place", f"{_GRIP} place in the pipe", PLACE, "", 0.03, (WALK,), knots=129),
+    Site("grip_speed", f"{_GRIP} speed", SPEED, "", 0.03, (ANCHOR, WALK), _WAYS),
     Site(
         "small_spring",
         "force of the small actuator's spring, K(x) in eq. (1)",
         "small",
         "N",
         1.0,
-        experiments=(STATIC, STEP, ANCHOR, WALK),
-        equation=True,
+        (STATIC, STEP, ANCHOR, WALK),
     ),
 )

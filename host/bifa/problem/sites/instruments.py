@@ -1,9 +1,11 @@
 """What instruments add to what they measure: readings by value, by place, by what came before."""
 
+from functools import partial
+
 import numpy as np
 
-from bifa.problem.inputs import STATIC, STEP, WALK, Inputs, StepInputs, WalkInputs
-from bifa.problem.sites.site import PLACE, PRESSURE, Range, Site, loading, pressures, remembered, row_of
+from bifa.problem.inputs import STATIC, STEP, WALK, Inputs, StaticInputs, StepInputs, WalkInputs
+from bifa.problem.sites.site import PLACE, PRESSURE, Range, Site, pressures, remembered, row_of
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant, layout
@@ -26,12 +28,11 @@ def _camera_memory(channels: Channels, curve: LearntCurve, inputs: Inputs, plant
     return {name: remembered(mm, inputs.time_s, curve, rows[name]) for name, mm in channels.items() if name in rows}
 
 
-def _body_loading(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
-    return loading(channels, curve, inputs, "large")
-
-
-def _small_loading(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
-    return loading(channels, curve, inputs, "small")
+def _loading(actuator: str, channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    if not isinstance(inputs, StaticInputs) or inputs.actuator != actuator:
+        return {}
+    extending, contracting = (curve.at(inputs.displacement_m, row) for row in (0, 1))
+    return {"force_N": channels["force_N"] + np.where(inputs.direction > 0, extending, contracting)}
 
 
 def _pressure_sensor(channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
@@ -72,37 +73,30 @@ def _pressure_sensor_others(channels: Channels, curve: LearntCurve, inputs: Inpu
 
 
 SITES = (
-    Site("camera", "what the motion capture says", PLACE, "m", 0.002, experiments=(WALK,), readings=_camera),
+    Site("camera", "what the motion capture says", PLACE, "m", 0.002, (WALK,), readings=_camera),
     Site(
         "camera_memory",
         "what the motion capture says by how the displacement has changed, by how long ago",
         Range("time ago (s)", 0.0, 1.2),
         "m/m",
         0.1,
-        rows=("head", "tail", "small"),
-        experiments=(STEP, WALK),
+        (STEP, WALK),
+        ("head", "tail", "small"),
         knots=61,
         readings=_camera_memory,
     ),
-    Site(
-        "body_loading",
-        "force of the large actuator's spring while it is loaded slowly, by direction",
-        "body",
-        "N",
-        1.0,
-        rows=("extending", "contracting"),
-        experiments=(STATIC,),
-        readings=_body_loading,
-    ),
-    Site(
-        "small_loading",
-        "force of the small actuator's spring while it is loaded slowly, by direction",
-        "small",
-        "N",
-        1.0,
-        rows=("extending", "contracting"),
-        experiments=(STATIC,),
-        readings=_small_loading,
+    *(
+        Site(
+            f"{prefix}_loading",
+            f"force of the {actuator} actuator's spring while it is loaded slowly, by direction",
+            prefix,
+            "N",
+            1.0,
+            (STATIC,),
+            ("extending", "contracting"),
+            readings=partial(_loading, actuator),
+        )
+        for prefix, actuator in (("body", "large"), ("small", "small"))
     ),
     Site("pressure_sensor", "what the pressure sensors say", PRESSURE, "psi", 0.1, readings=_pressure_sensor),
     Site(
@@ -111,8 +105,8 @@ SITES = (
         Range("pressure drop (psi)", -25.0, 25.0),
         "psi",
         0.1,
-        rows=("large", "small"),
-        experiments=(STEP, WALK),
+        (STEP, WALK),
+        ("large", "small"),
         readings=_pressure_sensor_inflow,
     ),
     Site(
@@ -121,8 +115,8 @@ SITES = (
         Range("time ago (s)", 0.0, 0.4),
         "psi/psi",
         0.1,
-        rows=("large", "small"),
-        experiments=(STEP, WALK),
+        (STEP, WALK),
+        ("large", "small"),
         knots=17,
         readings=_pressure_sensor_memory,
     ),
@@ -132,8 +126,8 @@ SITES = (
         PRESSURE,
         "psi",
         0.1,
-        rows=tuple(f"{CHAMBERS[mine]} by {CHAMBERS[other]}" for mine, other in _PAIRS),
-        experiments=(WALK,),
+        (WALK,),
+        tuple(f"{CHAMBERS[mine]} by {CHAMBERS[other]}" for mine, other in _PAIRS),
         readings=_pressure_sensor_others,
     ),
 )

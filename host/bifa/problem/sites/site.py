@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from bifa.problem.inputs import Inputs, StaticInputs
-from bifa.robot.learnt import LearntCurve
+from bifa.problem.inputs import Inputs
+from bifa.robot.learnt import ROWS, LearntCurve
 from bifa.simulate import Plant
 from lacuna.system import Channels, CorrectionSite
 
@@ -34,11 +34,10 @@ class Site:
     """Where a curve may be learnt. `over`: a range, or the actuator ("body", "small") over whose spring's range it
     goes; `scale`: how much of the term, in `unit`, matters; `rows`: one curve each.
 
-    A curve of the robot's own equations (`equation`) needs no function: the integrator has it
-    (`bifa.robot.learnt.ROWS`). Others have one, which gets the curve and returns what it gets with the curve in it:
-    `plant(plant, curve, place)`, the robot of one trial; `inputs(inputs, curve, place)`, what was done to it, as it
-    reached it; `readings(channels, curve, inputs, plant)`, those channels that change. `place`: of the trial in the
-    session, 0 for the day's first, 1 for its last.
+    A curve of the robot's own equations needs no function: the integrator has it. Others have one, which gets the curve
+    and returns what it gets with the curve in it: `plant(plant, curve, place)`, the robot of one trial;
+    `inputs(inputs, curve, place)`, what was done to it, as it reached it; `readings(channels, curve, inputs, plant)`,
+    those channels that change. `place`: of the trial in the session, 0 for the day's first, 1 for its last.
     """
 
     name: str
@@ -46,34 +45,23 @@ class Site:
     over: Range | str
     unit: str
     scale: float
-    rows: tuple[str, ...] = ("",)
     experiments: tuple[str, ...] = ()
+    rows: tuple[str, ...] = ("",)
     knots: int = 9
-    equation: bool = False
     plant: Callable[[Plant, LearntCurve, float], Plant] | None = None
     inputs: Callable[[Inputs, LearntCurve, float], Inputs] | None = None
     readings: Callable[[Channels, LearntCurve, Inputs, Plant], Channels] | None = None
 
-    def declared(self, ends_m: tuple[float, float] | None) -> CorrectionSite:
-        """As the engine knows it; `ends_m`: of the spring's range, where the curve goes over that."""
-        if isinstance(self.over, Range):
-            over = self.over
-        elif ends_m is not None:
-            over = Range("displacement (m)", *ends_m)
-        else:
-            raise ValueError(f"{self.name} goes over the range of a spring, which is missing")
-        return CorrectionSite(
-            self.name,
-            self.term,
-            over.quantity,
-            self.unit,
-            over.lower,
-            over.upper,
-            self.scale,
-            self.rows,
-            self.experiments,
-            self.knots,
-        )
+    @property
+    def equation(self) -> bool:
+        """Whether the curve is in the robot's own equations."""
+        return self.name in ROWS
+
+    def declared(self, springs: Mapping[str, Range]) -> CorrectionSite:
+        """As the engine knows it; `springs`: the range of each actuator's."""
+        over = springs[self.over] if isinstance(self.over, str) else self.over
+        variable = over.quantity, self.unit, over.lower, over.upper
+        return CorrectionSite(self.name, self.term, *variable, self.scale, self.rows, self.experiments, self.knots)
 
 
 def pressures(channels: Channels) -> list[tuple[str, np.ndarray]]:
@@ -92,11 +80,3 @@ def remembered(values: np.ndarray, time_s: np.ndarray, curve: LearntCurve, row: 
 def row_of(channel: str, inputs: Inputs) -> int:
     """The row of a pressure channel in curves by actuator, the large one's first."""
     return 0 if inputs.actuator == "large" or channel == "pressure_body_psi" else 1
-
-
-def loading(channels: Channels, curve: LearntCurve, inputs: Inputs, actuator: str) -> Channels:
-    """The force of a static loading of `actuator` with what a curve adds by direction, extending first."""
-    if not isinstance(inputs, StaticInputs) or inputs.actuator != actuator:
-        return {}
-    extending, contracting = (curve.at(inputs.displacement_m, row) for row in (0, 1))
-    return {"force_N": channels["force_N"] + np.where(inputs.direction > 0, extending, contracting)}

@@ -1,6 +1,7 @@
 """What differs from trial to trial: parameters that change over the day, and what was done to the robot."""
 
 from dataclasses import replace
+from functools import partial
 
 from bifa.problem.inputs import ANCHOR, STEP, WALK, Inputs, PullInputs, StepInputs, WalkInputs
 from bifa.problem.sites.site import DAY, Range, Site
@@ -8,16 +9,13 @@ from bifa.problem.switches import delayed
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant, layout
 
+_AREAS = [layout.BODY + layout.AREA, layout.SMALL + layout.AREA]
+_FRICTION = [layout.MU_S, layout.MU_K]
 
-def _area_of_the_day(plant: Plant, curve: LearntCurve, place: float) -> Plant:
+
+def _scaled(quantities: list[int], plant: Plant, curve: LearntCurve, place: float) -> Plant:
     q = plant.q.copy()
-    q[[layout.BODY + layout.AREA, layout.SMALL + layout.AREA]] *= 1.0 + curve.at(place)
-    return plant._replace(q=q)
-
-
-def _friction_of_the_day(plant: Plant, curve: LearntCurve, place: float) -> Plant:
-    q = plant.q.copy()
-    q[[layout.MU_S, layout.MU_K]] *= 1.0 + curve.at(place)
+    q[quantities] *= 1.0 + curve.at(place)
     return plant._replace(q=q)
 
 
@@ -42,24 +40,18 @@ def _grip_pulled(inputs: Inputs, curve: LearntCurve, place: float) -> Inputs:
 
 
 SITES = (
-    Site("area_of_the_day", "the area a of eq. (2), as the day goes on", DAY, "", 0.01, plant=_area_of_the_day),
+    Site("area_of_the_day", "the area a of eq. (2), as the day goes on", DAY, "", 0.01, plant=partial(_scaled, _AREAS)),
     Site(
         "friction_of_the_day",
         "the friction's coefficients, as the day goes on",
         DAY,
         "",
         0.01,
-        experiments=(ANCHOR, WALK),
-        plant=_friction_of_the_day,
+        (ANCHOR, WALK),
+        plant=partial(_scaled, _FRICTION),
     ),
     Site(
-        "vacuum_of_the_day",
-        "the vacuum, as the day goes on",
-        DAY,
-        "psi",
-        0.1,
-        experiments=(STEP, WALK),
-        plant=_vacuum_of_the_day,
+        "vacuum_of_the_day", "the vacuum, as the day goes on", DAY, "psi", 0.1, (STEP, WALK), plant=_vacuum_of_the_day
     ),
     Site(
         "valves",
@@ -67,8 +59,8 @@ SITES = (
         DAY,
         "s",
         0.005,
-        rows=("to vacuum", "to positive"),
-        experiments=(STEP, WALK),
+        (STEP, WALK),
+        ("to vacuum", "to positive"),
         knots=2,
         inputs=_valves,
     ),
@@ -78,8 +70,8 @@ SITES = (
         Range("pulled distance (m)", 0.0, 0.08),
         "",
         0.03,
-        rows=("forward", "backward"),
-        experiments=(ANCHOR,),
+        (ANCHOR,),
+        ("forward", "backward"),
         knots=33,
         inputs=_grip_pulled,
     ),
