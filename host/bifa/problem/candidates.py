@@ -45,21 +45,23 @@ def _static(dataset: Dataset, actuator: str, rate: float, pressure: float) -> tu
     path = np.where(time_s < half_s, time_s, 2 * half_s - time_s) * rate
     planned = PlannedTrial("static_loading", actuator, pressure, rate)
     settings = {"actuator": actuator, "pressure_psi": pressure, "rate_mm_s": rate}
-    return settings, planned.as_trial({"time_s": time_s, "displacement_mm": path, **_unknown(time_s, "force_N")})
+    return settings, planned.as_trial(
+        {"time_s": time_s, "displacement_mm": path, **_unknown(time_s, "force_N", "pressure_psi")}
+    )
 
 
 def _step(actuator: str, pressure: float) -> tuple[Mapping[str, Any], Trial]:
     time_s = np.arange(0.0, _END_S, 0.01)
     command = ((time_s >= _UP_S) & (time_s < _DOWN_S)).astype(float)
     planned = PlannedTrial("step_response", actuator, pressure)
-    columns = {"time_s": time_s, "command": command, **_unknown(time_s, "displacement_mm")}
+    columns = {"time_s": time_s, "command": command, **_unknown(time_s, "displacement_mm", "pressure_psi")}
     return {"actuator": actuator, "pressure_psi": pressure}, planned.as_trial(columns)
 
 
 def _pull(rate: float, pressure: float) -> tuple[Mapping[str, Any], Trial]:
     time_s = np.arange(0.0, PULL_MM / rate, 0.02)
     planned = PlannedTrial("anchor_pull", None, pressure, rate)
-    columns = {"time_s": time_s, "displacement_mm": rate * time_s, **_unknown(time_s, "force_N")}
+    columns = {"time_s": time_s, "displacement_mm": rate * time_s, **_unknown(time_s, "force_N", "pressure_psi")}
     return {"pressure_psi": pressure, "rate_mm_s": rate}, planned.as_trial(columns)
 
 
@@ -68,16 +70,10 @@ def _walk(gait: Gait, inclination_deg: float) -> tuple[Mapping[str, Any], Trial]
     settings = {"inclination_deg": inclination_deg} if inclination_deg else {}
     planned = PlannedTrial("locomotion", gait=gait, cycles=_WALK_CYCLES, settings=settings)
     commands = of_gait(gait, float(time_s[-1]) + gait.period_s).at(time_s).astype(float)
-    columns = {"time_s": time_s}
-    for i, chamber in enumerate(CHAMBERS):
-        columns[f"command_{chamber}"] = commands[:, i]
-        columns |= _unknown(time_s, f"pressure_{chamber}_psi")
-    columns |= _unknown(time_s, "displacement_head_mm")
+    columns = {"time_s": time_s} | {f"command_{chamber}": commands[:, i] for i, chamber in enumerate(CHAMBERS)}
+    columns |= _unknown(time_s, "displacement_head_mm", *(f"pressure_{chamber}_psi" for chamber in CHAMBERS))
     return {"gait": gait.as_dict(), **settings}, planned.as_trial(columns)
 
 
-def _unknown(time_s: np.ndarray, name: str) -> dict[str, np.ndarray]:
-    columns = {name: np.full(time_s.shape, np.nan)}
-    if not name.startswith("pressure_") and name != "displacement_head_mm":
-        columns["pressure_psi"] = np.full(time_s.shape, np.nan)
-    return columns
+def _unknown(time_s: np.ndarray, *names: str) -> dict[str, np.ndarray]:
+    return {name: np.full(time_s.shape, np.nan) for name in names}

@@ -56,8 +56,8 @@ class FittedCurve:
     @cached_property
     def felt(self) -> frozenset[str]:
         """The shapes that matter in a walk."""
-        sizes = self._sizes(self.shapes)
-        return frozenset(name for name, size in zip(self.names, sizes, strict=True) if size > _FELT_N)
+        most_N = np.abs(chebyshev.chebval(np.linspace(-1.0, 1.0, 200), self.shapes.T)).max(axis=1)
+        return frozenset(name for name, size in zip(self.names, most_N, strict=True) if size > _FELT_N)
 
     def curve(self, weights: tuple[float, ...]) -> StiffnessCurve:
         """The curve with each shape added as often as `weights` say."""
@@ -67,9 +67,8 @@ class FittedCurve:
     @cached_property
     def tables(self) -> Family:
         """The curves that the shapes make, as the simulator reads them."""
-        none = np.zeros(len(self.shapes))
-        ends = self.fit.lower_m, self.fit.upper_m
-        return Family(self.curve(tuple(none)), [StiffnessCurve(tuple(way), *ends) for way in self._ways])
+        none, ends = (0.0,) * len(self.shapes), (self.fit.lower_m, self.fit.upper_m)
+        return Family(self.curve(none), [StiffnessCurve(tuple(way), *ends) for way in self._ways])
 
     @cached_property
     def changes(self) -> dict[str, dict[str, float]]:
@@ -83,7 +82,3 @@ class FittedCurve:
     def _ways(self) -> list[np.ndarray]:
         """The shapes in powers of the normalised coordinate."""
         return [np.append(chebyshev.cheb2poly(shape), [0.0, 0.0])[: DEGREE + 1] for shape in self.shapes]
-
-    def _sizes(self, shapes: np.ndarray) -> np.ndarray:
-        """How many N each shape changes K by, where it changes it most."""
-        return np.abs(chebyshev.chebval(np.linspace(-1.0, 1.0, 200), shapes.T)).max(axis=1)

@@ -43,8 +43,7 @@ def imposed_motion(time_s: np.ndarray, displacement_m: np.ndarray) -> ImposedMot
     direction = np.where(np.abs(speed) > 0.25 * np.abs(speed).max(), np.sign(speed), 0).astype(int)
     direction = _sharpened(displacement_m, direction)
     smooth = displacement_m.copy()
-    edges = np.flatnonzero(np.diff(direction)) + 1
-    for start, stop in zip(np.r_[0, edges], np.r_[edges, n], strict=True):
+    for start, stop in _stretches(direction):
         if stop - start >= _SMOOTHING_WINDOW:
             smooth[start:stop] = moving_line(displacement_m[start:stop], _SMOOTHING_WINDOW)[0]
     return _straight(time_s, displacement_m, direction) or ImposedMotion(smooth, direction)
@@ -67,8 +66,7 @@ def moving_line(values: np.ndarray, window: int) -> tuple[np.ndarray, np.ndarray
 def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndarray) -> ImposedMotion | None:
     """The motion as straight lines; None where it was not one, as what they leave shows: it may not exceed what
     neighbouring samples differ by."""
-    edges = np.flatnonzero(np.diff(direction)) + 1
-    stretches = list(zip(np.r_[0, edges], np.r_[edges, len(direction)], strict=True))
+    stretches = _stretches(direction)
     if any(stop - start < 2 * _MARGIN + 3 for start, stop in stretches if direction[start]):
         return None
     lines = [_line(time_s, displacement_m, start, stop, direction[start] != 0) for start, stop in stretches]
@@ -89,9 +87,7 @@ def _straight(time_s: np.ndarray, displacement_m: np.ndarray, direction: np.ndar
     return ImposedMotion(path, np.sign(slope).astype(int)[place], turned_s, turned_m)
 
 
-def _rest_before(
-    time_s: np.ndarray, displacement_m: np.ndarray, line: tuple[float, float]
-) -> list[tuple[float, float]]:
+def _rest_before(time_s: np.ndarray, displacement_m: np.ndarray, line: _Line) -> list[_Line]:
     """The line of a rest too short to have been found, before a motion along `line`; none where there is none."""
     level, slope = line
     off = np.abs(displacement_m - level - slope * time_s)
@@ -113,13 +109,16 @@ def _line(time_s: np.ndarray, displacement_m: np.ndarray, start: int, stop: int,
 def _sharpened(displacement_m: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Put an immediate reversal at the very sample where the displacement turns: the window that finds the direction
     shows a short rest there."""
-    edges = np.flatnonzero(np.diff(direction)) + 1
-    starts, stops = np.r_[0, edges], np.r_[edges, len(direction)]
-    for i in range(1, len(starts) - 1):
-        before, here, after = (direction[starts[k]] for k in (i - 1, i, i + 1))
-        if here == 0 and before == -after and stops[i] - starts[i] <= _DIRECTION_WINDOW:
-            inside = slice(starts[i], stops[i])
-            turn = starts[i] + int(np.argmax(before * displacement_m[inside])) + 1
-            direction[starts[i] : turn] = before
-            direction[turn : stops[i]] = after
+    for start, stop in _stretches(direction)[1:-1]:
+        before, after = direction[start - 1], direction[stop]
+        if direction[start] == 0 and before == -after and stop - start <= _DIRECTION_WINDOW:
+            turn = start + int(np.argmax(before * displacement_m[start:stop])) + 1
+            direction[start:turn] = before
+            direction[turn:stop] = after
     return direction
+
+
+def _stretches(direction: np.ndarray) -> list[tuple[int, int]]:
+    """First sample of each stretch in one direction, and the one behind its last."""
+    edges = np.flatnonzero(np.diff(direction)) + 1
+    return list(zip(np.r_[0, edges], np.r_[edges, len(direction)], strict=True))

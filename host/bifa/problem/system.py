@@ -6,7 +6,9 @@ from K's own contracted zero, so the two differ by that zero, which is 0 where t
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from operator import itemgetter
 from typing import Any
@@ -24,7 +26,6 @@ from bifa.problem.library import engine_effects
 from bifa.problem.spare import spare
 from bifa.problem.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
 from bifa.robot import Model
-from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate import Plant, lanes, layout
 from bifa.simulate.plant import of_values
 from bifa.simulate.tables import tabulated
@@ -78,18 +79,11 @@ class RobotSystem(System):
 
     name = "pipe robot"
 
-    def __init__(
-        self,
-        dataset: Dataset,
-        model: Model,
-        curves: Mapping[str, FittedCurve],
-        fitted: Sequence[str],
-    ):
+    def __init__(self, dataset: Dataset, model: Model, curves: Mapping[str, FittedCurve], fitted: Sequence[str]):
         self.dataset, self.model, self.curves = dataset, model, dict(curves)
         self.fitted = tuple(fitted)
         self.accuracies: Mapping[str, float] = {}  # RMS by quantity, up to which a prediction is good enough
-        self._inputs = {trial.file: inputs_of(trial) for trial in dataset.trials}
-        self.trials = tuple(_engine_trial(trial, self._inputs[trial.file]) for trial in dataset.trials)
+        self.trials = tuple(_engine_trial(trial) for trial in dataset.trials)
         self._last_in_session = max((t.session_order or 0 for t in self.trials), default=0)
         self.effects: Mapping[str, Effect] = engine_effects()
         shapes = [p for curve in self.curves.values() for p in curve.parameters]
@@ -141,30 +135,26 @@ class RobotSystem(System):
         alike: bool = False,
     ) -> list[Channels]:
         """Each of `thetas` in its trial, those on one bench side by side."""
-        each = list(zip(thetas, corrections or [()] * len(thetas), trials, strict=True))
-        cases = [self._case(theta, learnt, effects, trial) for theta, learnt, trial in each]
-        benches: dict[Hashable, list[int]] = {}
-        for k, (case, trial) in enumerate(zip(cases, trials, strict=True)):
-            if case is not None:
-                benches.setdefault(trial.payload.bench, []).append(k)
+        learnt = corrections or [()] * len(thetas)
+        benches: dict[Hashable, dict[int, RobotInTrial[Inputs]]] = defaultdict(dict)
+        for k, (theta, curves, trial) in enumerate(zip(thetas, learnt, trials, strict=True)):
+            if (case := self._case(theta, curves, effects, trial)) is not None:
+                benches[trial.payload.bench][k] = case
+        tolerances_m = _EXACT_M if not coarse else _ALIKE_M if alike and self.at_once > 1 else _COARSE_M
         found: dict[int, Channels] = {}
-        for members in benches.values():
-            first = trials[members[0]]
-            shared = alike and self.at_once > 1
-            tolerances_m = _EXACT_M if not coarse else _ALIKE_M if shared else _COARSE_M
-            tolerance_m = tolerances_m[first.experiment]
-            there = [case for case in (cases[k] for k in members) if case is not None]
-            simulated = _simulated(first.payload, there, tolerance_m, alike)
-            for k, case, channels in zip(members, there, simulated, strict=True):
+        for cases in benches.values():
+            experiment = trials[next(iter(cases))].experiment
+            simulated = _simulated(list(cases.values()), tolerances_m[experiment], alike)
+            for (k, case), channels in zip(cases.items(), simulated, strict=True):
                 if channels:
-                    found[k] = _seen(channels, each[k][1], case, trials[k])
+                    found[k] = _seen(channels, learnt[k], case, trials[k])
         return [found[k] if k in found else _nothing(trial) for k, trial in enumerate(trials)]
 
     def _case(
         self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
     ) -> RobotInTrial[Inputs] | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
-        place = self._place_in_session(trial)
+        place = (trial.session_order or 0) / max(self._last_in_session, 1)  # 0 for the day's first, 1 for its last
         try:
             plant, zeros = self._plant(self._key(theta, effects))
             plant = sites.corrected(plant, learnt, place)
@@ -173,18 +163,13 @@ class RobotSystem(System):
         inputs: Inputs = sites.corrected_inputs(trial.payload, learnt, plant, place)
         return RobotInTrial(inputs, _altered(plant, trial, theta, inputs.positive_psi), zeros, theta)
 
-    def _place_in_session(self, trial: Record) -> float:
-        """0 for the day's first trial, 1 for its last; 0 where the order was not noted."""
-        return (trial.session_order or 0) / max(self._last_in_session, 1)
-
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
         return regressors.of(trial, prediction)
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
         found = []
         if trial.experiment in (ANCHOR, WALK):
-            source = "friction differs from run to run"
-            both = ("mu_s", "mu_k")
+            source, both = "friction differs from run to run", ("mu_s", "mu_k")
             found.append(
                 Parameter("friction_scale", "", 1.0, 0.8, 1.25, scale=FRICTION_WOBBLE, source=source, factor_of=both)
             )
@@ -192,22 +177,12 @@ class RobotSystem(System):
             source = "the valves switched between two samples"
             found.append(Parameter("switch_late_s", "s", 0.0, -3.0 * sd, 3.0 * sd, scale=sd, source=source))
         if trial.experiment == ANCHOR:
-            found.append(self._slip_late(trial))
+            # Repeats are sampled alike, so that the same half sample may be missed in all of them.
+            half_s = 0.5 * trial.payload.sample_s
+            alike = sum(other.condition == trial.condition for other in self.trials)
+            sd, source = half_s * np.sqrt(max(alike, 1) / 3.0), "the peak lies between two samples"
+            found.append(Parameter("slip_late_s", "s", 0.0, -2.0 * half_s, 2.0 * half_s, scale=sd, source=source))
         return tuple(found)
-
-    def _slip_late(self, trial: Record) -> Parameter:
-        # Repeats are sampled alike, so that the same half sample may be missed in all of them.
-        half_s = 0.5 * trial.payload.sample_s
-        alike = sum(other.condition == trial.condition for other in self.trials)
-        return Parameter(
-            "slip_late_s",
-            "s",
-            0.0,
-            -2.0 * half_s,
-            2.0 * half_s,
-            scale=half_s * np.sqrt(max(alike, 1) / 3.0),
-            source="the peak lies between two samples",
-        )
 
     def spare(self) -> tuple[tuple[str, Hashable], ...]:
         return spare(self.dataset)
@@ -244,7 +219,7 @@ class RobotSystem(System):
             CandidateExperiment(
                 experiment=recorded.experiment,
                 settings=settings,
-                trial=_engine_trial(recorded, inputs_of(recorded), measured=False),
+                trial=_engine_trial(recorded, measured=False),
             )
             for settings, recorded in candidates.of(self.dataset)
         )
@@ -257,10 +232,10 @@ class RobotSystem(System):
         chosen = {
             effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
         }
-        model = self.model.with_values(values).with_effects(chosen)
-        return _with_curves(
-            model, {prefix: curve.curve(self._shapes[prefix](theta)) for prefix, curve in self.curves.items()}
-        )
+        curves: dict[str, Any] = {
+            f"{prefix}_stiffness": curve.curve(self._shapes[prefix](theta)) for prefix, curve in self.curves.items()
+        }
+        return replace(self.model.with_values(values).with_effects(chosen), **curves)
 
     def _named(self, name: str) -> Parameter:
         entry = self.model.parameters[name]
@@ -269,27 +244,17 @@ class RobotSystem(System):
         # friction shows in fewer samples: wider steps for its derivatives
         scale = prior_sd or (high - low) * (1.0 if name in _PIPE else 0.1)
         # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
-        at_least = "mu_k" if name == "mu_s" else None
-        return Parameter(
-            name,
-            entry.unit,
-            entry.value,
-            entry.lower,
-            entry.upper,
-            (low, high),
-            scale,
-            entry.source,
-            prior_sd,
-            at_least=at_least,
-            elsewhere=_PLACES.get(name, ()),
-        )
+        at_least, elsewhere = "mu_k" if name == "mu_s" else None, _PLACES.get(name, ())
+        values = entry.value, entry.lower, entry.upper, (low, high)
+        return Parameter(name, entry.unit, *values, scale, entry.source, prior_sd, at_least, elsewhere)
 
     def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple[Any, ...]:
         """All that a plant depends on, hashable."""
         weights = tuple((prefix, shapes(theta)) for prefix, shapes in self._shapes.items())
+        all_of = {effect: self.effects[effect].parameters + self.effects[effect].own for effect in effects}
         extra = tuple(
-            (effect, tuple((p.name, theta.get(f"{effect}.{p.name}", p.value)) for p in _all_of(self.effects[effect])))
-            for effect in effects
+            (effect, tuple((p.name, theta.get(f"{effect}.{p.name}", p.value)) for p in parameters))
+            for effect, parameters in all_of.items()
         )
         return self._own_values(theta), weights, extra
 
@@ -322,15 +287,15 @@ def _bench_unknowns(dataset: Dataset) -> list[str]:
 
 
 def _simulated(
-    bench: Inputs, cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool
+    cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool
 ) -> list[Mapping[str, np.ndarray]]:
-    """The channels of each case; none of one that is out of range."""
+    """The channels of each case on one bench; none of one that is out of range."""
     try:
-        return bench.simulate(cases, tolerance_m, alike)
+        return cases[0].inputs.simulate(cases, tolerance_m, alike)
     except BifaError:
         if len(cases) == 1:
             return [{}]
-        return [_simulated(bench, [case], tolerance_m, alike)[0] for case in cases]
+        return [_simulated([case], tolerance_m, alike)[0] for case in cases]
 
 
 def _nothing(trial: Record) -> Channels:
@@ -352,11 +317,8 @@ def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:
     return itemgetter(*names)
 
 
-def _all_of(effect: Effect) -> tuple[Parameter, ...]:
-    return effect.parameters + effect.own
-
-
-def _engine_trial(recorded: Trial, inputs: Inputs, measured: bool = True) -> Record:
+def _engine_trial(recorded: Trial, measured: bool = True) -> Record:
+    inputs = inputs_of(recorded)
     channels = {
         name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
         for name in inputs.channels
@@ -383,10 +345,3 @@ def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | No
     if trial.experiment == STEP:
         q[layout.BODY + layout.MASS] = theta.get(STAND_MASS, q[layout.BODY + layout.MASS])
     return plant._replace(q=q)
-
-
-def _with_curves(model: Model, curves: Mapping[str, StiffnessCurve]) -> Model:
-    from dataclasses import replace
-
-    changes: dict[str, Any] = {f"{prefix}_stiffness": curve for prefix, curve in curves.items()}
-    return replace(model, **changes)
