@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from .clocks import DATE, FRAME, SECONDS, dated, first_that_is_none, zone_of
+from .clocks import DATE, FRAME, SECONDS, moment_of, zone_of
 from .fields import Fields
 from .layout import EXPERIMENTS, is_command
 from .sheet import SEPARATORS, Sheet, SheetForm, listed
@@ -143,7 +143,7 @@ def _column(sheet: Sheet, export: Export, name: str) -> np.ndarray:
     source = export.columns.get(name, name)
     unit = export.units.get(name)
     if unit == DATE:
-        return _dates(sheet, export, source)
+        return _seconds(sheet, export, _date_cells(sheet, source), source)
     place = sheet.find(source)
     _refuse_other_unit(sheet, place, name, unit)
     values = sheet.numbers(place, source)
@@ -159,22 +159,22 @@ def _scale(export: Export, name: str) -> float:
     return size * export.factor.get(name, 1.0) * export.sign.get(name, 1)
 
 
-def _dates(sheet: Sheet, export: Export, source: str) -> np.ndarray:
-    """Dates from one column, or from several that make one date together ("Date + Time")."""
-    return _seconds(sheet, export, _date_cells(sheet, source), source)
-
-
 def _date_cells(sheet: Sheet, source: str) -> list[str]:
+    """Dates from one column, or from several that make one date together ("Date + Time")."""
     parts = [sheet.cells(sheet.find(part)) for part in source.split(" + ")]
     return [" ".join(part) for part in zip(*parts, strict=True)]
 
 
 def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.ndarray:
-    zone = zone_of(export.zone) if export.zone else None
-    if (row := first_that_is_none(cells, export.date_format, zone)) is not None:
-        form = f"of the form {export.date_format!r}" if export.date_format else "as ISO 8601 writes it"
-        raise sheet.error(f"{cells[row]!r} is no date {form}", row, source)
-    return dated(cells, export.date_format, zone)
+    """Seconds since the first of these dates."""
+    zone, moments = zone_of(export.zone) if export.zone else None, []
+    for row, cell in enumerate(cells):
+        try:
+            moments.append(moment_of(cell, export.date_format, zone))
+        except ValueError:
+            form = f"of the form {export.date_format!r}" if export.date_format else "as ISO 8601 writes it"
+            raise sheet.error(f"{cell!r} is no date {form}", row, source) from None
+    return np.array([(moment - moments[0]).total_seconds() for moment in moments])
 
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:

@@ -138,6 +138,10 @@ class Fields:
             raise self.error(key, f"must be a table, not {_kind(value)}")
         return value
 
+    def inner(self, key: str, values: Any) -> Fields:
+        """The table `values` under `key`, to be read likewise."""
+        return Fields(values, self._source, self._trial, key)
+
     def completed(self, defaults: Mapping[str, Any]) -> Fields:
         """What is left of this table, with `defaults` for what it does not say; a table in it is completed alike."""
         mixed = {

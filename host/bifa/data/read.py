@@ -5,7 +5,6 @@ import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -53,28 +52,23 @@ def read_dataset(path: str | os.PathLike[str]) -> Dataset:
     if isinstance(version, bool) or version != FORMAT or not isinstance(version, int):
         raise top.error("format", f"format {version!r} is not supported; this program reads format {FORMAT}")
     name = top.text("name")
-    known = _known(top, source) if "known" in top else {}
+    declared = top.inner("known", top.take("known") if "known" in top else {})
+    known = {key: declared.number(key) for key in declared.remaining()}
     provenance = top.table("provenance") if "provenance" in top else {}
     listed = top.take("trial")
     if not isinstance(listed, list) or not listed:
         raise top.error("trial", "must be a list of [[trial]] tables with at least one")
-    exports = _exports(top, source)
+    instruments = top.inner("instrument", top.take("instrument") if "instrument" in top else {})
+    exports = parse_exports(instruments, source)
     top.finish(also=("known", "provenance", "instrument"))
-    heads = [_trial_head(entry, source, number) for number, entry in enumerate(listed, start=1)]
-    paths = [_inside(folder, head, source, number, exports) for number, head in enumerate(heads, start=1)]
-    _refuse_duplicates(heads, paths, source)
-    trials = [
-        Trial(**{**head, "columns": _columns(file, head, exports)}) for head, file in zip(heads, paths, strict=True)
-    ]
-    for number, trial in enumerate(trials, start=1):
-        _check_switches(trial, source, number)
+    entries = [Fields(entry, source, trial=number) for number, entry in enumerate(listed, start=1)]
+    heads = [_trial_head(fields) for fields in entries]
+    paths = [_inside(folder, head, fields, exports) for head, fields in zip(heads, entries, strict=True)]
+    _refuse_duplicates(heads, paths, entries)
+    trials = [Trial(**head, columns=_columns(file, head, exports)) for head, file in zip(heads, paths, strict=True)]
+    for trial, fields in zip(trials, entries, strict=True):
+        _check_switches(trial, fields)
     return Dataset(folder, name, known, tuple(trials), provenance, exports)
-
-
-def _exports(top: Fields, source: Source) -> dict[str, Export]:
-    if "instrument" not in top:
-        return {}
-    return parse_exports(Fields(top.take("instrument"), source, table="instrument"), source)
 
 
 def _columns(path: Path, head: dict[str, Any], exports: dict[str, Export]) -> dict[str, np.ndarray]:
@@ -122,21 +116,15 @@ def _no_table(folder: Path) -> str:
     )
 
 
-def _known(top: Fields, source: Source) -> dict[str, float]:
-    fields = Fields(top.take("known"), source, table="known")
-    return {key: fields.number(key) for key in fields.remaining()}
-
-
-def _trial_head(entry: Any, source: Source, number: int) -> dict[str, Any]:
+def _trial_head(fields: Fields) -> dict[str, Any]:
     """The keyword arguments of Trial, without the columns."""
-    fields = Fields(entry, source, trial=number)
     head: dict[str, Any] = {"file": fields.text("file")}
     head["experiment"] = fields.choice("experiment", tuple(EXPERIMENTS))
     layout = EXPERIMENTS[head["experiment"]]
     keys = layout.required + tuple(key for key in layout.optional if key in fields)
     extra: dict[str, Any] = {}
     for key in keys:
-        (extra if key in SETTINGS else head)[key] = _setting(fields, key, source, number)
+        (extra if key in SETTINGS else head)[key] = _setting(fields, key)
     head["repeat"] = fields.whole("repeat", 1)
     if "session_order" in fields:
         head["session_order"] = fields.whole("session_order", 0)
@@ -144,19 +132,19 @@ def _trial_head(entry: Any, source: Source, number: int) -> dict[str, Any]:
     for key in noted:
         if key in SETTINGS:
             raise fields.error("extra", f"{key} is a key of the trial itself and does not belong in extra")
-    notes = Fields(noted, source, trial=number, table="extra")
+    notes = fields.inner("extra", noted)
     for key in NOTED.keys() & noted.keys():
         notes.number(key, *NOTED[key])
     fields.finish(also=layout.optional + _COMMON_OPTIONAL)
     return {**head, "extra": {**noted, **extra}}
 
 
-def _check_switches(trial: Trial, source: Source, number: int) -> None:
+def _check_switches(trial: Trial, fields: Fields) -> None:
     """When the valves switched, if that is noted: a list for a step, a table of them for a walk."""
     noted = trial.extra.get("switch_time_s")
     if noted is None or trial.experiment not in ("step_response", "locomotion"):
         return
-    extra = Fields({"switch_time_s": noted}, source, trial=number, table="extra")
+    extra = fields.inner("extra", {"switch_time_s": noted})
     lists = [noted]
     if trial.experiment == "locomotion":
         if not isinstance(noted, dict) or set(noted) - set(_CHAMBERS):
@@ -170,7 +158,7 @@ def _check_switches(trial: Trial, source: Source, number: int) -> None:
             raise extra.error("switch_time_s", f"{trial.file}: must be rising times within the trial, in s")
 
 
-def _setting(fields: Fields, key: str, source: Source, number: int) -> Any:
+def _setting(fields: Fields, key: str) -> Any:
     if key == "actuator":
         return fields.choice(key, ACTUATORS)
     if key == "direction":
@@ -180,7 +168,7 @@ def _setting(fields: Fields, key: str, source: Source, number: int) -> Any:
     if key == "inclination_deg":
         return fields.number(key, *INCLINATION_RANGE_DEG)
     if key == "gait":
-        return _gait(Fields(fields.take(key), source, trial=number, table=key))
+        return _gait(fields.inner(key, fields.take(key)))
     return fields.positive(key)  # rate_mm_s, load_cell_N_m
 
 
@@ -191,55 +179,35 @@ def _gait(fields: Fields) -> dict[str, float]:
     return gait
 
 
-def _inside(
-    folder: Path,
-    head: dict[str, Any],
-    source: Source,
-    number: int,
-    exports: Mapping[str, Export] = MappingProxyType({}),
-) -> Path:
+def _inside(folder: Path, head: dict[str, Any], fields: Fields, exports: Mapping[str, Export]) -> Path:
     """The path of a trial's file, certain to be a regular file within the folder."""
     file = head["file"]
-    place: dict[str, Any] = {
-        "file": TABLE_FILE,
-        "line": source.line(number, ("file",)),
-        "column": f"trial {number}, file",
-    }
     if PurePosixPath(file).is_absolute() or PureWindowsPath(file).anchor or ".." in Path(file).parts:
-        raise DatasetError(f"{file!r} is outside the data set; name a file within the folder", **place)
+        raise fields.error("file", f"{file!r} is outside the data set; name a file within the folder")
     if not file.endswith(".csv") and ROLES[head["experiment"]] not in exports:
-        raise DatasetError(f"{file!r} is not a .csv file", **place)
+        raise fields.error("file", f"{file!r} is not a .csv file")
     try:
         resolved = (folder / file).resolve()
         if not resolved.is_relative_to(folder.resolve()):
-            raise DatasetError(f"{file!r} is a link to a file outside the data set", **place)
+            raise fields.error("file", f"{file!r} is a link to a file outside the data set")
         if not resolved.is_file():
             what = "is not a regular file" if resolved.exists() else "does not exist"
-            raise DatasetError(f"the file {file!r} {what}", **place)
+            raise fields.error("file", f"the file {file!r} {what}")
     except (OSError, RuntimeError) as error:  # too long a name, a loop of links
-        raise DatasetError(f"{file!r} cannot be opened: {error}", **place) from None
+        raise fields.error("file", f"{file!r} cannot be opened: {error}") from None
     return resolved
 
 
-def _refuse_duplicates(heads: list[dict[str, Any]], paths: list[Path], source: Source) -> None:
+def _refuse_duplicates(heads: list[dict[str, Any]], paths: list[Path], entries: list[Fields]) -> None:
     files: dict[Path, int] = {}
     repeats: dict[Any, int] = {}
-    for number, (head, path) in enumerate(zip(heads, paths, strict=True), start=1):
+    for number, (head, path, fields) in enumerate(zip(heads, paths, entries, strict=True), start=1):
         identity = (Trial(**head, columns={}).condition, head["repeat"])
-        earlier = files.setdefault(path, number)
-        if earlier != number:
-            raise DatasetError(
-                f"{head['file']!r} was listed before, in trial {earlier}",
-                file=TABLE_FILE,
-                line=source.line(number, ("file",)),
-                column=f"trial {number}, file",
-            )
-        earlier = repeats.setdefault(identity, number)
-        if earlier != number:
-            raise DatasetError(
+        if (earlier := files.setdefault(path, number)) != number:
+            raise fields.error("file", f"{head['file']!r} was listed before, in trial {earlier}")
+        if (earlier := repeats.setdefault(identity, number)) != number:
+            raise fields.error(
+                "repeat",
                 f"repeat {head['repeat']} of the same experiment and settings was listed before, "
                 f"in trial {earlier}; number the repeats 1, 2, 3",
-                file=TABLE_FILE,
-                line=source.line(number, ("repeat",)),
-                column=f"trial {number}, repeat",
             )
