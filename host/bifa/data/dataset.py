@@ -1,5 +1,6 @@
 """A data set in memory: what was known beforehand, and the trials."""
 
+from collections import defaultdict
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from . import tables
 from .errors import DatasetError
 from .layout import EXPERIMENTS, SETTINGS
 
@@ -102,11 +102,37 @@ class Trial:
 
     def to_pandas(self) -> Any:
         """The columns as a DataFrame over time; the condition and the repeat in its `attrs`."""
-        return tables.to_pandas(self)
+        import pandas
+
+        columns = {name: column for name, column in self.columns.items() if name != "time_s"}
+        frame = pandas.DataFrame(columns, index=pandas.Index(self.time_s, name="time_s"))
+        frame.attrs = {"file": self.file, "experiment": self.experiment, "condition": self.label, "repeat": self.repeat}
+        return frame
 
     def plot(self, axes: Any = None) -> Any:
         """Draw every column over time, one quantity below the other; returns the figure."""
-        return tables.plot(self, axes)
+        import matplotlib.pyplot as plt
+
+        groups: dict[str, list[str]] = defaultdict(list)  # by quantity, which is what a column's name begins with
+        for name in self.columns:
+            if name != "time_s":
+                groups[name.split("_")[0]].append(name)
+        if axes is None:
+            _, axes = plt.subplots(len(groups), 1, figsize=(8.0, 1.9 * len(groups)), sharex=True, squeeze=False)
+            axes = axes[:, 0]
+        for axis, (quantity, names) in zip(axes, groups.items(), strict=True):
+            unit = names[0].rsplit("_", 1)[-1] if quantity != "command" else ""
+            for name in names:
+                label = name.removeprefix(f"{quantity}_").removesuffix(f"_{unit}")
+                axis.plot(self.time_s, self.columns[name], linewidth=1.0, label=label)
+            axis.set_ylabel(f"{quantity} [{unit}]" if unit and unit != quantity else quantity)
+            if len(names) > 1:
+                axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)  # beside the curves
+        axes[0].set_title(f"{self.file}: {self.label}", loc="left", fontsize=9)
+        axes[-1].set_xlabel("time [s]")
+        figure = axes[0].figure
+        figure.align_ylabels()
+        return figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,13 +166,15 @@ class Dataset:
 
     def to_pandas(self) -> Any:
         """All trials below one another, by file and time."""
-        return tables.stacked(self.trials)
+        import pandas
+
+        return pandas.concat({trial.file: trial.to_pandas() for trial in self.trials}, names=["file"])
 
     def repeats(self) -> Iterator[tuple[Trial, ...]]:
         """Groups of trials that repeat one condition, in the order in which they first appear."""
-        groups: dict[Hashable, list[Trial]] = {}
+        groups: dict[Hashable, list[Trial]] = defaultdict(list)
         for trial in self.trials:
-            groups.setdefault(trial.condition, []).append(trial)
+            groups[trial.condition].append(trial)
         yield from (tuple(group) for group in groups.values())
 
 

@@ -24,10 +24,10 @@ class Layout:
     """
 
     columns: tuple[str, ...]
-    optional_columns: tuple[str, ...]
     rate_hz: float
     required: tuple[str, ...]
     optional: tuple[str, ...] = ()
+    optional_columns: tuple[str, ...] = ()
 
     @property
     def all_columns(self) -> tuple[str, ...]:
@@ -38,19 +38,16 @@ class Layout:
 EXPERIMENTS: dict[str, Layout] = {
     "static_loading": Layout(
         columns=("time_s", "displacement_mm", "force_N", "pressure_psi"),
-        optional_columns=(),
         rate_hz=50.0,
         required=("actuator", "pressure_psi", "rate_mm_s"),
     ),
     "step_response": Layout(
         columns=("time_s", "command", "displacement_mm", "pressure_psi"),
-        optional_columns=(),
         rate_hz=100.0,
         required=("actuator", "pressure_psi"),
     ),
     "anchor_pull": Layout(
         columns=("time_s", "displacement_mm", "force_N", "pressure_psi"),
-        optional_columns=(),
         rate_hz=50.0,
         required=("pressure_psi", "rate_mm_s"),
         optional=("load_cell_N_m", "direction"),

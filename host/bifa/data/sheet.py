@@ -193,10 +193,6 @@ class Sheet:
         """What each column is called, the parts of its name together."""
         return [" / ".join(parts) for parts in self.names]
 
-    def listed(self) -> str:
-        """The first names, and how many more there are."""
-        return listed(label for label in self.labels() if label)
-
     def find(self, name: str) -> int:
         """The place of the column of this name: of some of its parts, in order, and "X [2]" the second of that name.
         DatasetError where there is none, or several."""
@@ -207,7 +203,7 @@ class Sheet:
             named = [place for place, parts in enumerate(self.names) if _is_called(parts, bare)]
             places = named[chosen - 1 : chosen]
         if not places:
-            raise self._error(f"lacks the column {name}; it has {self.listed() or 'none'}")
+            raise self._error(f"lacks the column {name}; it has {listed(filter(None, self.labels())) or 'none'}")
         if len(places) > 1:
             found = listed(self.labels()[place] for place in places)
             raise self._error(
@@ -249,12 +245,6 @@ class Sheet:
             return ["" if cell != cell or cell is None else str(cell) for cell in self._frame.iloc[:, place]]
         written = map(self._written, range(len(self)))
         return [row[place] if place < len(row) else "" for row in written]
-
-    def is_text(self, place: int) -> bool:
-        """Whether no cell of a column is a number."""
-        if place < self._frame.shape[1] and self._frame.iloc[:, place].dtype.kind in "fiu":
-            return False
-        return not any(cell and number(cell) is not None for cell in self.cells(place))
 
     def _number(self, cell: str, row: int, name: str) -> float:
         mark = self._form.decimal
