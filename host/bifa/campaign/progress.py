@@ -1,8 +1,5 @@
 """Progress of a campaign for people: one line a stage, a bar for the stage that runs."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn
 from rich.table import Column
 
@@ -13,7 +10,8 @@ _TITLE = 35  # characters: the longest title of a stage
 
 
 class StageProgress:
-    """Hand `start` and `end` to `run_stages`, `update` to what happens inside a stage.
+    """Bars that redraw themselves on a terminal and end as plain lines elsewhere: use it in `contextlib.closing`. Hand
+    `start` and `end` to `run_stages`, `update` to what happens inside a stage.
 
     While a person measures there is no bar, which would redraw itself over questions and answers: `close` it before.
     """
@@ -64,13 +62,3 @@ class StageProgress:
         if self._bars is not None:
             self._bars.stop()
             self._bars = None
-
-
-@contextmanager
-def stage_progress(console: Console) -> Iterator[StageProgress]:
-    """Bars that redraw themselves on a terminal and end as plain lines elsewhere."""
-    progress = StageProgress(console)
-    try:
-        yield progress
-    finally:
-        progress.close()

@@ -59,6 +59,7 @@ def campaign(
     check_folder(out)
     check_port(port)
 
+    from contextlib import closing
     from dataclasses import replace
 
     from bifa.campaign.setup import Effort, Setup
@@ -75,10 +76,10 @@ def campaign(
 
         with console.status("starting"):  # slow to import: the person is asked first
             from bifa.campaign import loop
-            from bifa.campaign.progress import stage_progress
+            from bifa.campaign.progress import StageProgress
             from bifa.campaign.stages import run_stages
 
-        with stage_progress(console) as progress:
+        with closing(StageProgress(console)) as progress:
             if setup.hands is not None:
                 setup.hands.before = progress.close
             stages = loop.campaign(setup, Effort(quick), progress.update)

@@ -2,10 +2,11 @@
 
 import io
 import re
+from contextlib import closing
 
 import pytest
 
-from bifa.campaign.progress import stage_progress
+from bifa.campaign.progress import StageProgress
 from bifa.campaign.stages import Stage
 from bifa.screen import Console
 
@@ -15,7 +16,7 @@ STAGE = Stage("measure", "characterise the robot on its bench", (), (), lambda i
 @pytest.mark.parametrize("width", [60, 80, 120, 200])
 def test_what_the_stage_does_is_not_cut_off(width):
     out = io.StringIO()
-    with stage_progress(Console(file=out, width=width, force_terminal=True, color_system=None)) as progress:
+    with closing(StageProgress(Console(file=out, width=width, force_terminal=True, color_system=None))) as progress:
         progress.start(STAGE)
         progress.update("static loading, small, 8 psi, 2 mm/s, repeat 1", 0.4)
         progress.end(STAGE, ran=True)
