@@ -4,17 +4,17 @@ residual lives."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from bifa.problem.accuracy import QUANTITIES, is_of
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.residual_error import repeat_differences, rms
 from lacuna.estimation.fit import evaluate_on
 from lacuna.system import Channels
 
-_QUANTITIES = ("displacement_mm", "pressure_psi", "force_N")
 _POINTS = 400  # of a trace, enough for a small figure
 
 
@@ -25,23 +25,21 @@ def prediction_errors(found: Diagnosis) -> list[dict[str, Any]]:
     before, after = (fit.residuals() | evaluate_on(fit, held_out).residuals() for fit in (found.base, found.final))
     floors = repeat_differences(known, held_out, after)
     rows = []
-    for quantity in _QUANTITIES:
+    for quantity in QUANTITIES:
         for which, trials, floor in zip(("fitted", "held-out"), (known, held_out), floors, strict=True):
             sides = {
                 "before": [before[trial.name] for trial in trials],
                 "after": [after[trial.name] for trial in trials],
                 "noise_floor": floor,
             }
-            errors = {side: rms(_only(quantity, members)) for side, members in sides.items()}
+            errors = {side: rms(_only(quantity, channels) for channels in members) for side, members in sides.items()}
             if math.isfinite(errors["before"]):  # the quantity was measured in these trials
                 rows.append({"quantity": quantity, "trials": which} | {k: float(f"{v:.4g}") for k, v in errors.items()})
     return rows
 
 
-def _only(quantity: str, members: Sequence[Channels]) -> list[Channels]:
-    """Channels of one quantity: "displacement_head_mm" is one of "displacement_mm"."""
-    first, last = quantity.rsplit("_", 1)
-    return [{c: r for c, r in channels.items() if c.startswith(first) and c.endswith(last)} for channels in members]
+def _only(quantity: str, channels: Channels) -> Channels:
+    return {name: residual for name, residual in channels.items() if is_of(name, quantity)}
 
 
 def residuals(found: Diagnosis, labels: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -34,9 +34,10 @@ def accuracies(texts: Iterable[str]) -> dict[str, float]:
 
 def accuracy_of(channel: str, accuracies: Mapping[str, float]) -> float:
     """The accuracy of a channel: displacement_head_mm is a displacement_mm. 0: only the noise counts."""
-    return next((v for q, v in accuracies.items() if _is_of(channel, q)), 0.0)
+    return next((v for q, v in accuracies.items() if is_of(channel, q)), 0.0)
 
 
-def _is_of(channel: str, quantity: str) -> bool:
+def is_of(channel: str, quantity: str) -> bool:
+    """Whether a channel is one of a quantity."""
     first, unit = quantity.rsplit("_", 1)
     return channel.startswith(first) and channel.endswith(unit)
