@@ -60,15 +60,11 @@ class Stage:
 def digest(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files with their names, in order: of a data set those that it lists, with the
     instruments' own records of them; nowhere what an operating system or an office program leaves behind."""
-    total = hashlib.sha256()
     if path.is_dir():
-        for file in sorted(_that_count(path)):
-            total.update(f"{file.relative_to(path).as_posix()}\0{digest(file)}\n".encode())
-    else:
-        with path.open("rb") as stream:
-            while block := stream.read(1 << 20):
-                total.update(block)
-    return total.hexdigest()
+        lines = (f"{file.relative_to(path).as_posix()}\0{digest(file)}\n" for file in sorted(_that_count(path)))
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _that_count(folder: Path) -> list[Path]:
@@ -110,37 +106,24 @@ def run_stages(
     something that a stage would replace is not on record; an error inside a stage leaves the artefacts of earlier
     runs as they were. Raises LockedError where another program runs stages in `folder`.
     """
-    unknown = set(rerun) - {stage.name for stage in stages}
-    if unknown:
-        raise StageError(
-            f"no stage is called {', '.join(sorted(unknown))}; there are {', '.join(s.name for s in stages)}"
-        )
+    names, again = [stage.name for stage in stages], set(rerun)
+    if unknown := again.difference(names):
+        raise StageError(f"no stage is called {', '.join(sorted(unknown))}; there are {', '.join(names)}")
     check_folder(folder)
     with locked(folder):
-        _bring_up_to_date(folder, stages, set(rerun), on_start, on_end)
-
-
-def _bring_up_to_date(
-    folder: Path,
-    stages: Sequence[Stage],
-    rerun: set[str],
-    on_start: Callable[[Stage], None],
-    on_end: Callable[[Stage, bool], None],
-) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    records = _read_records(folder)
-    names = {stage.name for stage in stages}
-    for stage in stages:  # another version's stages may have made the same
-        theirs = {name: record for name, record in records.items() if name == stage.name or name not in names}
-        _refuse_unrecorded(folder, stage, theirs)
-    shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
-    for stage in stages:
-        on_start(stage)
-        asked = _asked(folder, stage)
-        ran = stage.name in rerun or not _holds(folder, stage, asked, records.get(stage.name))
-        if ran:
-            _run(folder, stage, asked, records)
-        on_end(stage, ran)
+        folder.mkdir(parents=True, exist_ok=True)
+        records = _read_records(folder)
+        for stage in stages:  # another version's stages may have made the same
+            theirs = {name: record for name, record in records.items() if name == stage.name or name not in names}
+            _refuse_unrecorded(folder, stage, theirs)
+        shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
+        for stage in stages:
+            on_start(stage)
+            asked = _asked(folder, stage)
+            ran = stage.name in again or not _holds(folder, stage, asked, records.get(stage.name))
+            if ran:
+                _run(folder, stage, asked, records)
+            on_end(stage, ran)
 
 
 def _refuse_unrecorded(folder: Path, stage: Stage, records: Mapping[str, dict[str, Any]]) -> None:
@@ -228,13 +211,15 @@ def _resumed(scratch: Path, stage: Stage, asked: dict[str, Any]) -> dict[str, An
     is what is left after all was moved; StageError where it was begun by hand with something else."""
     if not stage.resumes or not scratch.exists():
         return {}
-    begun = _read_asked(scratch / _ASKED)
+    asked_before = scratch / _ASKED  # not there after an earlier version, or an interruption at the very beginning
+    begun = dict(json.loads(asked_before.read_text(encoding="utf-8"))) if asked_before.exists() else {}
     moved = "artefacts" in begun and not any((scratch / name).exists() for name in stage.makes)
     if moved or not (stage.by_hand or {key: begun.get(key) for key in asked} == asked):
         shutil.rmtree(scratch)
         return {}
     differing = _differing(begun.get("settings", {}), asked["settings"])
-    differing += [f"another {name}" for name in _other_inputs(begun, asked)]
+    old = begun.get("inputs", {})
+    differing += [f"another {name}" for name, now in asked["inputs"].items() if name in old and old[name] != now]
     if differing:
         trials = trials_in(scratch)
         held = f"holds {counted(trials, 'trial')} of the stage {stage.name}, begun"
@@ -250,17 +235,6 @@ def trials_in(scratch: Path) -> int:
     from bifa.data.write import PARTIAL_SUFFIX  # numpy comes with it: errors of usage do not wait for that
 
     return len(list(scratch.glob(f"**/*{PARTIAL_SUFFIX}/*.csv")))
-
-
-def _other_inputs(begun: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
-    old = begun.get("inputs", {})
-    return [name for name, now in asked["inputs"].items() if name in old and old[name] != now]
-
-
-def _read_asked(path: Path) -> dict[str, Any]:
-    """What the scratch was begun with; empty where an earlier version of bifa, or an interruption at the very
-    beginning, left nothing."""
-    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else {}
 
 
 def _made_before(folder: Path, scratch: Path, stage: Stage, begun: Mapping[str, Any]) -> dict[str, str]:
