@@ -3,9 +3,10 @@
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,24 +38,6 @@ _ROBOTS = 256
 PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3, "edge": 23.3}
 
 
-@dataclass(frozen=True)
-class GaitResult:
-    """Speeds in mm/s over the settled cycles, of which `settled_cycles` were measured in all; `spread` is that of the
-    repeats. `interval_90_mm_s`, `walks_probability`: what the completed model predicts, at the edge that of the last
-    round. `stand_in`: the baseline, since no gait walks on the model."""
-
-    gait: str
-    base_model: float
-    completed_model: float
-    measured: float
-    spread: float
-    paper: float
-    stand_in: bool = False
-    settled_cycles: int = 0
-    interval_90_mm_s: tuple[float, float] = (0.0, 0.0)
-    walks_probability: float = 0.0
-
-
 def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stage:
     """The stage that makes `summary.json`, `report.html`, its two main figures and the walk that moves.
 
@@ -63,14 +46,10 @@ def summarize(sealed: bool, robot: str, made: Sequence[tuple[str, str]]) -> Stag
     needs += ["gait-base.toml", "rounds", "model-last.toml"]
     needs += ["diagnosis.json", "errors.json", "residuals.json", *(["truth.json"] if sealed else [])]
     makes = ("summary.json", "walks.png", "errors.png", "walk.svg", "report.html")
-
-    def run(inputs: Path, outputs: Path) -> None:
-        _run(inputs, outputs, robot, made)
-
-    return Stage("compare", "compare and report", tuple(needs), makes, run)
+    return Stage("compare", "compare and report", tuple(needs), makes, partial(_run, robot, made))
 
 
-def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]]) -> None:
+def _run(robot: str, made: Sequence[tuple[str, str]], inputs: Path, outputs: Path) -> None:
     base, completed = (load_model(inputs / f"model-{which}.toml") for which in ("base", "completed"))
     datasets = {which: read_dataset(inputs / f"walks-{which}") for which in ("base", "completed")}
     walked = {
@@ -85,7 +64,7 @@ def _run(inputs: Path, outputs: Path, robot: str, made: Sequence[tuple[str, str]
     traces = json.loads((inputs / "residuals.json").read_text())
     truth = json.loads((inputs / "truth.json").read_text()) if (inputs / "truth.json").exists() else None
     summary = {
-        "gaits": [asdict(result) for result in results],
+        "gaits": results,
         "verdict": diagnosis["verdict"],
         "effects": diagnosis["effects"],
         "remainder": diagnosis["remainder"],
@@ -121,22 +100,25 @@ def _edge(inputs: Path) -> Sequence[Trial]:
     return read_dataset(last).trials if rounds[-1]["at_edge"] and last.exists() else []
 
 
-def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> GaitResult:
+def _result(gait: str, trials: Sequence[Trial], base: Model, completed: Model) -> dict[str, Any]:
+    """Speeds in mm/s over the settled cycles, of which `settled_cycles` were measured in all; `spread` is that of the
+    repeats. `interval_90_mm_s`, `walks_probability`: what the completed model predicts, at the edge that of the last
+    round. `stand_in`: the baseline, since no gait walks on the model."""
     measured, trial = [speed_of(one) for one in trials], trials[0]
     means = [speed.mean_mm_s for speed in measured]
     prediction = prediction_of(completed, trial)
-    return GaitResult(
-        gait,
-        prediction_of(base, trial).speed_mm_s,
-        prediction.speed_mm_s,
-        float(np.mean(means)),
-        float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
-        PAPER_MM_S[gait],
-        gait != "baseline" and trial.gait == BASELINE.as_dict(),
-        sum(speed.settled_cycles for speed in measured),
-        prediction.interval_90_mm_s,
-        prediction.walks_probability,
-    )
+    return {
+        "gait": gait,
+        "base_model": prediction_of(base, trial).speed_mm_s,
+        "completed_model": prediction.speed_mm_s,
+        "measured": float(np.mean(means)),
+        "spread": float(np.std(means, ddof=1)) if len(means) > 1 else 0.0,
+        "paper": PAPER_MM_S[gait],
+        "stand_in": gait != "baseline" and trial.gait == BASELINE.as_dict(),
+        "settled_cycles": sum(speed.settled_cycles for speed in measured),
+        "interval_90_mm_s": prediction.interval_90_mm_s,
+        "walks_probability": prediction.walks_probability,
+    }
 
 
 def _when(measured: Dataset) -> list[tuple[str, str]]:
