@@ -3,6 +3,7 @@
 import json
 from collections.abc import Collection
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ def campaign(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stag
 def _characterize(setup: Setup, effort: Effort, on_progress: OnProgress) -> list[Stage]:
     """A real robot is measured without the known values that the person gives, which are declared afterwards: to
     correct one is no reason to measure again."""
-    kept, trials = setup.is_kept, plan.session(quick=effort.quick)
+    kept, trials = not setup.is_virtual, plan.session(quick=effort.quick)
     data, known = ("measured", {}) if kept else ("bench", dict(setup.known))
     on_trial = _unless_by_hand(setup, on_progress)
 
@@ -162,20 +163,17 @@ def _walk(
 
     needs = (model, *(file for file in gaits.values() if file))
     settings = setup.settings(number) | {"effort": asdict(effort)}
-    title, kept = f"walk: {' and '.join(gaits)}", setup.is_kept
+    title, kept = f"walk: {' and '.join(gaits)}", not setup.is_virtual
     return Stage(name, title, needs, (walks,), run, settings, resumes=kept, by_hand=kept)
 
 
-def _diagnosed(dataset: Dataset, suspected: Collection[str], setup: Setup, on_progress: OnProgress) -> Diagnosis:
-    def said(what: str) -> None:
-        on_progress(spoken(what), 0.0)
-
-    return diagnose(prepare(dataset), seed=setup.seed, suspected=suspected, on_progress=said)
+def _diagnosed(setup: Setup, on_progress: OnProgress, dataset: Dataset, suspected: Collection[str] = ()) -> Diagnosis:
+    system, seed = prepare(dataset), setup.seed
+    return diagnose(system, seed=seed, suspected=suspected, on_progress=lambda what: on_progress(spoken(what), 0.0))
 
 
 def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
-    def diagnosed(dataset: Dataset, suspected: Collection[str] = ()) -> Diagnosis:
-        return _diagnosed(dataset, suspected, setup, on_progress)
+    diagnosed = partial(_diagnosed, setup, on_progress)
 
     def run(inputs: Path, outputs: Path) -> None:
         dataset = read_dataset(inputs / "bench")
@@ -195,13 +193,13 @@ def _diagnose(setup: Setup, on_progress: OnProgress) -> Stage:
 
     makes = ("diagnosis.json", "errors.json", "residuals.json", "model-completed.toml", "separating")
     settings = setup.settings(_SEPARATING)
-    measures = setup.is_kept and not setup.is_by_hand  # the separating experiments, on a rig that needs nobody
+    measures = not (setup.is_virtual or setup.is_by_hand)  # the separating experiments, on a rig that needs nobody
     return Stage("diagnose", "find what the model lacks", ("bench",), makes, run, settings, by_hand=measures)
 
 
 def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     def complete(dataset: Dataset, suspected: tuple[str, ...]) -> tuple[Model, tuple[str, ...]]:
-        found = _diagnosed(dataset, suspected, setup, on_progress)
+        found = _diagnosed(setup, on_progress, dataset, suspected)
         return completed_model(found.final), tuple(effect.name for effect in found.effects)
 
     def walk(number: int, model: Model, gait: Gait, folder: Path) -> Dataset:
@@ -222,7 +220,7 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
     needs = ("bench", "separating", *walked, "diagnosis.json", "model-completed.toml", "gait-completed.toml")
     makes = ("rounds.json", "rounds", "model-last.toml", "gait-last.toml")
     settings = setup.settings(_FURTHER) | {"effort": asdict(effort)}
-    kept = setup.is_kept
+    kept = not setup.is_virtual
     return Stage("again", "feed the walks back", needs, makes, run, settings, resumes=kept, by_hand=kept)
 
 

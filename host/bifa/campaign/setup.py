@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from bifa.measure.by_hand import ByHand
 from bifa.rig import Rig, is_offered, open_rig
 
-Pairs = list[tuple[str, str]]
-
 
 @dataclass(frozen=True)
 class Effort:
@@ -40,14 +38,9 @@ class Setup:
 
     @property
     def is_virtual(self) -> bool:
-        """Whether the robot is simulated, so that it has seeds and a seal."""
+        """Whether the robot is simulated, so that it has seeds and a seal. On a real one nothing is measured again
+        unless asked, and earlier data are kept next to the new."""
         return self.port == "virtual"
-
-    @property
-    def is_kept(self) -> bool:
-        """Whether the robot is real: nothing is measured again unless asked, and earlier data are kept next to the
-        new."""
-        return not self.is_virtual
 
     def open(self, stage: int) -> Rig:
         """The rig for stage number `stage`."""
@@ -63,7 +56,7 @@ class Setup:
         return {**self.options, "seed": 100 * self.seed + stage} if self.is_virtual else dict(self.options)
 
 
-def about(setup: Setup, effort: Effort) -> tuple[str, Pairs]:
+def about(setup: Setup, effort: Effort) -> tuple[str, list[tuple[str, str]]]:
     """The robot in words, and how the campaign was made; the same for the same settings."""
     words = ["bifa", "campaign", "--port", setup.port]
     if setup.is_virtual:
