@@ -139,11 +139,6 @@ def _residuals(model: Model, repeats: Sequence[Trial]) -> np.ndarray:
     return np.array(measured) - predicted
 
 
-def _without_baseline(walks: Dataset) -> Dataset:
-    """The optimised gait's walks: the bench has walked the baseline, for another length of time."""
-    return replace(walks, trials=tuple(t for t in walks.trials if Gait(**t.walked) != BASELINE))
-
-
 def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...], trades: Trades) -> None:
     """Go round until a gait that was never fitted is predicted, nothing changes any more, or after `ROUNDS` rounds.
 
@@ -153,7 +148,9 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     """
     model, gait = load_model(inputs / "model-completed.toml"), load_gait(inputs / "gait-completed.toml")
     walks = read_dataset(inputs / "walks-completed")
-    before = _without_baseline(read_dataset(inputs / "walks-base"))
+    base = read_dataset(inputs / "walks-base")
+    # the bench has walked the baseline, for another length of time
+    before = replace(base, trials=tuple(t for t in base.trials if Gait(**t.walked) != BASELINE))
     dataset = joined(dataset, before, "walks-1/")
     began = tuple({Gait(**trial.walked): None for trial in before.trials})
     (outputs / "rounds").mkdir(exist_ok=True)

@@ -43,10 +43,9 @@ GAIT_NAMES = {
     "base": "found with the base model",
     "completed": "found with the completed model",
 }
-EDGE = "at the edge of what is known"
 ERROR_COLUMNS = ("base model", "completed model", "noise floor")
 _STAND_IN = "baseline: the {} model has none"
-_NAMES = GAIT_NAMES | {"edge": EDGE}
+_NAMES = GAIT_NAMES | {"edge": "at the edge of what is known"}
 FILES = (
     ("bench/dataset.toml", "data set"),
     ("diagnosis.json", "verdict"),

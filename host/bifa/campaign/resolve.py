@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, DatasetError, read_dataset
@@ -71,19 +70,14 @@ def refuse_leftovers(folder: Path) -> None:
 
 def planned(chosen: NextExperiment) -> tuple[PlannedTrial, ...]:
     """The chosen experiment as trials of a session, with its repeats."""
-    settings: Mapping[str, Any] = chosen.settings
+    settings = chosen.settings
     if chosen.experiment is None:
         raise ValueError("no experiment was chosen")
     gait = Gait(**settings["gait"]) if "gait" in settings else None
-    condition = PlannedTrial(
-        chosen.experiment,
-        settings.get("actuator"),
-        settings.get("pressure_psi"),
-        settings.get("rate_mm_s"),
-        gait,
-        _WALK_CYCLES if gait else 0,
-        settings={key: settings[key] for key in ("direction", "inclination_deg") if key in settings},
-    )
+    actuator, pressure_psi, rate_mm_s = (settings.get(key) for key in ("actuator", "pressure_psi", "rate_mm_s"))
+    stand = {key: settings[key] for key in ("direction", "inclination_deg") if key in settings}
+    cycles = _WALK_CYCLES if gait else 0
+    condition = PlannedTrial(chosen.experiment, actuator, pressure_psi, rate_mm_s, gait, cycles, settings=stand)
     return tuple(replace(condition, repeat=repeat) for repeat in range(1, REPEATS + 1))
 
 

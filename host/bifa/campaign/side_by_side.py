@@ -42,7 +42,6 @@ class Campaign:
     """A finished campaign. models: "base" and "completed"; gaits: by name, the baseline not among them."""
 
     name: str
-    folder: Path
     summary: Mapping[str, Any]
     models: Mapping[str, Model]
     gaits: Mapping[str, Gait]
@@ -69,7 +68,7 @@ def _read(name: str, folder: Path) -> Campaign:
         raise CompareError(f"{folder / 'summary.json'} is damaged ({error}); rebuild it with --rerun compare") from None
     which = ("base", "completed")
     models = {w: load_model(folder / f"model-{w}.toml") for w in which}
-    return Campaign(name, folder, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})
+    return Campaign(name, summary, models, {w: load_gait(folder / f"gait-{w}.toml") for w in which})
 
 
 def compare_page(runs: Sequence[Campaign]) -> Page:
