@@ -216,11 +216,7 @@ class RobotSystem(System):
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
         return tuple(
-            CandidateExperiment(
-                experiment=recorded.experiment,
-                settings=settings,
-                trial=_engine_trial(recorded, measured=False),
-            )
+            CandidateExperiment(recorded.experiment, settings, _engine_trial(recorded, measured=False))
             for settings, recorded in candidates.of(self.dataset)
         )
 
