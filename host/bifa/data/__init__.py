@@ -6,12 +6,4 @@ from .layout import EXPERIMENTS
 from .read import read_dataset
 from .write import DatasetWriter, write_dataset
 
-__all__ = [
-    "EXPERIMENTS",
-    "Dataset",
-    "DatasetError",
-    "DatasetWriter",
-    "Trial",
-    "read_dataset",
-    "write_dataset",
-]
+__all__ = ["EXPERIMENTS", "Dataset", "DatasetError", "DatasetWriter", "Trial", "read_dataset", "write_dataset"]
