@@ -6,29 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from bifa.data import Dataset
-from bifa.identify.start import prepare
 from bifa.problem.sites import SITES, corrected, learnt_curves
 from bifa.robot.learnt import ROWS
 from bifa.simulate import plant, vented_between
-from harness.independent_lab import BASELINE, IndependentLab
 from lacuna.system import Correction
-
-
-@pytest.fixture(scope="module")
-def system():
-    lab = IndependentLab().with_seed(4)
-    trials = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
-    trials += [lab.step(which, 8.5) for which in ("large", "small")]
-    trials += [lab.anchor(8.5), lab.walk(BASELINE, 8.0)]
-    known = {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
-    numbered = tuple(replace(t, file=f"{i:02d}.csv", session_order=i + 1) for i, t in enumerate(trials))
-    return prepare(Dataset(path=None, name="small day", known=known, trials=numbered))
-
-
-@pytest.fixture(scope="module")
-def theta(system):
-    return {p.name: p.value for p in system.parameters}
 
 
 def curve(system, name, function) -> Correction:
@@ -130,38 +111,27 @@ def test_a_camera_that_remembers_is_one_on_a_mount_that_rings(system, theta, exp
         np.testing.assert_array_equal(got[other], plain[other])
 
 
-def with_effect(theta, name, **values):
-    return theta | {f"{name}.{parameter}": value for parameter, value in values.items()}
-
-
+SWITCHED = ("step_response", "locomotion")
 # A curve (a row each where they differ), the effect of the library that does the same, and where it shows.
 ALIKE = {
-    "valves": ([lambda _: 0.03], with_effect({}, "valve_latency", delay_s=0.03), ("step_response", "locomotion")),
+    "valves": ([lambda _: 0.03], {"valve_latency.delay_s": 0.03}, SWITCHED),
     "area_stroke": (
         [lambda x: 0.1 * x],
-        with_effect({}, "area_variation", slope=0.1, force_kept=0.0),
+        {"area_variation.slope": 0.1, "area_variation.force_kept": 0.0},
         ("static_loading",),
     ),
     "grip_speed": (
         [lambda _: 0.15, lambda _: -0.15],
-        with_effect({}, "friction_direction", asymmetry=0.15),
+        {"friction_direction.asymmetry": 0.15},
         ("anchor_pull", "locomotion"),
     ),
-    "pressure_sensor_memory": (
-        [lambda ago_s: -np.exp(-ago_s / 0.05)],
-        with_effect({}, "sensor_lag", time_s=0.05),
-        ("step_response", "locomotion"),
-    ),
-    "pressure_sensor_inflow": (
-        [lambda drop_psi: 0.05 * drop_psi],
-        with_effect({}, "sensor_position", share=0.05),
-        ("step_response", "locomotion"),
-    ),
+    "pressure_sensor_memory": ([lambda ago_s: -np.exp(-ago_s / 0.05)], {"sensor_lag.time_s": 0.05}, SWITCHED),
+    "pressure_sensor_inflow": ([lambda drop_psi: 0.05 * drop_psi], {"sensor_position.share": 0.05}, SWITCHED),
 }
 
 
 def with_dead_time(trial):
-    if trial.experiment not in ("step_response", "locomotion"):
+    if trial.experiment not in SWITCHED:
         return trial
     return replace(trial, payload=replace(trial.payload, commands=vented_between(trial.payload.commands, 0.004)))
 

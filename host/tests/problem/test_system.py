@@ -12,43 +12,13 @@ from bifa.problem.inputs import inputs_of
 from bifa.problem.library import engine_effects
 from bifa.problem.stiffness import UndeterminedError
 from bifa.robot import ModelParameterError
-from harness.independent_lab import BASELINE, IndependentLab
+from bifa.simulate import static_loading
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.graduated import solve_graduated
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.system import Correction
-
-
-def numbered(trials) -> tuple:
-    return tuple(replace(trial, file=f"{i:02d}.csv", session_order=i) for i, trial in enumerate(trials))
-
-
-@pytest.fixture(scope="module")
-def lab():
-    return IndependentLab().with_seed(4)
-
-
-@pytest.fixture(scope="module")
-def dataset(lab):
-    trials = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
-    trials += [lab.step(which, 8.5) for which in ("large", "small")]
-    trials += [lab.anchor(p) for p in (0.0, 8.5)]
-    trials += [lab.walk(BASELINE, 8.0)]
-    known = {"head_mass_kg": lab.head_mass, "tail_mass_kg": lab.tail_mass}
-    known |= {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
-    return Dataset(path=None, name="small day", known=known, trials=numbered(trials))
-
-
-@pytest.fixture(scope="module")
-def system(dataset):
-    return prepare(dataset)
-
-
-@pytest.fixture(scope="module")
-def theta(system):
-    return {p.name: p.value for p in system.parameters}
 
 
 def test_trials_side_by_side_are_predicted_as_each_alone(system, theta):
@@ -122,8 +92,6 @@ def test_a_prediction_never_looks_at_what_was_measured(dataset, system, theta):
             for name, values in trial.columns.items()
         }
         rubbish.append(replace(trial, columns=hidden))
-    from bifa.problem.inputs import inputs_of
-
     for trial, changed in zip(system.trials, rubbish, strict=True):
         blind = replace(trial, payload=inputs_of(changed))
         for channel, values in system.predict(theta, (), trial).items():
@@ -204,8 +172,6 @@ def test_a_learnt_spring_adds_its_force(system, theta):
 
 
 def test_the_identified_model_predicts_what_the_system_does(system, theta):
-    from bifa.simulate import static_loading
-
     model = system.model_at(theta)
     trial = system.trials[0]
     inputs = trial.payload

@@ -5,29 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.data import Dataset
 from bifa.identify.start import prepare
 from bifa.problem.accuracy import AccuracyError, accuracies, accuracy_of
 from bifa.problem.spare import spare
 from bifa.problem.unmeasured import LOAD_CELL, PRIOR_SD, STAND_MASS
-from harness.independent_lab import BASELINE, IndependentLab
+from harness.independent_lab import BASELINE
 
 GAITS = [BASELINE | {"period_s": period} for period in (5.7, 4.4, 3.4)]
 
 
 @pytest.fixture(scope="module")
-def trials():
-    lab = IndependentLab().with_seed(4)
-    made = [lab.static(which, p) for which in ("large", "small") for p in (0.0, 8.0)]
-    made += [lab.step(which, 8.5) for which in ("large", "small")]
-    made += [lab.anchor(p) for p in (0.0, 8.5)]
-    made += [lab.walk(BASELINE, 6.0)]
-    return tuple(replace(trial, file=f"{i:02d}.csv", session_order=i) for i, trial in enumerate(made))
-
-
-@pytest.fixture(scope="module")
-def system(trials):
-    return prepare(Dataset(path=None, name="day", known={"head_mass_kg": 0.175}, trials=trials))
+def system(dataset):
+    return prepare(replace(dataset, known={"head_mass_kg": 0.175}))
 
 
 def named(system):
@@ -53,24 +42,17 @@ def test_the_mass_on_the_stand_moves_the_steps_of_the_large_actuator_only(system
         assert moved == system.matters(STAND_MASS, trial)
 
 
-def test_a_load_cell_that_the_data_set_declares_is_known(trials):
-    declared = tuple(replace(t, extra={**t.extra, LOAD_CELL: 6200.0}) for t in trials)
-    system = prepare(Dataset(path=None, name="day", known={}, trials=declared))
-    assert LOAD_CELL not in named(system)
+def test_a_load_cell_that_the_data_set_declares_is_known(dataset):
+    declared = tuple(replace(t, extra={**t.extra, LOAD_CELL: 6200.0}) for t in dataset.trials)
+    assert LOAD_CELL not in named(prepare(replace(dataset, known={}, trials=declared)))
 
 
-def _planned(trials, experiment, settings):
-    one = next(t for t in trials if t.experiment == experiment)
-    return [replace(one, **setting) for setting in settings]
-
-
-def test_never_fitted_are_a_middle_pressure_a_middle_gait_and_the_lower_of_two_steps(trials):
-    made = _planned(trials, "static_loading", [{"pressure_psi": p} for p in (0.0, 4.0, 8.5)])
-    made += _planned(trials, "step_response", [{"pressure_psi": p} for p in (6.0, 8.5)])
-    made += _planned(trials, "anchor_pull", [{"pressure_psi": p} for p in (0.0, 8.5)])
-    made += _planned(trials, "locomotion", [{"gait": gait} for gait in GAITS])
-    dataset = Dataset(path=None, name="day", known={}, trials=tuple(made))
-    chosen = set(spare(dataset))
+def test_never_fitted_are_a_middle_pressure_a_middle_gait_and_the_lower_of_two_steps(dataset):
+    made = [replace(dataset.of("static_loading")[0], pressure_psi=p) for p in (0.0, 4.0, 8.5)]
+    made += [replace(dataset.of("step_response")[0], pressure_psi=p) for p in (6.0, 8.5)]
+    made += [replace(dataset.of("anchor_pull")[0], pressure_psi=p) for p in (0.0, 8.5)]
+    made += [replace(dataset.of("locomotion")[0], gait=gait) for gait in GAITS]
+    chosen = set(spare(replace(dataset, trials=tuple(made))))
     spared = [t for t in made if (t.experiment, t.condition) in chosen]
     assert [t.pressure_psi for t in spared if t.experiment == "static_loading"] == [4.0]
     assert [t.pressure_psi for t in spared if t.experiment == "step_response"] == [6.0]
