@@ -32,16 +32,8 @@ def walked(gaits: dict[str, Gait], seed: int = 0, robot: Model = ROBOT, cycles: 
                 key: values + (0.1 * draw.standard_normal(len(values)) if key.startswith("displacement") else 0.0)
                 for key, values in clean.items()
             }
-            trials.append(
-                Trial(
-                    file=f"{name}_{repeat}.csv",
-                    experiment="locomotion",
-                    columns=columns,
-                    gait=gait.as_dict(),
-                    repeat=repeat,
-                    session_order=len(trials) + 1,
-                )
-            )
+            head = {"gait": gait.as_dict(), "repeat": repeat, "session_order": len(trials) + 1}
+            trials.append(Trial(f"{name}_{repeat}.csv", "locomotion", columns, **head))
     return Dataset(None, "walks", {}, tuple(trials), {})
 
 
@@ -68,10 +60,21 @@ def folders(tmp_path):
     return inputs, outputs
 
 
-def go_round(folders, first, later, gaits=(FASTER, FASTER)):
-    """again() with a completed model `first` and diagnoses that answer `later` in turn; rounds and data they saw."""
+def walk_into(number, model, gait, folder):
+    write_dataset(folder, walked({f"round-{number}": gait}, number))
+    return read_dataset(folder)
+
+
+def rounds_of(folders, first, trades, effects=()):
+    """The rounds that again() writes with a completed model `first`."""
     inputs, outputs = folders
     save_model(inputs / "model-completed.toml", first)
+    again(inputs, outputs, Dataset(None, "day", {}, ()), effects, trades)
+    return json.loads((outputs / "rounds.json").read_text())
+
+
+def go_round(folders, first, later, gaits=(FASTER, FASTER)):
+    """The rounds with diagnoses that answer `later` in turn, and the data that they saw."""
     seen, answers, left, begun, asked = [], iter(later), iter(gaits), [], []
 
     def complete(dataset, suspected):
@@ -79,18 +82,14 @@ def go_round(folders, first, later, gaits=(FASTER, FASTER)):
         asked.append(suspected)
         return next(answers), ("hysteresis",)
 
-    def walk_into(number, model, gait, folder):
-        write_dataset(folder, walked({f"round-{number}": gait}, number))
-        return read_dataset(folder)
-
     def search(model, walked):
         begun.append(walked)
         return next(left)
 
-    again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, search, walk_into))
+    rounds = rounds_of(folders, first, Trades(complete, search, walk_into))
     assert begun == [(FASTER, FAST, *gaits[:number]) for number in range(len(begun))], "from all that were walked"
     assert asked == [(), *[("hysteresis",)] * (len(asked) - 1)], "what was named before is tried again"
-    return json.loads((outputs / "rounds.json").read_text()), seen
+    return rounds, seen
 
 
 def test_a_robust_gait_that_is_predicted_is_followed_by_the_one_at_the_edge(folders):
@@ -130,30 +129,21 @@ def test_it_ends_where_nothing_changes_any_more(folders):
 
 def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing(folders):
     """Choked flow, 800: with the walks among the data nothing was named, and the edge was sought of the base model."""
-    inputs, outputs = folders
-    save_model(inputs / "model-completed.toml", ROBOT)
     searched = []
 
     def search(model, walked):
         searched.append(model)
         return FASTER
 
-    def walk_into(number, model, gait, folder):
-        write_dataset(folder, walked({f"round-{number}": gait}, number))
-        return read_dataset(folder)
-
     trades = Trades(lambda dataset, suspected: (SLIPPERY, ()), search, walk_into)
-    again(inputs, outputs, Dataset(None, "day", {}, ()), ("hysteresis",), trades)
-    rounds = json.loads((outputs / "rounds.json").read_text())
+    rounds = rounds_of(folders, ROBOT, trades, ("hysteresis",))
     assert [r["effects"] for r in rounds] == [["hysteresis"], ["hysteresis"]]
     assert searched[0]["mu_k"] == pytest.approx(ROBOT["mu_k"])
-    assert load_model(outputs / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"])
+    assert load_model(folders[1] / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"])
 
 
 def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
     """The robot stands still with the gait at the edge: two cycles of it are recorded, fed back, and the next tried."""
-    inputs, outputs = folders
-    save_model(inputs / "model-completed.toml", ROBOT)
     seen = []
 
     def complete(dataset, suspected):
@@ -164,12 +154,11 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
         write_dataset(folder, stood(gait, number))
         return read_dataset(folder)
 
-    again(inputs, outputs, Dataset(None, "day", {}, ()), (), Trades(complete, lambda model, walked: FASTER, fall))
-    rounds = json.loads((outputs / "rounds.json").read_text())
+    rounds = rounds_of(folders, ROBOT, Trades(complete, lambda model, walked: FASTER, fall))
     assert len(rounds) == ROUNDS
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]
     assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
-    assert load_gait(outputs / "gait-last.toml") == FAST, "the robust gait is what is kept"
+    assert load_gait(folders[1] / "gait-last.toml") == FAST, "the robust gait is what is kept"
 
 
 def stood(gait, seed):
