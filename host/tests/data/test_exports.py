@@ -77,6 +77,13 @@ SIMPLE = """[instrument.machine]
 columns = { time_s = "t", displacement_mm = "x", force_N = "F" }
 units = { time_s = "s", displacement_mm = "mm", force_N = "N" }
 """
+DATED = SIMPLE.replace('time_s = "s"', 'time_s = "date"')
+
+
+def read(folder, content, text=SIMPLE, encoding="utf-8"):
+    """The columns of a file with this content, as declared."""
+    (folder / "a.csv").write_text(content, encoding=encoding)
+    return read_export(folder / "a.csv", declared(text), MACHINE)[0]
 
 
 @pytest.mark.parametrize(
@@ -88,12 +95,10 @@ units = { time_s = "s", displacement_mm = "mm", force_N = "N" }
     ],
 )
 def test_units_factors_and_signs_of_the_file_are_converted(tmp_path, units, factors):
-    (tmp_path / "a.csv").write_text("t,x,F\n1,2,3\n4,5,6\n")
     text = SIMPLE.replace('"s"', f'"{units["time_s"]}"').replace('"mm"', f'"{units["displacement_mm"]}"')
-    text = (
-        text.replace('"N"', f'"{units["force_N"]}"') + "sign = { force_N = -1 }\nfactor = { displacement_mm = 0.5 }\n"
-    )
-    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    text = text.replace('"N"', f'"{units["force_N"]}"')
+    text += "sign = { force_N = -1 }\nfactor = { displacement_mm = 0.5 }\n"
+    found = read(tmp_path, "t,x,F\n1,2,3\n4,5,6\n", text)
     time_s, x, force = factors
     np.testing.assert_allclose(found["time_s"], np.array([1.0, 4.0]) * time_s)
     np.testing.assert_allclose(found["displacement_mm"], np.array([2.0, 5.0]) * x * 0.5)
@@ -101,9 +106,8 @@ def test_units_factors_and_signs_of_the_file_are_converted(tmp_path, units, fact
 
 
 def test_a_camera_with_another_origin_has_an_offset(tmp_path):
-    (tmp_path / "a.csv").write_text("t,x,F\n0,0.3124,0\n1,0.3134,0\n")
     text = SIMPLE.replace('"mm"', '"m"') + "sign = { displacement_mm = -1 }\noffset = { displacement_mm = 312.4 }\n"
-    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    found = read(tmp_path, "t,x,F\n0,0.3124,0\n1,0.3134,0\n", text)
     np.testing.assert_allclose(found["displacement_mm"], [0.0, -1.0], atol=1e-9)
 
 
@@ -114,29 +118,20 @@ def test_dates_are_read_as_the_moments_that_they_are(tmp_path, zone, form):
     begin = datetime(2026, 10, 25, 0, 59, 59, tzinfo=ZoneInfo("UTC"))
     moments = [begin + timedelta(milliseconds=250 * k) for k in range(8)]
     told = [m.isoformat() if form is None else m.astimezone(ZoneInfo("UTC")).strftime(form) for m in moments]
-    text = SIMPLE.replace('time_s = "s"', 'time_s = "date"') + (
-        f'date_format = "{form}"\nzone = "UTC"\n' if form else ""
-    )
-    (tmp_path / "a.csv").write_text("t,x,F\n" + "".join(f"{t},1,2\n" for t in told))
-    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
-    np.testing.assert_allclose(found["time_s"], 0.25 * np.arange(8))
     local = [moment.astimezone(ZoneInfo(zone)).isoformat() for moment in moments]
-    (tmp_path / "a.csv").write_text("t,x,F\n" + "".join(f"{t},1,2\n" for t in local))
-    found, _, _ = read_export(tmp_path / "a.csv", declared(SIMPLE.replace('time_s = "s"', 'time_s = "date"')), MACHINE)
-    np.testing.assert_allclose(found["time_s"], 0.25 * np.arange(8))
+    text = DATED + (f'date_format = "{form}"\nzone = "UTC"\n' if form else "")
+    for dates, declaration in ((told, text), (local, DATED)):
+        found = read(tmp_path, "t,x,F\n" + "".join(f"{t},1,2\n" for t in dates), declaration)
+        np.testing.assert_allclose(found["time_s"], 0.25 * np.arange(8))
 
 
 def test_a_date_in_two_columns_and_one_that_is_none(tmp_path):
-    text = SIMPLE.replace('"t"', '"Date + Time"').replace('time_s = "s"', 'time_s = "date"')
-    text += 'date_format = "%Y/%m/%d %H:%M:%S.%f"\n'
-    (tmp_path / "a.csv").write_text("Date,Time,x,F\n2026/11/25,10:00:00.5,1,2\n2026/11/25,10:00:01.0,1,2\n")
-    found, _, _ = read_export(tmp_path / "a.csv", declared(text), MACHINE)
-    assert found["time_s"].tolist() == [0.0, 0.5]
-    (tmp_path / "a.csv").write_text("Date,Time,x,F\n2026/11/25,10:00:00.5,1,2\n25.11.2026,10:00:01.0,1,2\n")
-    with pytest.raises(
-        DatasetError, match=r"line 3, column Date \+ Time: '25\.11\.2026 10:00:01\.0' is no date of the"
-    ):
-        read_export(tmp_path / "a.csv", declared(text), MACHINE)
+    text = DATED.replace('"t"', '"Date + Time"') + 'date_format = "%Y/%m/%d %H:%M:%S.%f"\n'
+    begin = "Date,Time,x,F\n2026/11/25,10:00:00.5,1,2\n"
+    assert read(tmp_path, begin + "2026/11/25,10:00:01.0,1,2\n", text)["time_s"].tolist() == [0.0, 0.5]
+    said = r"line 3, column Date \+ Time: '25\.11\.2026 10:00:01\.0' is no date of the"
+    with pytest.raises(DatasetError, match=said):
+        read(tmp_path, begin + "25.11.2026,10:00:01.0,1,2\n", text)
 
 
 def test_the_strobe_may_be_a_column_or_clock_every_frame(tmp_path):
@@ -189,32 +184,27 @@ def test_a_workbook_comes_in(tmp_path):
     ],
 )
 def test_a_fault_is_named_by_line_column_and_cell(tmp_path, text, said):
-    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with pytest.raises(DatasetError, match=rf"a\.csv.*{said}"):
-        read_export(tmp_path / "a.csv", declared(SIMPLE), MACHINE)
+        read(tmp_path, text)
 
 
 def test_points_in_a_file_with_decimal_commas_are_no_thousands(tmp_path):
-    (tmp_path / "a.csv").write_text("t;x;F\n0,0;1.234;2\n1,0;2,5;3\n")
     with pytest.raises(DatasetError, match=r"line 2, column x: '1\.234' is not a number"):
-        read_export(tmp_path / "a.csv", declared(SIMPLE + 'separator = ";"\ndecimal = ","\n'), MACHINE)
+        read(tmp_path, "t;x;F\n0,0;1.234;2\n1,0;2,5;3\n", SIMPLE + 'separator = ";"\ndecimal = ","\n')
 
 
 def test_an_encoding_that_is_another_is_said_with_how_to_declare_it(tmp_path):
-    (tmp_path / "a.csv").write_bytes("t,x,F,µ\n0,1,2,3\n".encode("cp1252"))
     with pytest.raises(DatasetError, match=r'line 1: byte 0xb5 is not UTF-8.*encoding = "cp1252"'):
-        read_export(tmp_path / "a.csv", declared(SIMPLE), MACHINE)
-    read_export(tmp_path / "a.csv", declared(SIMPLE + 'encoding = "cp1252"\n'), MACHINE)
+        read(tmp_path, "t,x,F,µ\n0,1,2,3\n", encoding="cp1252")
+    read(tmp_path, "t,x,F,µ\n0,1,2,3\n", SIMPLE + 'encoding = "cp1252"\n', "cp1252")
     for encoding in ("utf-16", "utf-8-sig"):
-        (tmp_path / "a.csv").write_text("t,x,F\n0,1,2\n1,2,3\n", encoding=encoding)
-        found, _, _ = read_export(tmp_path / "a.csv", declared(SIMPLE + f'encoding = "{encoding}"\n'), MACHINE)
+        found = read(tmp_path, "t,x,F\n0,1,2\n1,2,3\n", SIMPLE + f'encoding = "{encoding}"\n', encoding)
         assert found["force_N"].tolist() == [2.0, 3.0]
 
 
 def test_a_row_of_units_and_the_declaration_have_to_agree(tmp_path):
-    (tmp_path / "a.csv").write_text("t,x,F\n(s),(mm),(kN)\n0,1,2\n")
     with pytest.raises(DatasetError, match=r"line 2, column F: the file says kN, but units.force_N is declared as N"):
-        read_export(tmp_path / "a.csv", declared(SIMPLE + "units_rows = 1\n"), MACHINE)
+        read(tmp_path, "t,x,F\n(s),(mm),(kN)\n0,1,2\n", SIMPLE + "units_rows = 1\n")
 
 
 @pytest.mark.parametrize(
@@ -263,8 +253,7 @@ def test_any_number_is_read_to_the_last_bit(values, how, encoding):
     rows = "".join(f"{mark.join([f'{v!r}'.replace('.', point)] * 2)}{mark}1\n" for v in values)
     form = f'separator = "{name}"\ndecimal = "{point}"\nencoding = "{encoding}"\n'
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "a.csv").write_text(f"t{mark}x{mark}F\n" + rows, encoding=encoding)
-        found, _, _ = read_export(Path(folder) / "a.csv", declared(SIMPLE + form), MACHINE)
+        found = read(Path(folder), f"t{mark}x{mark}F\n" + rows, SIMPLE + form, encoding)
     assert found["displacement_mm"].tolist() == values
 
 
@@ -351,13 +340,7 @@ def test_the_declarations_of_the_pages_are_valid(page):
 
 
 def test_a_columns_name_alone_is_no_unit(tmp_path):
-    (tmp_path / "a.csv").write_text("t,x,N\n0,1,2\n1,2,3\n")
-    columns = 'columns = { time_s = "t", displacement_mm = "x", force_N = "N" }\n'
-    units = 'units = { time_s = "s", displacement_mm = "mm", force_N = "kN" }\n'
-    found, _, _ = read_export(tmp_path / "a.csv", declared("[instrument.machine]\n" + columns + units), MACHINE)
-    assert found["force_N"].tolist() == [2000.0, 3000.0]
-    (tmp_path / "a.csv").write_text("t,x,N [N]\n0,1,2\n1,2,3\n")
+    text = SIMPLE.replace('"N"', '"kN"').replace('"F"', '"N"')
+    assert read(tmp_path, "t,x,N\n0,1,2\n1,2,3\n", text)["force_N"].tolist() == [2000.0, 3000.0]
     with pytest.raises(DatasetError, match=r"the file says N, but units.force_N is declared as kN"):
-        read_export(
-            tmp_path / "a.csv", declared("[instrument.machine]\n" + columns.replace('"N"', '"N [N]"') + units), MACHINE
-        )
+        read(tmp_path, "t,x,N [N]\n0,1,2\n1,2,3\n", text.replace('"N"', '"N [N]"'))
