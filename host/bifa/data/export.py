@@ -18,24 +18,27 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 import numpy as np
 
-from .clocks import DATE, FRAME, SECONDS, moment_of, zone_of
 from .fields import Fields
 from .layout import EXPERIMENTS, is_command
 from .sheet import SEPARATORS, Sheet, SheetForm, listed
 
 MACHINE, CAMERA = "machine", "camera"
 ROLES = {"static_loading": MACHINE, "anchor_pull": MACHINE, "step_response": CAMERA, "locomotion": CAMERA}
+FRAME, DATE = "frame", "date"
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _LENGTHS = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "in": 25.4, "um": 1e-3}
 _FORCES = {"N": 1.0, "kN": 1000.0, "mN": 1e-3, "lbf": 4.4482216152605, "kgf": 9.80665, "gf": 9.80665e-3}
 _PRESSURES = {"psi": 1.0, "kPa": 0.1450377377, "bar": 14.50377377, "mbar": 0.01450377377, "MPa": 145.0377377}
-UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": SECONDS}  # by what a column's name ends with
+UNITS = {"mm": _LENGTHS, "N": _FORCES, "psi": _PRESSURES, "s": _SECONDS}  # by what a column's name ends with
 _SPELT = {"sec": "s", "seconds": "s", "second": "s", "msec": "ms", "µm": "um", "inch": "in", "lb": "lbf", "volts": "v"}
 _SPELT |= {"meters": "m", "millimeters": "mm", "centimeters": "cm", "newton": "N", "inches": "in"}
 _ROWS = {"skip_rows": 0, "header_rows": 1, "units_rows": 0}  # and the least of each
@@ -167,14 +170,30 @@ def _date_cells(sheet: Sheet, source: str) -> list[str]:
 
 def _seconds(sheet: Sheet, export: Export, cells: list[str], source: str) -> np.ndarray:
     """Seconds since the first of these dates."""
-    zone, moments = zone_of(export.zone) if export.zone else None, []
+    zone, moments = _zone(export.zone) if export.zone else None, []
     for row, cell in enumerate(cells):
         try:
-            moments.append(moment_of(cell, export.date_format, zone))
+            moments.append(_moment(cell, export.date_format, zone))
         except ValueError:
             form = f"of the form {export.date_format!r}" if export.date_format else "as ISO 8601 writes it"
             raise sheet.error(f"{cell!r} is no date {form}", row, source) from None
     return np.array([(moment - moments[0]).total_seconds() for moment in moments])
+
+
+def _moment(cell: str, form: str | None, zone: ZoneInfo | None) -> datetime:
+    """The date in a cell; ValueError where there is none. `form`: as for strptime, None for ISO 8601; `zone`: of dates
+    that name none; without one they are taken as those of UTC, so that no change of the clocks is seen."""
+    text = cell.strip()
+    moment = datetime.fromisoformat(text) if form is None else datetime.strptime(text, form)
+    return (moment if moment.tzinfo else moment.replace(tzinfo=zone or UTC)).astimezone(UTC)
+
+
+def _zone(name: str) -> ZoneInfo:
+    """The zone of this name; ValueError where there is none."""
+    try:
+        return ZoneInfo(name)
+    except (ZoneInfoNotFoundError, OSError) as error:
+        raise ValueError(f"unknown time zone {name!r}: write it as Europe/Berlin, or UTC") from error
 
 
 def _refuse_other_unit(sheet: Sheet, place: int, name: str, unit: str | None) -> None:
@@ -234,7 +253,7 @@ def parse_export(fields: Fields, name: str) -> Export:
     fields.finish(also=_KEYS)
     try:
         if export.zone:
-            zone_of(export.zone)
+            _zone(export.zone)
     except ValueError as error:
         raise fields.error("zone", str(error)) from None
     _check_columns(fields, export)

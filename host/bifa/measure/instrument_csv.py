@@ -17,8 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bifa.data import Dataset, DatasetError, Trial, read_dataset, write_dataset
-from bifa.data.clocks import DATE
-from bifa.data.export import OWN_NAMES, Export, dated_edges, read_export, sync_edges
+from bifa.data.export import DATE, OWN_NAMES, Export, dated_edges, read_export, sync_edges
 from bifa.data.layout import TABLE_FILE
 from bifa.data.lost import codes
 from bifa.data.sheet import Sheet
