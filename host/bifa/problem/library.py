@@ -29,19 +29,12 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
     )
 
 
-def _engine_parameter(parameter: effects.EffectParameter) -> Parameter:
-    lower, upper = parameter.lower, parameter.upper
-    if parameter.period is not None:
-        lower, upper = parameter.typical - 0.5 * parameter.period, parameter.typical + 0.5 * parameter.period
+def _engine_parameter(p: effects.EffectParameter) -> Parameter:
+    lower, upper = p.lower, p.upper
+    if p.period is not None:
+        lower, upper = p.typical - 0.5 * p.period, p.typical + 0.5 * p.period
     return Parameter(
-        name=parameter.name,
-        unit=parameter.unit,
-        value=parameter.typical,
-        lower=lower,
-        upper=upper,
-        scale=_scale(parameter),
-        source=parameter.meaning,
-        periodic=parameter.period is not None,
+        p.name, p.unit, p.typical, lower, upper, scale=_scale(p), source=p.meaning, periodic=p.period is not None
     )
 
 

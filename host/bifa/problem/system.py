@@ -319,15 +319,8 @@ def _engine_trial(recorded: Trial, measured: bool = True) -> Record:
         name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
         for name in inputs.channels
     }
-    return Record(
-        name=recorded.file,
-        experiment=recorded.experiment,
-        condition=recorded.condition,
-        time_s=recorded.time_s,
-        channels=channels,
-        session_order=recorded.session_order,
-        payload=inputs,
-    )
+    settings = recorded.experiment, recorded.condition
+    return Record(recorded.file, *settings, recorded.time_s, channels, recorded.session_order, payload=inputs)
 
 
 def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:
