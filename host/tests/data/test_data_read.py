@@ -65,14 +65,12 @@ def test_repeats_are_grouped_by_condition(folder):
 def edit_row(line, column, text):
     """Replace one field of the walk's file."""
 
-    def apply(folder):
-        lines = (folder / WALK).read_text().split("\n")
+    def change(lines):
         fields = lines[line - 1].split(",")
         fields[column] = text
         lines[line - 1] = ",".join(fields)
-        (folder / WALK).write_text("\n".join(lines))
 
-    return apply
+    return edit_lines(change)
 
 
 def edit_lines(change):
@@ -94,16 +92,11 @@ HEADER = (
 )
 
 MALFORMED_CSV = {
-    "missing column": (
-        edit_row(1, 4, "displacement_tail_mm"),
-        1,
-        "displacement_head_mm",
-        "missing from the header",
-    ),
+    "missing column": (edit_row(1, 4, "displacement_tail_mm"), 1, "displacement_head_mm", "missing from the header"),
     "extra column": (edit_row(1, 4, "displacement_head_mm,volts"), 1, "volts", "unknown column 'volts'"),
     "bad unit": (edit_row(1, 5, "pressure_body_bar"), 1, "pressure_body_bar", "unknown column"),
     "column twice": (edit_row(1, 5, "time_s"), 1, "time_s", "twice"),
-    "no header": (lambda folder: edit_lines(lambda lines: lines.pop(0))(folder), 1, "0", "unknown column"),
+    "no header": (edit_lines(lambda lines: lines.pop(0)), 1, "0", "unknown column"),
     "empty name": (edit_row(1, 5, ""), 1, "(no name)", "unknown column ''"),
     "NaN": (edit_row(7, 4, "nan"), 7, "displacement_head_mm", "the value is missing"),
     "infinity": (edit_row(7, 4, "-inf"), 7, "displacement_head_mm", "-inf is beyond any measurement"),
@@ -183,17 +176,9 @@ MALFORMED_TOML = {
     "name a number": (replace('name = "made for a test"', "name = 3"), "name", "must be a string"),
     "name empty": (replace('name = "made for a test"', 'name = ""'), "name", "not empty"),
     "unknown key at the top": (replace("format = 1", "format = 1\nunits = 'SI'"), "units", "unknown key"),
-    "known a word": (
-        replace("head_mass_kg = 0.175", "head_mass_kg = '175 g'"),
-        "known.head_mass_kg",
-        "a number",
-    ),
+    "known a word": (replace("head_mass_kg = 0.175", "head_mass_kg = '175 g'"), "known.head_mass_kg", "a number"),
     "known NaN": (replace("head_mass_kg = 0.175", "head_mass_kg = nan"), "known.head_mass_kg", "finite"),
-    "unknown experiment": (
-        replace("static_loading", "tensile", 99),
-        "trial 1, experiment",
-        "'tensile' is unknown",
-    ),
+    "unknown experiment": (replace("static_loading", "tensile", 99), "trial 1, experiment", "'tensile' is unknown"),
     "unknown key": (replace("repeat = 2", "repeat = 2\nspeed = 1"), "trial 2, speed", "unknown key"),
     "clock out of the question": (
         replace("repeat = 2", "repeat = 2\nextra = { clock_rate = 2.0 }"),
@@ -225,11 +210,7 @@ MALFORMED_TOML = {
     "repeat zero": (replace("repeat = 1", "repeat = 0"), "trial 1, repeat", "0 is outside"),
     "repeat a fraction": (replace("repeat = 1", "repeat = 1.0"), "trial 1, repeat", "whole number"),
     "repeat twice": (replace("repeat = 2", "repeat = 1"), "trial 2, repeat", "listed before, in trial 1"),
-    "file twice": (
-        replace("static_loading_2.csv", "static_loading_1.csv"),
-        "trial 2, file",
-        "listed before",
-    ),
+    "file twice": (replace("static_loading_2.csv", "static_loading_1.csv"), "trial 2, file", "listed before"),
     "file missing": (replace("locomotion_2.csv", "locomotion_9.csv"), "trial 8, file", "does not exist"),
     "file not CSV": (replace("locomotion_2.csv", "dataset.toml"), "trial 8, file", "not a .csv"),
     "file above": (replace("locomotion_2.csv", "../bench/locomotion_2.csv"), "trial 8, file", "outside"),
@@ -262,16 +243,13 @@ def test_malformed_table_is_refused_with_its_place(folder, kind):
         assert "line 1" in str(error)
 
 
-@pytest.mark.parametrize("key", ["known", "provenance"])
-def test_a_list_in_place_of_a_table(tmp_path, key):
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [("known", "a table, not a list"), ("provenance", "a table, not a list"), ("trial", "at least one")],
+)
+def test_a_list_in_place_of_a_table_and_no_trials(tmp_path, key, said):
     (tmp_path / "dataset.toml").write_text(f'format = 1\nname = "x"\n{key} = []\n')
-    with pytest.raises(DatasetError, match=f"line 3, {key}: must be a table, not a list"):
-        read_dataset(tmp_path)
-
-
-def test_no_trials(tmp_path):
-    (tmp_path / "dataset.toml").write_text('format = 1\nname = "x"\ntrial = []\n')
-    with pytest.raises(DatasetError, match="at least one"):
+    with pytest.raises(DatasetError, match=f"line 3, {key}: must be .*{said}"):
         read_dataset(tmp_path)
 
 
