@@ -1,6 +1,6 @@
 """What the columns of a trial may be called, and what their values may be."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -31,33 +31,23 @@ def check_values(columns: Mapping[str, np.ndarray], sheet: Sheet, rows: np.ndarr
     """Raise DatasetError for what cannot have been measured. Columns have the shape of `rows`, those of the sheet that
     they are from; `named`: what the file calls a column, where that is another name."""
 
-    def refuse(name: str, wrong: np.ndarray, problem: Callable[[float, float], str]) -> None:
-        """`problem` of the first value that is wrong, and of the one before."""
+    def refuse(name: str, wrong: np.ndarray, problem: str) -> None:
+        """`problem` is filled in with the first `value` that is wrong, the one `before`, and the `step` between."""
         if wrong.any():
             row = int(np.argmax(wrong))
             value, before = (float(columns[name][at]) for at in (row, row - 1))
-            raise sheet.error(problem(value, before), int(rows[row]), named.get(name, name))
+            said = problem.format(value=value, before=before, step=value - before)
+            raise sheet.error(said, int(rows[row]), named.get(name, name))
 
     if len(rows) < 2:
         raise sheet.error(f"{len(rows)} rows of data; at least two are needed", len(sheet) - 1)
     for name, values in columns.items():
-        refuse(name, np.isnan(values), lambda value, _: "the value is missing")
-        refuse(
-            name,
-            np.abs(values) > LARGEST,
-            lambda value, _: f"{value:g} is beyond any measurement (largest: {LARGEST:g})",
-        )
+        refuse(name, np.isnan(values), "the value is missing")
+        refuse(name, np.abs(values) > LARGEST, f"{{value:g}} is beyond any measurement (largest: {LARGEST:g})")
         if is_command(name):
-            refuse(
-                name,
-                (values != 0) & (values != 1),
-                lambda value, _: f"command {value:g} is neither 1 (positive) nor 0 (vacuum)",
-            )
+            refuse(name, (values != 0) & (values != 1), "command {value:g} is neither 1 (positive) nor 0 (vacuum)")
     step_s = np.diff(columns["time_s"], prepend=-np.inf)
-    refuse("time_s", step_s < 0, lambda value, before: f"time goes backwards: {value} after {before}")
-    refuse("time_s", step_s == 0, lambda value, before: f"time stands still: {value} after {before}")
-    refuse(
-        "time_s",
-        step_s < SHORTEST_STEP_S,
-        lambda value, before: f"time advances by {value - before:g} s, less than the minimum of {SHORTEST_STEP_S:g} s",
-    )
+    refuse("time_s", step_s < 0, "time goes backwards: {value} after {before}")
+    refuse("time_s", step_s == 0, "time stands still: {value} after {before}")
+    too_short = f"time advances by {{step:g}} s, less than the minimum of {SHORTEST_STEP_S:g} s"
+    refuse("time_s", step_s < SHORTEST_STEP_S, too_short)
