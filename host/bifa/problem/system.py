@@ -270,9 +270,7 @@ class RobotSystem(System):
 
 def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:
     """Names of the model's parameters that these trials see and the lab does not know."""
-    seen: set[str] = set()
-    for trial in dataset.trials:
-        seen |= _SEEN_BY[trial.experiment, trial.actuator]
+    seen = {name for trial in dataset.trials for name in _SEEN_BY[trial.experiment, trial.actuator]}
     return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known)
 
 
