@@ -75,11 +75,6 @@ def test_an_experiment_records_a_walk_with_the_camera(lab, tmp_path):
     assert trial.extra["clock_error_s"] < 1e-3
 
 
-def is_same_record(trial, raw):
-    """The instrument's own file of the trial is kept as it came."""
-    return [path for path in raw.iterdir() if path.name.startswith(Path(trial.file).stem)]
-
-
 @pytest.mark.parametrize("lab", ["programs"], indirect=True)
 def test_an_experiment_takes_the_exports_of_testing_machines_by_preset(lab, tmp_path):
     """Two of them: the declaration is put right while the second record waits."""
@@ -88,8 +83,8 @@ def test_an_experiment_takes_the_exports_of_testing_machines_by_preset(lab, tmp_
     output, _ = begin(lab, tmp_path, "experiment", *options, "static_loading").communicate(timeout=120)
     assert output.count("Nothing looks wrong") == 2, output
     trials = read_dataset(tmp_path / "static").trials
-    kept = [is_same_record(trial, tmp_path / "static" / "raw") for trial in trials]
-    assert [len(files) for files in kept] == [2, 2]
+    kept = [list((tmp_path / "static" / "raw").glob(f"{Path(trial.file).stem}*")) for trial in trials]
+    assert [len(files) for files in kept] == [2, 2], "the instrument's own files of each trial, as they came"
     assert all(trial.columns["displacement_mm"].max() > 25.0 for trial in trials)
     assert all(trial.extra["clock_error_s"] < 1e-3 for trial in trials)
 

@@ -73,20 +73,21 @@ def test_a_bench_file_that_is_wrong_is_refused_by_name(tmp_path, text, message):
     assert str(path) in str(caught.value)
 
 
-def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
-    def stages(port, mass):
-        return campaign(Setup(port, known={"head_mass_kg": mass}), Effort(), lambda what, share: None)[:2]
+def stages_of(port, known=None, quick=False):
+    return campaign(Setup(port, known=known or {}), Effort(quick), lambda what, share: None)
 
-    measure, declare = stages("/dev/ttyACM0", 0.18)
+
+def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
+    measure, declare, *_ = stages_of("/dev/ttyACM0", {"head_mass_kg": 0.18})
     run_stages(tmp_path, [recording(measure, {}), declare])
-    run_stages(tmp_path, stages("/dev/ttyACM7", 0.19))  # no such port: nothing is opened
+    run_stages(tmp_path, stages_of("/dev/ttyACM7", {"head_mass_kg": 0.19})[:2])  # no such port: nothing is opened
     assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.19}
 
 
 def test_by_hand_only_measuring_stages_are_measured_by_hand():
-    stages = campaign(Setup("/dev/ttyACM0"), Effort(), lambda what, share: None)
-    assert [stage.name for stage in stages if stage.by_hand] == ["measure", "walk-base", "walk-completed", "again"]
-    assert not any(stage.by_hand for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None))
+    kept = [stage.name for stage in stages_of("/dev/ttyACM0") if stage.by_hand]
+    assert kept == ["measure", "walk-base", "walk-completed", "again"]
+    assert not any(stage.by_hand for stage in stages_of("virtual"))
 
 
 @pytest.fixture
@@ -107,31 +108,26 @@ def recording(stage, known):
 
 
 def test_what_an_own_driver_measured_is_not_measured_again_unasked(own_driver, tmp_path, monkeypatch):
-    def stages(given, quick=False):
-        return campaign(Setup(own_driver, known=given), Effort(quick), lambda what, share: None)[:2]
-
-    measure, declare = stages({"head_mass_kg": 0.18})
+    measure, declare, *_ = stages_of(own_driver, {"head_mass_kg": 0.18})
     run_stages(tmp_path, [recording(measure, {"head_mass_kg": 0.2, "tail_mass_kg": 0.1}), declare])
     assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.18, "tail_mass_kg": 0.1}
     monkeypatch.setattr("bifa.__version__", "9.9")
-    run_stages(tmp_path, stages({"head_mass_kg": 0.19}))  # would open the rig, which is not there
+    run_stages(tmp_path, stages_of(own_driver, {"head_mass_kg": 0.19})[:2])  # would open the rig, which is not there
     assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.19, "tail_mass_kg": 0.1}
     with pytest.raises(StageError, match=r"quick = False, not True.*--rerun measure"):
-        run_stages(tmp_path, stages({}, quick=True))
+        run_stages(tmp_path, stages_of(own_driver, quick=True)[:2])
     run_stages(tmp_path, [recording(measure, {})], rerun=["measure"])
     assert read_dataset(tmp_path / "measured.earlier-1").known
 
 
 def test_every_stage_that_measures_with_an_own_driver_keeps_what_it_measured(own_driver):
-    stages = campaign(Setup(own_driver), Effort(), lambda what, share: None)
-    kept = [stage.name for stage in stages if stage.by_hand]
+    kept = [stage.name for stage in stages_of(own_driver) if stage.by_hand]
     assert kept == ["measure", "walk-base", "diagnose", "walk-completed", "again"]
 
 
 def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path):
     (tmp_path / ".measure-unfinished" / "measured").mkdir(parents=True)
-    measure, *_ = campaign(Setup("/dev/nowhere"), Effort(), lambda what, share: None)
-    run_stages(tmp_path, [measure])  # no such port: nothing is opened
+    run_stages(tmp_path, stages_of("/dev/nowhere")[:1])  # no such port: nothing is opened
     assert (tmp_path / "measured").is_dir()
 
 
@@ -143,7 +139,7 @@ def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
         raise SearchError("none walks")
 
     monkeypatch.setattr(loop, "found_gait", nothing_walks)
-    stages = {stage.name: stage for stage in campaign(Setup("virtual"), Effort(), lambda what, share: None)}
+    stages = {stage.name: stage for stage in stages_of("virtual")}
     save_model(tmp_path / f"model-{model}.toml", nominal())
     save_gait(tmp_path / "gait-base.toml", BASELINE)
     stages[f"optimise-{model}"].run(tmp_path, tmp_path)
