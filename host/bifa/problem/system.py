@@ -154,7 +154,8 @@ class RobotSystem(System):
         self, theta: Theta, learnt: Sequence[Correction], effects: tuple[str, ...], trial: Record
     ) -> RobotInTrial[Inputs] | None:
         """A robot in a trial; None where there is no such robot: its curve is no longer bistable."""
-        place = (trial.session_order or 0) / max(self._last_in_session, 1)  # 0 for the day's first, 1 for its last
+        # 0 for the day's first trial, or where the order was not noted; 1 for its last
+        place = (trial.session_order or 0) / max(self._last_in_session, 1)
         try:
             plant, zeros = self._plant(self._key(theta, effects))
             plant = sites.corrected(plant, learnt, place)
@@ -234,15 +235,16 @@ class RobotSystem(System):
         return replace(self.model.with_values(values).with_effects(chosen), **curves)
 
     def _named(self, name: str) -> Parameter:
-        entry = self.model.parameters[name]
-        low, high = entry.plausible
+        p = self.model.parameters[name]
+        low, high = p.plausible
         prior_sd = PRIOR_SD.get(name)
         # friction shows in fewer samples: wider steps for its derivatives
         scale = prior_sd or (high - low) * (1.0 if name in _PIPE else 0.1)
         # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
         at_least, elsewhere = "mu_k" if name == "mu_s" else None, _PLACES.get(name, ())
-        values = entry.value, entry.lower, entry.upper, (low, high)
-        return Parameter(name, entry.unit, *values, scale, entry.source, prior_sd, at_least, elsewhere)
+        return Parameter(
+            name, p.unit, p.value, p.lower, p.upper, p.plausible, scale, p.source, prior_sd, at_least, elsewhere
+        )
 
     def _key(self, theta: Theta, effects: tuple[str, ...]) -> tuple[Any, ...]:
         """All that a plant depends on, hashable."""
@@ -311,14 +313,15 @@ def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:
     return itemgetter(*names)
 
 
-def _engine_trial(recorded: Trial, measured: bool = True) -> Record:
-    inputs = inputs_of(recorded)
+def _engine_trial(trial: Trial, measured: bool = True) -> Record:
+    inputs = inputs_of(trial)
     channels = {
-        name: np.asarray(recorded.columns[name], float) if measured else np.full(len(recorded.time_s), np.nan)
+        name: np.asarray(trial.columns[name], float) if measured else np.full(len(trial.time_s), np.nan)
         for name in inputs.channels
     }
-    settings = recorded.experiment, recorded.condition
-    return Record(recorded.file, *settings, recorded.time_s, channels, recorded.session_order, payload=inputs)
+    return Record(
+        trial.file, trial.experiment, trial.condition, trial.time_s, channels, trial.session_order, payload=inputs
+    )
 
 
 def _altered(plant: Plant, trial: Record, theta: Theta, positive_psi: float | None) -> Plant:

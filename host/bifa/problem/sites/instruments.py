@@ -29,6 +29,7 @@ def _camera_memory(channels: Channels, curve: LearntCurve, inputs: Inputs, plant
 
 
 def _loading(actuator: str, channels: Channels, curve: LearntCurve, inputs: Inputs, plant: Plant) -> Channels:
+    """The force of a static loading of `actuator` with what a curve adds by direction, extending first."""
     if not isinstance(inputs, StaticInputs) or inputs.actuator != actuator:
         return {}
     extending, contracting = (curve.at(inputs.displacement_m, row) for row in (0, 1))
