@@ -20,15 +20,12 @@ ROUNDS = 3
 SPECIMEN = ("sealed", "profile", "effects", "parameters")  # of a virtual rig: what makes it the same robot again
 _WALK_CYCLES = 4
 
-OpenRig = Callable[[int], AbstractContextManager[Rig]]
-Diagnose = Callable[[Dataset, Collection[str]], Diagnosis]
-
 
 def resolve(
     dataset: Dataset,
     found: Diagnosis,
-    diagnose: Diagnose,
-    open_rig: OpenRig,
+    diagnose: Callable[[Dataset, Collection[str]], Diagnosis],
+    open_rig: Callable[[int], AbstractContextManager[Rig]],
     folder: Path,
     on_progress: OnProgress = lambda what, share: None,
     record: Recorder | None = None,

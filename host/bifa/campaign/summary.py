@@ -12,7 +12,7 @@ import numpy as np
 
 import bifa
 from bifa.campaign.again import read_rounds
-from bifa.campaign.page import campaign_page, most_missed, motion_of
+from bifa.campaign.page import GAIT_NAMES, campaign_page, most_missed, motion_of
 from bifa.campaign.stages import Stage
 from bifa.campaign.walks import predict, prediction_of, speed_of, walks_of
 from bifa.data import Dataset, Trial, read_dataset
@@ -29,11 +29,7 @@ from bifa.robot import Model, load_model
 from bifa.robot.gait import BASELINE, Gait, load_gait
 from bifa.simulate import gait_rows
 
-TITLES = {
-    "baseline": "baseline gait",
-    "base": "gait found with the base model",
-    "completed": "gait found with the completed model",
-}
+TITLES = {"baseline": "baseline gait"} | {which: f"gait {GAIT_NAMES[which]}" for which in ("base", "completed")}
 _ROBOTS = 256
 PAPER_MM_S = {"baseline": 10.8, "base": 23.3, "completed": 23.3, "edge": 23.3}
 

@@ -17,6 +17,7 @@ SEPARATING = NextExperiment(
     {"actuator": "small", "pressure_psi": 0.0, "rate_mm_s": 30.0},
     gain=12.0,
 )
+DAY = Dataset(None, "day", {}, ())
 
 
 def test_settings_become_trials_with_their_repeats():
@@ -48,9 +49,8 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
         seen.append((dataset, suspected))
         return SimpleNamespace(next=NextExperiment(), effects=())
 
-    day = Dataset(None, "day", {}, (), {})
     found = SimpleNamespace(next=SEPARATING, effects=(SimpleNamespace(name="leak"),))
-    dataset, found, ran = resolve(day, found, diagnose, lambda n: open_rig("virtual", seed=n), tmp_path)
+    dataset, found, ran = resolve(DAY, found, diagnose, lambda n: open_rig("virtual", seed=n), tmp_path)
     assert ran == (SEPARATING,)
     assert found.next.experiment is None
     assert seen == [(dataset, {"leak", "hysteresis", "viscoelasticity"})], "what was named is tried again"
@@ -60,8 +60,7 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
 
 @pytest.mark.uno
 def test_it_gives_up_where_experiments_do_not_help(tmp_path):
-    day = Dataset(None, "day", {}, (), {})
     confused = SimpleNamespace(next=SEPARATING, effects=())
-    _, found, ran = resolve(day, confused, lambda *_: confused, lambda n: open_rig("virtual", seed=n), tmp_path)
+    _, found, ran = resolve(DAY, confused, lambda *_: confused, lambda n: open_rig("virtual", seed=n), tmp_path)
     assert found is confused
     assert len(ran) == ROUNDS
