@@ -36,7 +36,6 @@ from .table import check_header, check_values
 
 _CHAMBERS = tuple(c.removeprefix("command_") for c in EXPERIMENTS["locomotion"].columns if is_command(c))
 _CLOCK_S = 0.1  # by which a time may be outside its trial: of the order of a command's age
-_COMMON_OPTIONAL = ("session_order", "extra")
 
 
 def read_dataset(path: str | os.PathLike[str]) -> Dataset:
@@ -135,7 +134,7 @@ def _trial_head(fields: Fields) -> dict[str, Any]:
     notes = fields.inner("extra", noted)
     for key in NOTED.keys() & noted.keys():
         notes.number(key, *NOTED[key])
-    fields.finish(also=layout.optional + _COMMON_OPTIONAL)
+    fields.finish(also=(*layout.optional, "session_order", "extra"))
     return {**head, "extra": {**noted, **extra}}
 
 
