@@ -80,7 +80,7 @@ lint: $(python) $(stamps)/lint
 	check "ruff format in tools/ and schema/" $(bin)/ruff format --quiet --check $(ruff_elsewhere)
 	check "types" sh -c 'cd host && ../$(bin)/mypy --no-error-summary'
 	check "names" $(bin)/python tools/names.py
-	check "tests use no private names" $(bin)/python tools/private.py
+	check "tests and benchmarks use no private names" $(bin)/python tools/private.py
 	check "import rules" sh -c 'cd host && ../$(bin)/lint-imports --no-cache >../build/imports.txt 2>&1 || { cat ../build/imports.txt; exit 1; }'
 	check "clang-format" clang-format --dry-run -Werror $(cpp_files)
 	check "lib/ knows no Arduino" tools/check-includes.sh

@@ -1,4 +1,5 @@
-"""Tests come in by the public door: python tools/private.py. They use no name that begins with an underscore."""
+"""Tests and benchmarks come in by the public door: python tools/private.py. They use no name that begins with an
+underscore: that one is gone would be seen by nobody before they run."""
 
 import ast
 import re
@@ -7,16 +8,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-TESTS = ROOT / "host" / "tests"
+GUESTS = [ROOT / "host" / name for name in ("benchmarks", "harness", "tests")]
 PATCHED = re.compile(r"(?:bifa|lacuna|harness|benchmarks|virtual_robot)\..*\._[a-z]\w*|_[a-z]\w*")
 OF_TUPLES = {"_replace", "_asdict", "_fields"}  # public, whatever they are called
 
 
 def main() -> int:
-    """Say where a test uses a name that its owner keeps to itself."""
+    """Say where one of them uses a name that its owner keeps to itself."""
     found = [
-        f"{path.relative_to(ROOT)}:{line}: {name} is private: test it through what is public, or make it public"
-        for path in sorted(TESTS.rglob("*.py"))
+        f"{path.relative_to(ROOT)}:{line}: {name} is private: reach it through what is public, or make it public"
+        for folder in GUESTS
+        for path in sorted(folder.rglob("*.py"))
         for line, name in private_names(ast.parse(path.read_text("utf-8")))
     ]
     print("\n".join(found), end="\n" if found else "")

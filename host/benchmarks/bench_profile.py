@@ -106,7 +106,7 @@ def _kernel_share(folder: Path) -> float:
 
     system = prepare(read_dataset(folder))
     inside = 0.0
-    call: Callable = Kernel._call
+    call: Callable = Kernel.call
 
     def timed(*job) -> None:
         nonlocal inside
@@ -115,13 +115,13 @@ def _kernel_share(folder: Path) -> float:
         inside += time.process_time() - began
 
     use_threads(1)
-    Kernel._call = staticmethod(timed)
+    Kernel.call = staticmethod(timed)
     try:
         began = time.process_time()
         fit_base(system, system.trials)
         return inside / (time.process_time() - began)
     finally:
-        Kernel._call = staticmethod(call)
+        Kernel.call = staticmethod(call)
         use_threads(None)
 
 

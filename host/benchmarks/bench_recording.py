@@ -42,7 +42,7 @@ def _worst_edge_s() -> float:
     """Greatest error of an edge on the Uno's clock, judged by the bench's time, which no recording knows."""
     with open_rig("virtual", profile="realistic") as rig, Uno(rig.transport, rig.clock) as uno:
         rig.instruments.start()
-        clock = rig.instruments._clock
+        clock = rig.instruments.clock
         rig.clock.sleep(0.05)
         first_s = _true_s(clock, rig.instruments.stop()["sync_time_s"])[0]
         uno.connect()
@@ -50,7 +50,7 @@ def _worst_edge_s() -> float:
         for _ in range(STARTS):
             rig.clock.sleep(0.001)
             with Recording(rig, uno) as tape:
-                clock = rig.instruments._clock
+                clock = rig.instruments.clock
                 tape.wait(0.5)
             edges_s = tape.record["sync_time_s"]
             truth_s = PERIOD_S + (_true_s(clock, edges_s) - first_s) * rig.world.clock_hz / 16e6

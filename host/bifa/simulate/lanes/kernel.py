@@ -89,7 +89,7 @@ class Kernel:
         jobs["switches"] = [one[0].size for one in what.switches]
         jobs["sample_s"], jobs["samples"] = _addresses(what.sample_s), [times.size for times in what.sample_s]
         rows = _rows_for(jobs, COLUMNS[what.kind])
-        self._call(self._march, setting, jobs)
+        self.call(self._march, setting, jobs)
         del kept
         return rows
 
@@ -100,12 +100,13 @@ class Kernel:
         jobs, setting, kept = _jobs(plants, rigs)
         jobs["path"], jobs["sample_s"], jobs["samples"] = _addresses(paths_m), _address(sample_s), sample_s.size
         rows = _rows_for(jobs, 2)
-        self._call(self._load, setting, jobs)
+        self.call(self._load, setting, jobs)
         del kept
         return rows
 
     @staticmethod
-    def _call(function: Callable[..., int], setting: _Setting, jobs: np.ndarray) -> None:
+    def call(function: Callable[..., int], setting: _Setting, jobs: np.ndarray) -> None:
+        """Where the time goes that is not Python's. MemoryError where there is none left."""
         if function(ctypes.addressof(setting), _address(jobs), len(jobs)):
             raise MemoryError("out of memory for a simulation")
 
