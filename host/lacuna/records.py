@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.decimals import number
-from lacuna.errors import LacunaError
+from lacuna.errors import LacunaError, listed
 from lacuna.system import Record
 
 _TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # of a second
@@ -45,7 +45,9 @@ class Table:
         """`outputs` become channels, all other columns inputs. Raises RecordError where one is missing."""
         for output in outputs:
             if output not in self.columns:
-                raise RecordError(f"record {self.name} has no column {output}; it has {_listed(self.columns)}.")
+                raise RecordError(
+                    f"record {self.name} has no column {output}; it has {listed(self.columns, _MOST_NAMED)}."
+                )
         return Record(
             name=self.name,
             experiment=str(self.labels.get("experiment", "run")),
@@ -82,7 +84,7 @@ def read(data: Any) -> list[Record | Table]:
     if isinstance(data, Mapping):
         if data and all(isinstance(column, np.ndarray) for column in data.values()):
             raise RecordError(
-                f"a record of {_listed(data)} has no times: give a column time_s, in seconds (of static"
+                f"a record of {listed(data, _MOST_NAMED)} has no times: give a column time_s, in seconds (of static"
                 " data the number of the row)."
             )
         return [_table(one, str(name)) for name, one in data.items()]
@@ -136,7 +138,9 @@ def _of_columns(data: Any, name: str) -> Table:
     if clock:
         time_s = columns.pop(clock)
     if time_s is None:
-        raise RecordError(f"record {name} has no times: give a column time_s, in seconds. It has {_listed(columns)}.")
+        raise RecordError(
+            f"record {name} has no times: give a column time_s, in seconds. It has {listed(columns, _MOST_NAMED)}."
+        )
     name = str(labels.get("name", name))
     inputs = {n: _own(c, name, n) for n, c in columns.items()}
     return Table(name, _seconds(time_s, name) / _TIMES.get(clock, 1), inputs, labels, clock)
@@ -233,13 +237,6 @@ def _single(column: Any, record: str, label: str) -> Any:
     return cells[0]
 
 
-def _listed(names: Iterable[Any]) -> str:
-    """The first names, and how many more there are."""
-    names = [str(name) for name in names]
-    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    return ", ".join(names[:_MOST_NAMED]) + more
-
-
 def _plain(label: Any) -> Hashable:
     return label.item() if isinstance(label, np.generic) else label
 
@@ -289,9 +286,9 @@ def _refuse_settings(tables: Mapping[str, Table]) -> None:
         if len(found) > 1 and found not in (list(range(len(found))), list(range(1, len(found) + 1))):
             raise RecordError(
                 f"{condition}: files whose names differ only by a number at the end are taken for repeats, and these"
-                f" are numbered {_listed(found)}, not 1 to {len(found)}. If the number is a setting, give each file a"
-                " column `condition` of its own, and the setting a column; if they are repeats, give all the same"
-                " `condition`, or number them without a gap."
+                f" are numbered {listed(found, _MOST_NAMED)}, not 1 to {len(found)}. If the number is a setting, give"
+                " each file a column `condition` of its own, and the setting a column; if they are repeats, give all"
+                " the same `condition`, or number them without a gap."
             )
 
 

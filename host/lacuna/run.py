@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from lacuna.check.grains import grains_of
-from lacuna.check.numbers import listed, within
+from lacuna.check.numbers import within
 from lacuna.cores import usable_cores
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
-from lacuna.errors import LacunaError, MisuseError
+from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.estimation.problem import use_threads
 from lacuna.function_system import FunctionSystem
 from lacuna.misfit import compared_at_misfit

@@ -131,7 +131,7 @@ class Model:
         base = {name: parameter.value for name, parameter in self.parameters.items()}
         return base | {f"{e}.{p}": value for e, values in self.effects.items() for p, value in values.items()}
 
-    def with_values(self, values: Mapping[str, float], covariance: Covariance | None = None) -> Model:
+    def with_values(self, values: Mapping[str, float]) -> Model:
         """A copy with some values changed; naming an effect's parameter makes the effect active."""
         parameters = dict(self.parameters)
         effects = {name: dict(v) for name, v in self.effects.items()}
@@ -143,7 +143,7 @@ class Model:
                 effects.setdefault(effect, {})[parameter] = value
             else:
                 raise ModelParameterError(f"{name!r} is not a parameter; known are {', '.join(BASE_PARAMETERS)}")
-        return replace(self, parameters=parameters, effects=effects, covariance=covariance or self.covariance)
+        return replace(self, parameters=parameters, effects=effects)
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> Model:
         """A copy with exactly these effects active; parameters left out take their typical values."""

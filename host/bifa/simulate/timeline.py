@@ -89,7 +89,7 @@ def of_phases(
     """Switching of eq. (9) integrated from three initial phases, at the robot's 1 kHz."""
     time = np.arange(0.0, duration_s + 0.5 * _RESOLUTION_S, _RESOLUTION_S)
     phases = cpg.phases(gait, time, initial_rad, coupling_per_s)
-    return of_samples(time, (np.mod(phases, _TWO_PI) > _TWO_PI * cpg.duties(gait)).astype(float).T)
+    return of_samples(time, cpg.outputs(phases, gait).T)
 
 
 def of_samples(time_s: np.ndarray, columns: np.ndarray) -> Timeline:

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from lacuna.check.numbers import SAME, differ, listed, spread
-from lacuna.errors import LacunaError, MisuseError
+from lacuna.check.numbers import SAME, differ, spread
+from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.system import Channels, Record, System, Theta
 
 _NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent

@@ -1,8 +1,8 @@
-"""Comparing columns, and naming many things in a few words."""
+"""Comparing columns, and saying where."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -30,9 +30,3 @@ def first(true: np.ndarray) -> int:
 def within(experiment: str, experiments: Iterable[str]) -> str:
     """Where something is, unless there is only one place."""
     return f" in {experiment}" if len(set(experiments)) > 1 else ""
-
-
-def listed(names: Sequence[str], most: int = 4) -> str:
-    """The first few, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from lacuna.check.model import initial, predicted
-from lacuna.check.numbers import SAME, differ, listed, spread
-from lacuna.errors import MisuseError
+from lacuna.check.numbers import SAME, differ, spread
+from lacuna.errors import MisuseError, listed
 from lacuna.system import Channels, Record, System, groups_of_repeats
 
 _OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lacuna.check.numbers import listed
 from lacuna.diagnosis.decide import Choice
 from lacuna.diagnosis.nuisances import Followed
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import Error, Floor
 from lacuna.diagnosis.split import Split
+from lacuna.errors import listed
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from lacuna.check.numbers import listed
 from lacuna.diagnosis.nuisances import NuisanceOfRun, runs_of
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.residual_error import failed
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
+from lacuna.errors import listed
 from lacuna.estimation.fit import Fit, evaluate_on
 from lacuna.estimation.structure import is_learnt
 from lacuna.estimation.uncertainty import Estimate, uncertainty

@@ -30,7 +30,7 @@ def test_the_stated_spread_is_two_percent_of_every_parameter():
 def test_the_covariance_of_a_fit_is_used_where_there_is_one():
     names = ("mu_k", "body_area_N_psi")
     matrix = np.array([[1e-4, 0.8e-2 * 0.05], [0.8e-2 * 0.05, 0.0025]])
-    model = nominal().with_values({}, Covariance(names, matrix))
+    model = replace(nominal(), covariance=Covariance(names, matrix))
     plants = spread_of(model).naive.plants(model, 1024, seed=3)
     drawn = np.cov(values(plants, "mu_k"), values(plants, "body_area_N_psi"))
     np.testing.assert_allclose(drawn, matrix, rtol=0.08)
@@ -53,7 +53,7 @@ def test_a_spread_out_of_range_is_refused(share):
 
 
 def test_a_covariance_that_is_none_is_refused():
-    model = nominal().with_values({}, Covariance(("mu_k", "mu_s"), np.array([[1.0, 2.0], [2.0, 1.0]])))
+    model = replace(nominal(), covariance=Covariance(("mu_k", "mu_s"), np.array([[1.0, 2.0], [2.0, 1.0]])))
     with pytest.raises(UncertaintyError, match="not positive semidefinite"):
         spread_of(model)
 
@@ -68,7 +68,7 @@ def test_the_springs_curves_are_drawn_with_the_parameters():
     names = ("body_area_N_psi", "body_stiffness.0")  # whose value at z = 0 is K's, halfway along the range
     sd = np.array([0.05, 0.4])
     matrix = np.outer(sd, sd) * np.array([[1.0, 0.9], [0.9, 1.0]])
-    model = nominal().with_values({}, Covariance(names, matrix))
+    model = replace(nominal(), covariance=Covariance(names, matrix))
     plants = spread_of(model).naive.plants(model, 1024, seed=3)
     drawn = np.cov(values(plants, "body_area_N_psi"), forces(plants))
     np.testing.assert_allclose(drawn, matrix, rtol=0.08)
@@ -77,7 +77,7 @@ def test_the_springs_curves_are_drawn_with_the_parameters():
 
 
 def test_a_drawn_robot_is_the_one_that_its_curves_make():
-    model = nominal().with_values({}, Covariance(("body_stiffness.2", "mu_k"), np.diag([0.25, 1e-8])))
+    model = replace(nominal(), covariance=Covariance(("body_stiffness.2", "mu_k"), np.diag([0.25, 1e-8])))
     (drawn,) = spread_of(model).naive.plants(model, 1, seed=0)
     coefficients = np.array(model.body_stiffness.coefficients)
     off = forces([drawn], 0.75)[0] - forces([plant(model)], 0.75)[0]
@@ -89,7 +89,7 @@ def test_a_drawn_robot_is_the_one_that_its_curves_make():
 
 
 def test_a_spring_that_is_not_bistable_is_no_robots():
-    model = nominal().with_values({}, Covariance(("body_stiffness.0",), np.array([[1e4]])))
+    model = replace(nominal(), covariance=Covariance(("body_stiffness.0",), np.array([[1e4]])))
     own = plant(model).body_curve
     plants = spread_of(model).plants(model, 64, seed=1)
     kept = [np.allclose(one.body_curve, own) for one in plants]
@@ -110,4 +110,4 @@ def test_learnt_curves_are_drawn_as_the_splines_that_they_were_fitted_as():
 @pytest.mark.parametrize("name", ["body_stiffness.16", "body_stiffness.a", "learnt.filling.0.8", "neck_stiffness.0"])
 def test_a_covariance_of_values_that_a_model_does_not_have_is_refused(name):
     with pytest.raises(ModelParameterError, match=f"has no parameter '{name}'"):
-        nominal().with_values({}, Covariance((name,), np.eye(1)))
+        replace(nominal(), covariance=Covariance((name,), np.eye(1)))

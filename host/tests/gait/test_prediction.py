@@ -14,7 +14,7 @@ from bifa.simulate import layout, of_gait, vented_between, walk
 
 
 def known(scatter=None, sd=1e-6, **changes):
-    model = nominal().with_values(changes, Covariance(("mu_k",), np.array([[sd**2]])))
+    model = replace(nominal().with_values(changes), covariance=Covariance(("mu_k",), np.array([[sd**2]])))
     return replace(model, scatter=scatter)
 
 

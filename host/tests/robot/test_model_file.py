@@ -29,8 +29,8 @@ CHANGED = {
 
 def test_round_trip_keeps_every_number(tmp_path):
     model = nominal()
-    changed = model.with_values(
-        {"mu_k": 0.35, "body_area_N_psi": 8.7},
+    changed = replace(
+        model.with_values({"mu_k": 0.35, "body_area_N_psi": 8.7}),
         covariance=Covariance(("mu_k", "body_area_N_psi"), np.array([[1e-4, 2e-5], [2e-5, 1e-2]])),
     )
     save_model(tmp_path / "m.toml", changed)
