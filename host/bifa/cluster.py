@@ -44,7 +44,7 @@ class Tls:
         if not given:
             return None
         if missing := [name for name in files if name not in given]:
-            raise ClusterError(f"TLS needs {', '.join(files)} together: {', '.join(missing)} is missing")
+            raise ClusterError(f"TLS needs {', '.join(files)} together; missing: {', '.join(missing)}")
         for name, file in given.items():
             if not file.is_file():
                 raise ClusterError(f"{name} {file}: no such file")

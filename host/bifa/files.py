@@ -5,6 +5,7 @@ import os
 import secrets
 import shutil
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,7 +46,7 @@ def check_targets(
             raise TargetError(f"{path} is an input of this command; choose another file for its output")
         if path.exists() and (parent / "dataset.toml").exists():
             raise TargetError(f"{path} belongs to a data set, which is never overwritten; choose another place")
-        _check_writable(path if path.exists() else parent, path)
+        _check_writable(parent, path)
     for path in made:
         there = path.resolve()
         while not there.exists():
@@ -65,9 +66,14 @@ def _refuse_same(files: list[Path], folders: list[Path]) -> None:
             raise TargetError(f"{path} is used for both a file and a folder; choose different paths")
 
 
-def _check_writable(there: Path, asked: Path) -> None:
-    if not os.access(there, os.W_OK):
-        raise TargetError(f"{asked} cannot be written (no permission); choose another place")
+def _check_writable(folder: Path, asked: Path) -> None:
+    """By writing: permissions say nothing of a full disk, or of a mount that refuses."""
+    try:
+        if asked.exists() and not os.access(asked, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise TargetError(f"{asked} cannot be written ({error.strerror}); choose another place") from None
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:

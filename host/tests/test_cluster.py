@@ -62,7 +62,7 @@ def test_certificates_do_not_travel_in_the_clear(ours):
 
 
 def test_what_is_missing_is_said(ours, tmp_path):
-    with pytest.raises(ClusterError, match="--dask-key is missing"):
+    with pytest.raises(ClusterError, match="missing: --dask-key"):
         Tls(ours.ca, ours.cert).security()
     with pytest.raises(ClusterError, match=r"--dask-cert .*: no such file"):
         Tls(ours.ca, tmp_path / "none.pem", ours.key).security()

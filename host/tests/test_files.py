@@ -84,3 +84,11 @@ def test_what_a_command_reads_and_what_was_measured_are_never_its_target(tmp_pat
     with pytest.raises(TargetError, match="belongs to a data set"):
         check_targets(data / "walk_1.csv")
     check_targets(data / "model.toml", inputs=(model,))
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder here that refuses files even to root")
+def test_a_folder_that_refuses_files_is_known_before_the_work():
+    with pytest.raises(TargetError, match=r"x\.toml cannot be written .*; choose another place"):
+        check_targets(Path("/proc/x.toml"))
+    with pytest.raises(TargetError, match=r"/proc/x cannot be written"):
+        check_targets(folders=(Path("/proc/x"),))

@@ -176,7 +176,8 @@ def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
         absent = sorted(set(range(1, max(*numbers, REPEATS_WANTED) + 1)) - set(numbers))
         if absent:
             why = "no noise floor can be estimated from it" if len(group) == 1 else "the noise floor is less certain"
-            text = f"repeat {', '.join(map(str, absent))} is missing; {why}"
+            which = f"repeat {absent[0]} is" if len(absent) == 1 else f"repeats {', '.join(map(str, absent))} are"
+            text = f"{which} missing; {why}"
             yield Finding("missing repeats", text, condition=group[0].label)
 
 

@@ -90,7 +90,7 @@ def read_gait_file(path: str | Path) -> GaitFile:
     if unknown := [name for name in document if name not in RANGES]:
         raise GaitError(f"{path}: unknown key {', '.join(unknown)}; a gait file may hold {', '.join(RANGES)}")
     if missing := [name for name in GAIT_NAMES if name not in document]:
-        raise GaitError(f"{path}: {', '.join(missing)} is missing; a gait is {', '.join(GAIT_NAMES)}")
+        raise GaitError(f"{path}: missing: {', '.join(missing)}; a gait is {', '.join(GAIT_NAMES)}")
     try:
         others = {name: _checked(name, value) for name, value in document.items() if name not in GAIT_NAMES}
         return GaitFile(Gait(**{name: document[name] for name in GAIT_NAMES}), others)

@@ -66,7 +66,7 @@ def test_a_few_are_said_one_by_one_and_so_is_what_concerns_the_whole_data_set():
 
 
 def test_conditions_that_lack_a_repeat_are_gathered():
-    lonely = [Finding("missing repeats", "repeat 2, 3 is missing", condition=f"static, {n} psi") for n in (0, 2, 4)]
+    lonely = [Finding("missing repeats", "repeats 2, 3 are missing", condition=f"static, {n} psi") for n in (0, 2, 4)]
     (found,) = gathered(lonely)
-    assert found.text == "3 conditions: repeat 2, 3 is missing"
+    assert found.text == "3 conditions: repeats 2, 3 are missing"
     assert found.places == ("static, 0 psi", "static, 2 psi", "static, 4 psi")

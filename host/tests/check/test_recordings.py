@@ -108,7 +108,7 @@ def test_missing_repeats_and_experiments():
             kept[place] = replace(pressed, pressure_psi=3.0)
     texts = [str(found) for found in check_recordings(replace(dataset, trials=tuple(kept)))]
     assert len(texts) == 4
-    assert "step response, small, 8.5 psi: repeat 2, 3 is missing; no noise floor can be estimated" in texts[0]
+    assert "step response, small, 8.5 psi: repeats 2, 3 are missing; no noise floor can be estimated" in texts[0]
     assert "repeat 2 is missing; the noise floor is less certain" in texts[1]
     assert "no trial of anchor_pull" in texts[2]
     assert "no static loading of the large actuator at 0 psi" in texts[3]

@@ -44,7 +44,7 @@ def test_other_parameters_of_the_uno_may_stand_beside_the_gait(tmp_path):
         ("duty_head = 0.5", "duty_heat = 0.5", "unknown key duty_heat; .* hold period_s, .*coupling_per_s"),
         ("duty_head = 0.5", "duty_head = true", "duty_head"),
         ("duty_head = 0.5", f"duty_head = 1{400 * '0'}", "duty_head"),
-        ("duty_head = 0.5\n", "", "duty_head is missing"),
+        ("duty_head = 0.5\n", "", "missing: duty_head"),
         ("period_s", "format = 9\nperiod_s", "format = 9.*format 1"),
         ("psi12_deg = 270.0", 'psi12_deg = "fast"', "psi12_deg"),
         ("period_s", "pressure_psi = 15\nperiod_s", "pressure_psi = 15 is outside its range 0 to 14 psi"),
