@@ -55,14 +55,14 @@ SLOWEST_SYNC_S = 0.002  # the strobe is high for 2.6 ms
 
 @dataclass(frozen=True)
 class Export:
-    """What is declared of an instrument's files. `columns`: the export's own names, by the data set's; `units`,
-    `factor`, `sign` and `offset` (added last) likewise; `where`: values of other columns in the rows that count;
-    `sync`: "file" (beside it), "frames" (every row was exposed at a strobe), or the name of the column in which the
-    strobe was sampled."""
+    """What is declared of an instrument's files. `columns`: the export's own names, by the data set's, where they
+    differ; `units`, `factor`, `sign` and `offset` (added last) likewise; `where`: values of other columns in the rows
+    that count; `sync`: "file" (beside it), "frames" (every row was exposed at a strobe), or the name of the column in
+    which the strobe was sampled."""
 
     name: str
     form: SheetForm
-    columns: Mapping[str, str]
+    columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     factor: Mapping[str, float] = field(default_factory=dict)
     sign: Mapping[str, int] = field(default_factory=dict)
@@ -80,7 +80,7 @@ class Export:
         return self.sync == _SYNC_FILE
 
 
-OWN_NAMES = Export("", SheetForm(), {})
+OWN_NAMES = Export("", SheetForm())
 
 
 def read_export(

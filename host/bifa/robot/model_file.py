@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Set
 from dataclasses import asdict, fields, replace
@@ -57,8 +58,8 @@ def load_model(path: str | Path) -> Model:
         document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise ModelFileError(f"{path} is not TOML: {error}") from None
-    if document.get("format") != FORMAT:
-        raise ModelFileError(f"{path}: format {document.get('format')!r}; this version reads format {FORMAT}")
+    if (version := document.get("format", FORMAT)) != FORMAT:
+        raise ModelFileError(f"{path}: format {version!r}; this version reads format {FORMAT}")
     try:
         return _build(document)
     except BifaError as error:
@@ -97,31 +98,41 @@ def _curve(curve: StiffnessCurve) -> dict[str, Any]:
 
 def _build(document: dict[str, Any]) -> Model:
     optional = {"provenance", "effects", "learnt", "covariance", "scatter"}
-    _only(document, "the file", {"format", "name", "parameters", "stiffness"}, optional)
+    _only(document, "model", {"format", "name", "parameters", "stiffness"}, optional)
     _only(document["stiffness"], "stiffness", {"body", "small"})
     entries = document["parameters"]
     _only(entries, "parameters", set(BASE_PARAMETERS))
-    covariance = document.get("covariance")
-    if covariance is not None:
-        _only(covariance, "covariance", {"names", "matrix"})
-        try:
-            covariance = Covariance(tuple(covariance["names"]), np.array(covariance["matrix"], dtype=float))
-        except (TypeError, ValueError):
-            raise ModelFileError("covariance.matrix must be rows of numbers, as many as names") from None
-    effects = document.get("effects", {})
-    if not all(isinstance(values, dict) for values in effects.values()):
-        raise ModelFileError("effects must be tables of parameters, such as [effects.hysteresis]")
+    effects, learnt = _tables(document, "effects"), _tables(document, "learnt")
     return Model(
         name=str(document["name"]),
         parameters={name: _parameter(name, entries[name]) for name in BASE_PARAMETERS},
         body_stiffness=_read_curve("body", document["stiffness"]["body"]),
         small_stiffness=_read_curve("small", document["stiffness"]["small"]),
         effects=effects,
-        learnt={name: _learnt(name, entry) for name, entry in document.get("learnt", {}).items()},
-        covariance=covariance,
+        learnt={name: _learnt(name, entry) for name, entry in learnt.items()},
+        covariance=_read_covariance(document["covariance"]) if "covariance" in document else None,
         provenance=str(document.get("provenance", "")),
         scatter=_read_scatter(document["scatter"]) if "scatter" in document else None,
     )
+
+
+def _tables(document: dict[str, Any], key: str) -> dict[str, dict[str, Any]]:
+    """The tables within an optional table."""
+    tables = document.get(key, {})
+    if not isinstance(tables, dict) or not all(isinstance(values, dict) for values in tables.values()):
+        raise ModelFileError(f"{key} must hold tables, such as [{key}.NAME]")
+    return tables
+
+
+def _read_covariance(entry: dict[str, Any]) -> Covariance:
+    _only(entry, "covariance", {"names", "matrix"})
+    names, matrix = entry["names"], entry["matrix"]
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ModelFileError("covariance.names must be a list of names")
+    try:
+        return Covariance(tuple(names), np.array(matrix, dtype=float))
+    except (TypeError, ValueError, OverflowError):
+        raise ModelFileError("covariance.matrix must be rows of numbers, as many as names") from None
 
 
 def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
@@ -130,7 +141,7 @@ def _parameter(name: str, entry: dict[str, Any]) -> ModelParameter:
     if entry.get("unit", base.unit) != base.unit:
         raise ModelFileError(f"parameters.{name} is in {base.unit!r}, not {entry['unit']!r}")
     sd = entry.get("sd")
-    if sd is not None and not (isinstance(sd, (int, float)) and np.isfinite(sd) and sd >= 0):
+    if sd is not None and not (isinstance(sd, (int, float)) and 0 <= sd < math.inf):
         raise ModelFileError(f"parameters.{name}.sd must be a number not below 0")
     return base.with_value(entry["value"], sd=sd, source=str(entry.get("source", base.source)))
 
@@ -165,5 +176,5 @@ def _only(table: dict[str, Any], where: str, required: set[str], optional: Set[s
     unknown = sorted(set(table) - required - optional)
     missing = sorted(required - set(table))
     if unknown or missing:
-        what = f"does not know {', '.join(unknown)}" if unknown else f"lacks {', '.join(missing)}"
-        raise ModelFileError(f"{where} {what}; it has {', '.join(sorted(required | optional))}")
+        what = f"unknown: {', '.join(unknown)}" if unknown else f"missing: {', '.join(missing)}"
+        raise ModelFileError(f"{where}: {what}; allowed here are {', '.join(sorted(required | optional))}")

@@ -9,6 +9,7 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
+import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,6 +20,7 @@ from bifa.data.write import add_trial
 from bifa.measure.propose import look
 from bifa.toml import parse_toml
 from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
+from harness.tampered import tampered
 
 TIME_S = np.round(np.arange(0.0, 2.0, 0.01), 6)
 RECORD = {
@@ -279,6 +281,47 @@ def test_any_text_is_read_or_refused(text, form, names):
         for work in (lambda p: read_export(p, declared(SIMPLE + form), MACHINE), look):
             with suppress(DatasetError):
                 work(Path(folder) / "a.csv")
+
+
+def test_columns_under_their_own_names_need_no_declaration(tmp_path):
+    (tmp_path / "pull.csv").write_text("time_s;displacement_mm;force_N\n0,0;1,5;-2,5\n0,1;1,6;-2,4\n")
+    machine = declared('[instrument.machine]\nseparator = "semicolon"\ndecimal = ","\nsign = { force_N = -1 }\n')
+    found, _, _ = read_export(tmp_path / "pull.csv", machine, MACHINE)
+    assert {key: list(value) for key, value in found.items()} == {
+        "time_s": [0.0, 0.1],
+        "displacement_mm": [1.5, 1.6],
+        "force_N": [2.5, 2.4],
+    }
+
+
+DECLARED = """
+[instrument.machine]
+separator = "semicolon"
+decimal = ","
+header = "Zeit"
+units_rows = 1
+columns = { time_s = "Zeit", force_N = "Kraft" }
+units = { time_s = "s", force_N = "kN" }
+sign = { force_N = -1 }
+factor = { force_N = 2.0 }
+offset = { force_N = 2.0 }
+[instrument.camera]
+preset = "arduino"
+zone = "UTC"
+date_format = "%d"
+rate_hz = 100
+sync = { column = "strobe", threshold = 2.0 }
+where = { marker = 1 }
+"""
+
+
+@given(tampered(parse_toml(DECLARED)))
+def test_any_declaration_is_taken_or_refused(document):
+    text = tomli_w.dumps(document)
+    source = Source(text, 0, "bench.toml")
+    instruments = parse_toml(text).get("instrument", {})
+    with suppress(DatasetError):
+        parse_exports(Fields(instruments if isinstance(instruments, dict) else {}, source, table="instrument"), source)
 
 
 @settings(max_examples=100, deadline=None)

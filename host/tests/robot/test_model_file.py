@@ -1,13 +1,20 @@
 """Model files: written and read back to the same numbers, and refused by name and range."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bifa.robot import BASELINE, Covariance, ModelFileError, ModelParameterError, load_model, nominal, save_model
 from bifa.robot.learnt import LearntCurve
+from bifa.robot.model import Scatter
 from bifa.simulate import walk
+from bifa.toml import parse_toml
+from harness.tampered import tampered
 
 _LEARNT = "[learnt.{}]\nlower = 0.0\nupper = 1.0\nvalues = {}\n[stiffness.body]"
 CHANGED = {
@@ -76,3 +83,21 @@ def test_values_out_of_bounds_are_refused_with_the_range():
         nominal().with_values({"mu_s": 5.0})
     with pytest.raises(ModelParameterError, match="not a parameter"):
         nominal().with_values({"mass": 5.0})
+
+
+WHOLE = replace(
+    nominal().with_effects({"hysteresis": {}}),
+    covariance=Covariance(("mu_k",), np.array([[1e-4]])),
+    learnt={"filling": LearntCurve(0.0, 1.0, np.zeros((2, 4)))},
+    scatter=Scatter(),
+)
+
+
+@given(st.data())
+def test_any_model_file_is_read_or_refused(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("model")
+    save_model(folder / "m.toml", WHOLE)
+    spoilt = data.draw(tampered(parse_toml((folder / "m.toml").read_text())))
+    (folder / "m.toml").write_text(tomli_w.dumps(spoilt))
+    with suppress(ModelFileError):
+        load_model(folder / "m.toml")
