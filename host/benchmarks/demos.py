@@ -16,18 +16,18 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from statistics import mean
 from typing import NamedTuple
 
 from benchmarks import records as lines
 from benchmarks.blind_figures import wilson
 
 SEEDS, FIRST_SEED, JOBS, OUT = 10, 1000, 2, Path("../out/demos")
-_GAIT = "completed"
 
 
 class Story(NamedTuple):
-    """A demo: what the seal held and what was named, errors on trials not fitted in units of the noise, and of the
-    gait found with the completed model the speeds predicted and measured."""
+    """A demo: what the seal held and what was named, errors on trials not fitted in units of the noise; the speed
+    walked with a margin of 2 %, and at the edge of what is known (of the campaign's last gait) predicted and walked."""
 
     seed: int
     truth: tuple[str, ...]
@@ -36,6 +36,7 @@ class Story(NamedTuple):
     before: float
     after: float
     floor: float
+    robust_mm_s: float
     predicted_mm_s: float
     measured_mm_s: float
 
@@ -57,7 +58,7 @@ def told(seed: int, out: Path) -> Story:
 
 def story(seed: int, summary: dict) -> Story:
     """From a demo's `summary.json`."""
-    gait = next(one for one in summary["gaits"] if one["gait"] == _GAIT)
+    robust, *_, edge = summary["rounds"]
     error = {name: summary["error"][name]["held_out"] for name in ("before", "after", "noise_floor")}
     return Story(
         seed,
@@ -65,27 +66,31 @@ def story(seed: int, summary: dict) -> Story:
         summary["verdict"],
         tuple(effect["name"] for effect in summary["effects"]),
         *error.values(),
-        gait["completed_model"],
-        gait["measured"],
+        robust["measured_mm_s"],
+        edge["predicted_mm_s"],
+        edge["measured_mm_s"],
     )
 
 
-HEADING = f"{'seed':6}{'sealed':22}{'named':34}{'before':>8}{'after':>7}{'floor':>7}{'predicted':>11}{'measured':>10}"
+HEADING = f"{'seed':6}{'sealed':22}{'named':34}{'before':>8}{'after':>7}{'floor':>7}{'2 %':>8}{'edge':>8}{'walked':>8}"
 
 
 def row(one: Story) -> str:
     """A line of the table under `HEADING`."""
     sealed, named = " + ".join(one.truth), " + ".join(one.named) or one.verdict
     errors = f"{one.before:8.2f}{one.after:7.2f}{one.floor:7.2f}"
-    return f"{one.seed:<6}{sealed:22}{named:34}{errors}{one.predicted_mm_s:11.2f}{one.measured_mm_s:10.2f}"
+    speeds = "".join(f"{speed:8.2f}" for speed in (one.robust_mm_s, one.predicted_mm_s, one.measured_mm_s))
+    return f"{one.seed:<6}{sealed:22}{named:34}{errors}{speeds}"
 
 
 def summed_up(stories: Sequence[Story]) -> dict[str, float]:
     """How many were right; printed and returned."""
     right = sum(one.right for one in stories)
     low, high = wilson(right, len(stories))
+    gain = mean(one.measured_mm_s / one.robust_mm_s for one in stories) - 1.0
     print(f"named first what the seal held: {right} of {len(stories)} [{low:.2f}, {high:.2f}]")
-    return {"demos": len(stories), "demos_right": right}
+    print(f"the edge against the margin of 2 %: {100 * gain:+.1f} % on average")
+    return {"demos": len(stories), "demos_right": right, "demos_edge_gain": gain}
 
 
 def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:

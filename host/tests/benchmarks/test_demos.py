@@ -14,9 +14,10 @@ def summary(*named, truth="leak"):
         "verdict": "identified" if named else "unexplained",
         "effects": [{"name": name} for name in named],
         "error": {name: {"held_out": value} for name, value in errors.items()},
-        "gaits": [
-            {"gait": "base", "completed_model": 9.0, "measured": 8.0},
-            {"gait": "completed", "completed_model": 20.1, "measured": 20.2},
+        "rounds": [
+            {"predicted_mm_s": 20.1, "measured_mm_s": 20.0},
+            {"predicted_mm_s": 24.0, "measured_mm_s": 23.0},
+            {"predicted_mm_s": 22.1, "measured_mm_s": 22.0},
         ],
     }
 
@@ -28,7 +29,7 @@ def test_a_story_is_right_if_what_was_sealed_is_named_first(named, right):
     one = demos.story(3, summary(*named))
     assert one.right == right
     assert (one.before, one.after, one.floor) == (4.0, 1.02, 1.0)
-    assert (one.predicted_mm_s, one.measured_mm_s) == (20.1, 20.2)
+    assert (one.robust_mm_s, one.predicted_mm_s, one.measured_mm_s) == (20.0, 22.1, 22.0)
 
 
 def test_a_row_stands_under_its_heading():
@@ -45,8 +46,10 @@ def test_demos_go_on_from_their_records(monkeypatch, tmp_path, capsys):
 
     monkeypatch.setattr(demos, "told", told)
     figures = demos.run(range(4), tmp_path, 2, kept)
-    assert figures == {"demos": 4, "demos_right": 2}
-    assert "2 of 4 [0.15, 0.85]" in capsys.readouterr().out
+    assert figures == {"demos": 4, "demos_right": 2, "demos_edge_gain": pytest.approx(0.1)}
+    printed = capsys.readouterr().out
+    assert "2 of 4 [0.15, 0.85]" in printed
+    assert "+10.0 % on average" in printed
     assert demos.run(range(4), tmp_path, 2, kept) == figures
     assert sorted(asked) == [0, 1, 2, 3]
     assert [json.loads(line)["seed"] for line in kept.read_text().splitlines()] == [0, 1, 2, 3]
