@@ -10,7 +10,7 @@ The best known of a robot is the best of all its runs: of every seed, of `--long
 of the peers (differential evolution, SciPy's DIRECT and SHGO) on as many evaluations as the search took in
 the mean. (nevergrad's NGOpt is not among them: 1.0.12 pins a bayesian-optimization older than `bo` needs.) Robust
 searches and peers take ten times as long as nominal searches: `--fully` says on how many of the robots, evenly spread,
-they are tried. FILE has a line for each robot, with which an interrupted run goes on.
+they are tried. FILE has a line for each robot, with which a run goes on that was interrupted or searched fewer fully.
 """
 
 from __future__ import annotations
@@ -70,14 +70,22 @@ def specimen(seed: int) -> Model:
 
 
 def searched(
-    model: Model, settings: Settings, seeds: Sequence[int], long: int, runs: Simulations, fully: bool = True
+    record: dict[str, Any],
+    model: Model,
+    settings: Settings,
+    seeds: Sequence[int],
+    long: int,
+    runs: Simulations,
+    fully: bool = True,
 ) -> dict[str, Any]:
-    """Speeds of each seed, nominal and robust, of the long runs and of the peers; processor seconds a search, and how
-    many evaluations a nominal one took in the mean, which the peers have as well. Not `fully`: the nominal ones only.
+    """`record` with what it lacks: speeds of each seed, nominal and robust, of the long runs and of the peers;
+    processor seconds a search, and how many evaluations a nominal one took in the mean, which the peers have as well.
+    Not `fully`: the nominal ones only.
     """
-    record: dict[str, Any] = {}
-    spread = None if model.covariance else SPREAD
+    record, spread = dict(record), None if model.covariance else SPREAD
     for kind, robust in (("nominal", False), ("robust", True))[: 1 + fully]:
+        if kind in record:
+            continue
         start = time.process_time()
         own = [_found(model, replace(settings, robust=robust, seed=seed, spread=spread), runs) for seed in seeds]
         record[kind] = [speed for speed, _ in own]
@@ -86,12 +94,12 @@ def searched(
             record["evaluations"] = round(mean(evaluations for _, evaluations in own)) or EVALUATIONS["cma"]
         more = replace(settings, robust=robust, evaluations=_LONGER * EVALUATIONS["cma"], spread=spread)
         record[f"{kind}_long"] = [_found(model, replace(more, seed=1000 + k), runs)[0] for k in range(long)]
-    if not fully:
-        return record
     budget = record["evaluations"]
-    record["de"] = _found(model, replace(settings, robust=False, method="de", evaluations=budget), runs)[0]
+    if fully and "de" not in record:
+        record["de"] = _found(model, replace(settings, robust=False, method="de", evaluations=budget), runs)[0]
     for name, minimize in PEERS.items():
-        record[name] = peer(minimize, model, settings, budget, runs)
+        if fully and name not in record:
+            record[name] = peer(minimize, model, settings, budget, runs)
     return record
 
 
@@ -182,14 +190,15 @@ def run(
     try:
         with simulations() as runs:
             for number, (name, model, settings) in enumerate(asked):
-                record = known.get(name)
-                if record is None and only_print:
+                if only_print and name not in known:
                     continue
-                if record is None:
+                record = known.get(name, {"robot": name})
+                if not only_print:
                     fully = number * every // len(asked) > (number - 1) * every // len(asked)
-                    known[name] = record = {"robot": name} | searched(model, settings, range(seeds), long, runs, fully)
-                    if kept:
-                        lines.write(kept, known.values())
+                    record = searched(record, model, settings, range(seeds), long, runs, fully)
+                    if kept and record != known.get(name):
+                        lines.write(kept, (known | {name: record}).values())
+                known[name] = record
                 found.append(record)
                 print(row(name, record), flush=True)
     except KeyboardInterrupt:

@@ -35,6 +35,21 @@ def test_a_robot_that_was_not_searched_fully_counts_with_its_nominal_searches():
     assert len(regret.row("nominal", record)) == len(regret.row("nominal", RECORD))
 
 
+def test_what_a_record_has_is_not_searched_again():
+    lacking = {key: value for key, value in RECORD.items() if key != "shgo"}
+    asked = []
+
+    def judge(*args, **_):
+        asked.append(args)
+        return 14.0
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(regret, "peer", judge)
+        assert regret.searched(lacking, nominal(), Settings(), range(2), 1, None) == RECORD | {"shgo": 14.0}
+    assert len(asked) == 1
+    assert "shgo" not in lacking
+
+
 @pytest.mark.parametrize("name", ["direct", "shgo"])
 def test_a_peer_has_no_more_than_its_budget_and_is_judged_by_the_finer_metric(name):
     spent = []
