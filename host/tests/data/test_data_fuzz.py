@@ -5,8 +5,14 @@ import random
 
 import numpy as np
 import pytest
+import tomli_w
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
+from bifa.check import check_dataset
 from bifa.data import DatasetError, read_dataset
+from bifa.toml import parse_toml
+from harness.tampered import tampered
 
 TOKENS = [b",", b"\n", b"\r", b"\r\n", b"nan", b"inf", b"1e999", b"-", b"e", b".", b" ", b"\t", b"\0"]
 TOKENS += [b"\xff", b"\xef\xbb\xbf", b'"', b"#", b"_", b"0x1", b"time_s", b"1", b"[", b"]", b"=", b"'", b"{"]
@@ -78,6 +84,21 @@ def test_damaged_files(folder, target):
     refused, accepted = fuzz(folder, target, seed=1, rounds=400)
     assert refused > 100
     assert accepted > 0
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_data_set_of_which_a_value_is_spoilt_is_read_and_checked_or_refused(folder, data):
+    whole = parse_toml((folder / "dataset.toml").read_text())
+    try:
+        (folder / "dataset.toml").write_text(tomli_w.dumps(data.draw(tampered(whole))))
+        dataset, error = attempt(folder)
+    finally:
+        (folder / "dataset.toml").write_text(tomli_w.dumps(whole))
+    if error is None:
+        check_dataset(dataset)
+    else:
+        assert error.problem
 
 
 @pytest.mark.soak
