@@ -15,7 +15,7 @@ from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distributi
 from bifa.gait.pool import Simulations
 from bifa.gait.prediction import CYCLES, FELL, FINE_M, Prediction, predict_speed, settles
 from bifa.gait.settling import STANDING_MM_S
-from bifa.gait.space import SearchSpace, paper_space
+from bifa.gait.space import TIMES, SearchSpace, paper_space
 from bifa.gait.uncertainty import Knowledge, spread_of
 from bifa.robot.gait import Gait
 from bifa.robot.model import Model
@@ -54,13 +54,16 @@ class RobustRound:
 
 # Few robots while gaits differ much, many when they hardly do. The quantiles are below 10 %: a gait tuned until one
 # in ten of its own robots fails would fail more often on others.
-EXPLORE = RobustRound(24, 0.08, 0.95, 3e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005)
+EXPLORE = RobustRound(24, 0.08, 0.95, 1e-5, (0.0, 0.02, 0.04, 0.08, 0.16), 1400, 0.06, jitter=0.005)
 # At the cliff a hair of the period decides, and few robots call it too short; so do the integrator's errors: of one
 # gait 99 % of the robots walked with steps of 30 um, 65 % with 10 um, 34 % with 3 um, 27 % with 1 um and less.
 _REFINE = (
-    RobustRound(32, 0.0625, 0.95, 3e-6, (0.0, 0.02, 0.04), 480, 0.015, climbs=3, jitter=0.005),
-    RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.006, 0.012, -0.006), 96, 0.01, in_full=True, jitter=0.002),
+    RobustRound(32, 0.0625, 0.95, 3e-6, (0.0, 0.02, 0.04), 480, 0.008, climbs=3, jitter=0.005),
+    RobustRound(128, 0.0677, 0.993, 3e-6, (0.0, 0.006, 0.012, -0.006), 192, 0.006, 2, in_full=True, jitter=0.002),
 )
+# By how many seconds each time of a gait is changed between climbs, which end on the first of many tops along it.
+_LONGER_S: dict[str, tuple[float, ...]] = {name: (-0.1, -0.04, 0.04, 0.1) for name in TIMES}
+_LONGER_S |= {"body_vacuum": (-0.12, -0.06, -0.03, 0.03, 0.06), "body_pressure": (-0.02, 0.02, 0.05, 0.1)}
 _SHORTLIST = RobustRound(256, 0.08, 1.0, FINE_M, (0.0, 0.004, -0.004), in_full=True)
 # The check is by the metric in full: the search's quick one lets some pass, and what was best on some robots may fail
 # on others. Slower by these parts if need be.
@@ -234,17 +237,26 @@ def explore_on_robots(
     recorder(np.concatenate(_at_periods(settings.space, starts, EXPLORE.periods)))
     if not settings.refine:
         return recorder.found()
-    families = _best_periods(recorder, settings.space, settings.space.nearest(FAMILIES), PERIODS)
+    families = _suited(recorder, settings.space, settings.space.nearest(FAMILIES), PERIODS)
     known = list(families.near_best(_FAMILY_WORTH).finalists(_FAMILIES, _NEAR, wraps))
     return climb_basins(recorder, wraps, budget, settings.seed, _POPULATION, EXPLORE.step, known, EXPLORE.abandon)
 
 
-def _best_periods(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
-    """Of each point (n, dimensions) the copy with the best period."""
-    copies = np.array(_at_periods(space, points, periods))
-    values = np.array([objective(one) for one in copies])
-    best = np.argmax(values, axis=0)
-    return Evaluated(copies[best, np.arange(len(points))], values.max(axis=0))
+def _suited(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
+    """Of each point (n, dimensions) the best copy: with the best of these periods, then with one of its times the
+    best."""
+    tried = _at_periods(space, points, periods)
+    # One by one: what is worse than the best so far meets few robots.
+    points = _best_copies(tried, [objective(one) for one in tried]).points
+    retimed = [space.retimed(points, {name: by}) for name, each in _LONGER_S.items() for by in each]
+    values = objective(np.concatenate([points, *retimed]))
+    return _best_copies([points, *retimed], np.split(values, 1 + len(retimed)))
+
+
+def _best_copies(copies: Sequence[np.ndarray], values: Sequence[np.ndarray]) -> Evaluated:
+    """Of each point the best of its copies, (n, dimensions) each, which have these values, (n,) each."""
+    best, every = np.argmax(values, axis=0), np.arange(len(copies[0]))
+    return Evaluated(np.array(copies)[best, every], np.array(values)[best, every])
 
 
 def _budget(settings: Settings) -> int:
@@ -288,8 +300,8 @@ def _refine_on_robots(
             on_progress(f"refine {number}", min(count / budget, 1.0), best)
 
         recorder = RecordedObjective(objective, wraps, show)
-        best = _best_periods(recorder, settings.space, ended, stage.periods)
-        begun = best.near_best(_END_WORTH).finalists(stage.climbs, _FAR, wraps)
+        best = _suited(recorder, settings.space, ended, stage.periods)
+        begun = best.near_best(_END_WORTH).finalists(stage.climbs, APART, wraps)
         if not len(begun):
             break
         steps = [stage.step] * len(begun)

@@ -1,13 +1,16 @@
 """Where gaits are looked for: the paper's box (section V.B), and the map between it and the unit cube."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bifa.errors import BifaError
 from bifa.ranges import RANGES
-from bifa.robot.gait import Gait
+from bifa.robot.gait import GAIT_NAMES, Gait, gait_rows
+
+# What `SearchSpace.retimed` changes.
+TIMES = ("body_vacuum", "body_pressure", "head_ahead", "tail_ahead", "ends_vacuum")
 
 
 class SpaceError(BifaError):
@@ -70,17 +73,31 @@ class SearchSpace:
                 raise SpaceError(f"{axis.name}: {' and '.join(axis.sets)} are searched as one axis and must be equal")
             if not axis.lower <= first <= axis.upper:
                 raise SpaceError(f"{axis.name} = {first:g} is outside {axis.lower:g} to {axis.upper:g} {axis.unit}")
-        return self._unfolded(gait)
+        return self._unfolded(gait_rows([gait]))[0]
 
     def nearest(self, gaits: Sequence[Gait]) -> np.ndarray:
         """(n, dimensions) of gaits, or of what the space has nearest to them."""
-        return folded(np.array([self._unfolded(gait) for gait in gaits]).reshape(-1, len(self.axes)), self.wraps)
+        return folded(self._unfolded(gait_rows(gaits)), self.wraps)
 
-    def _unfolded(self, gait: Gait) -> np.ndarray:
-        values = gait.as_dict()
-        means = np.array([np.mean([values[name] for name in axis.sets]) for axis in self.axes])
+    def retimed(self, points: np.ndarray, longer_s: Mapping[str, float]) -> np.ndarray:
+        """Points (n, dimensions) of the same gaits, some of their `TIMES` longer as far as the space goes: for how long
+        the body is at vacuum and under pressure, by how much, at most half a period, head and tail are ahead of its
+        turn to vacuum, and for how long both ends are at vacuum. What is not longer stays as it is, in seconds.
+        """
+        rows = gait_rows(self.gaits(points))
+        body_vacuum, body_pressure, head_ahead, tail_ahead, ends_vacuum = (longer_s.get(name, 0.0) for name in TIMES)
+        period_s, ahead, at_vacuum = rows[:, :1], rows[:, 1:3] / 360.0, rows[:, 3:]
+        ahead_s = (ahead - np.round(ahead)) * period_s + [head_ahead, tail_ahead]
+        vacuum_s = at_vacuum * period_s + [body_vacuum, ends_vacuum, ends_vacuum]
+        period_s = period_s + body_vacuum + body_pressure
+        longer = np.hstack([period_s, 360.0 * ahead_s / period_s, vacuum_s / period_s])
+        return folded(self._unfolded(longer), self.wraps)
+
+    def _unfolded(self, rows: np.ndarray) -> np.ndarray:
+        """(n, dimensions) of gaits (n, 6), the mean of what an axis sets together."""
+        means = [rows[:, [GAIT_NAMES.index(name) for name in axis.sets]].mean(axis=1) for axis in self.axes]
         lower, width = self._box
-        return (means - lower) / width
+        return (np.stack(means, axis=1) - lower) / width
 
     @property
     def _box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 
 from bifa.errors import BifaError
@@ -52,6 +53,12 @@ class Gait:
 
 
 GAIT_NAMES = tuple(item.name for item in fields(Gait))
+
+
+def gait_rows(gaits: Sequence[Gait]) -> np.ndarray:
+    """(n, 6) in the order of a gait's fields."""
+    return np.array([list(gait.as_dict().values()) for gait in gaits], dtype=float).reshape(-1, len(GAIT_NAMES))
+
 
 # The paper's baseline (section V.B): the body switches only when head or tail fully anchors.
 BASELINE = Gait(5.7, 270.0, 90.0, 0.5, 0.5, 0.5)

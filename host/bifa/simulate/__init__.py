@@ -5,7 +5,8 @@
 >>> record["displacement_head_mm"]
 """
 
-from bifa.simulate.gaits import Advance, cores, full_lanes, gait_rows, speed, speeds
+from bifa.robot.gait import gait_rows
+from bifa.simulate.gaits import Advance, cores, full_lanes, speed, speeds
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.records import (
     SimulatedTrial,

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from bifa.robot.gait import Gait
+from bifa.robot.gait import Gait, gait_rows
 from bifa.robot.model import Model
 from bifa.simulate import lanes, layout, rigs
 from bifa.simulate.plant import Plant, plant
@@ -39,11 +39,6 @@ class Advance:
         """Spread of the last three cycles' advance over the last one's size (at least 1 mm): 0 when periodic."""
         last = self.advance_m[..., -3:]
         return np.ptp(last, axis=-1) / np.maximum(np.abs(last[..., -1]), 1e-3)
-
-
-def gait_rows(gaits: Sequence[Gait]) -> np.ndarray:
-    """(n, 6) in the order of a gait's fields."""
-    return np.array([list(gait.as_dict().values()) for gait in gaits], dtype=float).reshape(-1, 6)
 
 
 def speed(model: Model | Plant, gait: Gait, cycles: int = 10, tolerance_m: float = FAST_TOLERANCE_M) -> Advance:

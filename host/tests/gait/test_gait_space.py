@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from bifa.gait.space import SearchAxis, SpaceError, paper_space
+from bifa.gait.space import TIMES, SearchAxis, SpaceError, paper_space
 from bifa.robot.gait import BASELINE, Gait
 
 
@@ -31,6 +33,39 @@ def test_of_a_gait_outside_the_nearest_is_taken():
     inside, outside = paper_space().gaits(paper_space().nearest([Gait(3.0, 0, 90, 0.5, 0.4, 0.6), BASELINE]))
     assert inside == Gait(3.0, 0.0, 90.0, 0.5, 0.5, 0.5)
     assert outside == replace(BASELINE, period_s=4.0)
+
+
+def switches_s(gait):
+    """When head and tail turn to vacuum, in the half period around the body's turn to it, and for how long body and
+    ends stay there and the body is under pressure."""
+    turns = [-((ahead / 360.0 + 0.5) % 1.0 - 0.5) * gait.period_s for ahead in (gait.psi12_deg, gait.psi13_deg)]
+    at_vacuum = gait.duty_body * gait.period_s
+    return np.array([*turns, at_vacuum, gait.period_s - at_vacuum, gait.duty_head * gait.period_s])
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [
+        ("body_vacuum", [0, 0, 1, 0, 0]),
+        ("body_pressure", [0, 0, 0, 1, 0]),
+        ("head_ahead", [-1, 0, 0, 0, 0]),
+        ("tail_ahead", [0, -1, 0, 0, 0]),
+        ("ends_vacuum", [0, 0, 0, 0, 1]),
+    ],
+)
+def test_one_time_of_a_gait_is_longer_and_the_others_stay(name, changed):
+    space, gait = paper_space(), Gait(2.68, 217.0, 340.0, 0.665, 0.465, 0.465)
+    (longer,) = space.gaits(space.retimed(space.point(gait)[None], {name: 0.05}))
+    np.testing.assert_allclose(switches_s(longer) - switches_s(gait), 0.05 * np.array(changed), atol=1e-12)
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5), st.sampled_from(TIMES), st.floats(-4.0, 4.0))
+def test_whatever_is_made_longer_keeps_to_the_space(point, name, by):
+    space, points = paper_space(), np.array([point])
+    retimed = space.retimed(points, {name: by})
+    assert ((retimed >= 0.0) & (retimed <= 1.0)).all()
+    unchanged = space.retimed(points, {name: 0.0})
+    np.testing.assert_allclose((unchanged - points + 0.5) % 1.0, 0.5, atol=1e-9)
 
 
 def test_errors_name_the_axis_and_the_range():
