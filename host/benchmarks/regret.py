@@ -192,15 +192,14 @@ def run(
             for number, (name, model, settings) in enumerate(asked):
                 if only_print and name not in known:
                     continue
-                record = known.get(name, {"robot": name})
+                record = known.setdefault(name, {"robot": name})
                 if not only_print:
                     fully = number * every // len(asked) > (number - 1) * every // len(asked)
-                    record = searched(record, model, settings, range(seeds), long, runs, fully)
-                    if kept and record != known.get(name):
-                        lines.write(kept, (known | {name: record}).values())
-                known[name] = record
-                found.append(record)
-                print(row(name, record), flush=True)
+                    known[name] = searched(record, model, settings, range(seeds), long, runs, fully)
+                    if kept and known[name] != record:
+                        lines.write(kept, known.values())
+                found.append(known[name])
+                print(row(name, known[name]), flush=True)
     except KeyboardInterrupt:
         print(f"\ninterrupted after {len(found)} robots; the same command goes on")
     return summed_up(found) if found else {}
