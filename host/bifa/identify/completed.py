@@ -16,6 +16,7 @@ from bifa.robot.model import LEARNT, Covariance
 from bifa.simulate import plant
 from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit
+from lacuna.estimation.structure import knot_name
 from lacuna.estimation.uncertainty import Uncertainty, uncertainty
 
 
@@ -70,7 +71,8 @@ def _moves(model: Model, fit: Fit) -> dict[str, dict[str, float]]:
         each = (learnt.values.shape[1] - 1) // (knots - 1)
         for row in range(len(learnt.values)):
             for knot in range(knots):
-                found[f"{LEARNT}.{site}.{row}_{knot}"] = {f"{LEARNT}.{site}.{row}.{knot * each}": 1.0}
+                name = knot_name(system.correction_sites[site], row, knot)
+                found[name] = {f"{LEARNT}.{site}.{row}.{knot * each}": 1.0}
     return found
 
 

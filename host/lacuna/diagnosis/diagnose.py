@@ -41,6 +41,7 @@ from lacuna.diagnosis.warn import impossible_signs, warnings_of
 from lacuna.diagnosis.workers import OnProgress, Workers
 from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
+from lacuna.estimation.shrink import shrunk
 from lacuna.estimation.solve import one_thread
 from lacuna.system import Correction, CorrectionSite, System
 
@@ -365,7 +366,7 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, work
     best = min(offered, key=lambda c: c.checked_error, default=None)
     if best is None:
         return judged.explained
-    final = case.converged(best)
+    final = shrunk(case.converged(best))
     return final if not split.final or holds(final, judged.explained, split) else judged.explained
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
@@ -149,9 +149,17 @@ class Problem:
         other._prior = self.structure.prior_precision(released=True)
         return other
 
+    def sized(self, sizes: Mapping[str, float]) -> Problem:
+        """The same problem, the knots of learnt curves as far from zero as `sizes` has it, by site."""
+        other = copy(self)
+        other._prior = self.structure.prior_precision(sizes=sizes)
+        return other
+
     def over(self, trials: Sequence[Record]) -> Problem:
         """The same problem with other trials."""
-        return Problem(self.structure, trials, self.floor, self.view)
+        other = Problem(self.structure, trials, self.floor, self.view)
+        other._prior = self._prior
+        return other
 
     def predict(self, point: Point, index: int, *, coarse: bool = False) -> Channels:
         """Channels of trial `index`."""

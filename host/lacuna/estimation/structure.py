@@ -112,19 +112,21 @@ class Structure:
         """The learnt curves, knots interpolated by a natural cubic spline onto a uniform table."""
         return tuple(_tabulate(self.system.correction_sites[name], theta) for name in self.sites)
 
-    def prior_precision(self, released: bool = False) -> np.ndarray:
+    def prior_precision(self, released: bool = False, sizes: Mapping[str, float] | None = None) -> np.ndarray:
         """Precision of the prior around the parameters' starts, shape (P, P): what was known of each, and for learnt
-        curves knots within 10 scales of zero and bending within 3 scales a knot. `released`: what was known from the
-        trials themselves hardly counts, or they would count twice."""
+        curves knots within 10 scales of zero, or within the size of the curve at a site if `sizes` has it, and bending
+        within 3 scales a knot. `released`: what was known from the trials themselves hardly counts, or they would count
+        twice."""
         wider = [_RELEASED if released and p.prior_from_trials else 1.0 for p in self.parameters]
         sds = zip((p.prior_sd for p in self.parameters), wider, strict=True)
         precision = np.diag([(sd * factor) ** -2.0 if sd else 0.0 for sd, factor in sds])
         for name in self.sites:
             site = self.system.correction_sites[name]
             bend = np.diff(np.eye(site.knots), 2, axis=0)
-            block = (np.eye(site.knots) / 10**2 + bend.T @ bend / 3**2) / site.scale**2
+            scales = sizes[name] / site.scale if sizes and name in sizes else 10
+            block = (np.eye(site.knots) / scales**2 + bend.T @ bend / 3**2) / site.scale**2
             for row in range(len(site.rows)):
-                at = self.names.index(_knot_name(site, row, 0))
+                at = self.names.index(knot_name(site, row, 0))
                 precision[at : at + site.knots, at : at + site.knots] = block
         return precision
 
@@ -146,14 +148,15 @@ def is_learnt(name: str) -> bool:
     return name.startswith(f"{LEARNT}.")
 
 
-def _knot_name(site: CorrectionSite, row: int, knot: int) -> str:
+def knot_name(site: CorrectionSite, row: int, knot: int) -> str:
+    """The parameter's."""
     return f"{LEARNT}.{site.name}.{row}_{knot}"
 
 
 def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
     far = 50 * site.scale
     return [
-        Parameter(_knot_name(site, row, knot), site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
+        Parameter(knot_name(site, row, knot), site.unit, 0.0, -far, far, scale=site.scale, source="learnt")
         for row in range(len(site.rows))
         for knot in range(site.knots)
     ]
@@ -161,7 +164,7 @@ def _knot_parameters(site: CorrectionSite) -> list[Parameter]:
 
 def _tabulate(site: CorrectionSite, theta: Mapping[str, float]) -> Correction:
     rows = range(len(site.rows))
-    values = np.array([[theta[_knot_name(site, row, k)] for k in range(site.knots)] for row in rows])
+    values = np.array([[theta[knot_name(site, row, k)] for k in range(site.knots)] for row in rows])
     return Correction(site.name, values @ _splines(site.knots))
 
 
