@@ -16,7 +16,7 @@ from bifa.robot.model import LEARNT, Covariance
 from bifa.simulate import plant
 from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit
-from lacuna.estimation.structure import knot_name
+from lacuna.estimation.structure import is_learnt, knot_name
 from lacuna.estimation.uncertainty import Uncertainty, uncertainty
 
 
@@ -44,10 +44,12 @@ def _with_uncertainty(model: Model, fit: Fit, known: Uncertainty, sd: Mapping[st
     the curves' too, correlated as `known`: each by `sd`, else by how well it is known and by what the conditions of the
     data contradict one another, whichever is more."""
     moves, between = _moves(model, fit), np.sqrt(np.diag(clustered_covariance(fit)))
-    chosen = [k for k, e in enumerate(known.estimates) if e.determined and e.name in moves]
+    # all knots of a curve: a spline through some of them would swing beyond these
+    chosen = [k for k, e in enumerate(known.estimates) if (e.determined or is_learnt(e.name)) and e.name in moves]
     if not chosen:
         return model
-    widths = {known.estimates[k].name: max(known.estimates[k].sd, float(between[k])) for k in chosen} | dict(sd)
+    moved = np.where([is_learnt(e.name) for e in known.estimates], 0.0, between)  # knots are within the curve's size
+    widths = {known.estimates[k].name: max(known.estimates[k].sd, float(moved[k])) for k in chosen} | dict(sd)
     fitted = [known.estimates[k].name for k in chosen]
     matrix = known.covariance[np.ix_(chosen, chosen)]
     stretch = np.array([widths[name] for name in fitted]) / np.sqrt(np.diag(matrix))

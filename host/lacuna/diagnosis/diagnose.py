@@ -138,6 +138,7 @@ def diagnose(
             lambda: _corrected(case, found, choice, judged, None),
             "no curve is learnt",
         )
+    final = shrunk(final)
     hand.on_progress("estimating how well the parameters are known")
     shown = choice.explanation if judged.verdict == "identified" else found.base
     followed = followed_by_nothing(case.followed(shown))
@@ -366,7 +367,7 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, work
     best = min(offered, key=lambda c: c.checked_error, default=None)
     if best is None:
         return judged.explained
-    final = shrunk(case.converged(best))
+    final = case.converged(best)
     return final if not split.final or holds(final, judged.explained, split) else judged.explained
 
 

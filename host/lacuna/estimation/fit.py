@@ -204,7 +204,7 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
     """The same structure and trials against another floor, by a few steps with the derivatives that there are; without
     any steps it has no derivatives either."""
     point = fitted.solution.point
-    problem = Problem(fitted.structure, fitted.problem.trials, floor, fitted.problem.view)
+    problem = fitted.problem.over(fitted.problem.trials, floor)
     sensitivities = fitted.solution.sensitivities
     if not max_iterations:
         bare = replace(fitted.solution, cost=cost_of(problem, point), normal=np.zeros((0, 0)), sensitivities=())

@@ -155,9 +155,9 @@ class Problem:
         other._prior = self.structure.prior_precision(sizes=sizes)
         return other
 
-    def over(self, trials: Sequence[Record]) -> Problem:
-        """The same problem with other trials."""
-        other = Problem(self.structure, trials, self.floor, self.view)
+    def over(self, trials: Sequence[Record], floor: NoiseFloor | None = None) -> Problem:
+        """The same problem with other trials, or against another floor."""
+        other = Problem(self.structure, trials, floor or self.floor, self.view)
         other._prior = self._prior
         return other
 
