@@ -311,11 +311,13 @@ def _pulled_time(time_s: np.ndarray, pulled_mm: np.ndarray, rate_mm_s: float) ->
 def _walk(trial: Trial) -> WalkInputs:
     pressures = ("pressure_body_psi", "pressure_head_psi", "pressure_tail_psi")
     displacements = [n for n in ("displacement_head_mm", "displacement_tail_mm") if n in trial.columns]
+    # at the rig's usual pressure the supply is what a gauge says, or the fit: the regulator may be off its set-point
+    at_its_own = None if trial.pressure_psi is None else trial.extra.get("set_point_psi", trial.pressure_psi)
     return WalkInputs(
         time_s=_time_s(trial),
         commands=valves_of(walk_timeline(trial), trial),
         inclination_deg=float(trial.extra.get("inclination_deg", 0.0)),
-        positive_psi=trial.extra.get("set_point_psi", trial.pressure_psi),
+        positive_psi=at_its_own,
         channels=(*displacements, *pressures),
         switch_sd_s=switch_sd_s(trial),
     )
