@@ -25,12 +25,13 @@ _FASTEST = 0.98  # of the draws are slower than where those that walk are looked
 @dataclass(frozen=True)
 class Prediction:
     """Speeds in mm/s of a gait on `DRAWS` robots of what is known, each in a walk of its own, those that fall behind
-    included; `cycles`: by which nearly all have settled.
+    included; `cycles`: by which nearly all have settled; `backward`: that is the way the speeds are along.
 
     The speed and its interval are those of the robots that walk, however few: how many do is `walks_probability`."""
 
     speeds_mm_s: np.ndarray
     cycles: int
+    backward: bool = False
 
     @cached_property
     def walks(self) -> np.ndarray:
@@ -50,12 +51,13 @@ class Prediction:
 
     @property
     def speed_mm_s(self) -> float:
-        """The median of those that walk; 0 where none does."""
+        """The median of those that walk, negative backward; 0 where none does."""
         return self._quantile(0.5)
 
     def interval_mm_s(self, probability: float) -> tuple[float, float]:
         """Of the speed, where the robot walks."""
-        return self._quantile(0.5 - 0.5 * probability), self._quantile(0.5 + 0.5 * probability)
+        low, high = sorted(self._quantile(0.5 + side * probability) for side in (-0.5, 0.5))
+        return low, high
 
     @property
     def interval_90_mm_s(self) -> tuple[float, float]:
@@ -89,7 +91,7 @@ class Prediction:
 
     def _quantile(self, share: float) -> float:
         walking = self.speeds_mm_s[self.walks]
-        return float(np.quantile(walking, share)) if walking.size else 0.0
+        return float(np.quantile(walking, share)) * (-1.0 if self.backward else 1.0) if walking.size else 0.0
 
 
 class Predictor:
@@ -117,7 +119,10 @@ class Predictor:
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
         means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s(gait)
-        return Prediction(np.fmax(np.nan_to_num(means), 0.0), _most(f.begins for f in found if f.is_settled) + LEAST)
+        means = np.nan_to_num(means)
+        backward = bool(np.mean(means) < -STANDING_MM_S)
+        along = np.fmax(-means if backward else means, 0.0)
+        return Prediction(along, _most(f.begins for f in found if f.is_settled) + LEAST, backward)
 
     def _switched(self, rows: np.ndarray) -> np.ndarray:
         """The gaits (n, 6) as each walk has them, whose valves switch a little early or late: at a cliff half a

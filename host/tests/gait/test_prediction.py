@@ -84,6 +84,14 @@ def test_the_baseline_is_predicted_with_an_interval():
     assert 0.0 < record["walks_probability"] < 1.0
 
 
+def test_a_walk_backward_is_predicted_backward():
+    prediction = predict_speed(known(), spread_of(known()), library.load("backward").gait, draws=32)
+    low, high = prediction.interval_90_mm_s
+    assert low < prediction.speed_mm_s < high < -20.0
+    assert prediction.holds(prediction.speed_mm_s)
+    assert prediction.walks_probability > 0.9
+
+
 def test_cycles_of_a_slow_clock_are_longer():
     model = known(Scatter())
     fast, slow = (predict_speed(model, spread_of(model), BASELINE, draws=16, clock_rate=r) for r in (1.0, 1.01))
