@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from lacuna.errors import DeclarationError
 from lacuna.system import START_FACTORS, Effect, Parameter
 
 LIMITS = (0.4, 0.7, 0.9, 1.0, 1.2)  # of the inverse of a declared limit: fits begin there, and on both sides of it
@@ -35,21 +36,32 @@ class Coordinate:
         """`p` as it is fitted."""
         lower, upper = sorted(self._end(bound, p.value) for bound in (p.lower, p.upper))
         slope = self.slope(p.value)
-        low, high = sorted(map(self.fitted, p.plausible or (p.value, p.value)))
         return replace(
             p,
             value=self.fitted(p.value),
             lower=lower,
             upper=upper,
-            plausible=None if p.plausible is None else (low, high),
+            plausible=None if p.plausible is None else self._plausible(p, p.plausible, (lower, upper)),
             scale=p.step_scale * slope,
             prior_sd=None if p.prior_sd is None else p.prior_sd * slope,
+            grain=p.grain * slope,
             elsewhere=tuple(map(self.fitted, p.elsewhere)),
         )
 
+    def _plausible(self, p: Parameter, told: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
+        """An end that is infinite here (the logarithm of 0) is where the bound is. Raises DeclarationError."""
+        ends = sorted(self._end(end, p.value) for end in told)
+        low, high = (end if math.isfinite(end) else bound for end, bound in zip(ends, bounds, strict=True))
+        if not -math.inf < low < high < math.inf:
+            raise DeclarationError(
+                f"{p.name}: plausible is {told[0]} to {told[1]}, of which its bounds leave no finite range where it is"
+                " fitted: move the end that is at 0 or beyond"
+            )
+        return low, high
+
     def _end(self, bound: float, value: float) -> float:
-        """The inverse of 0 is infinite, on the value's side."""
-        return self.fitted(math.copysign(0.0, value) if self is INVERSE and bound == 0 else bound)
+        """The inverse of 0, and of what is beyond, is infinite, on the value's side."""
+        return self.fitted(math.copysign(0.0, value) if self is INVERSE and bound * value <= 0 else bound)
 
 
 def _same(value: float) -> float:

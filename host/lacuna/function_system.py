@@ -28,6 +28,7 @@ from lacuna.system import (
     System,
     Theta,
     middle_conditions,
+    several,
 )
 from lacuna.values import Values
 
@@ -57,7 +58,8 @@ class FunctionSystem(System):
     the effect is off; `theta` holds them in the order in which they are declared here. `simulate` returns the predicted
     outputs by name, shape (n,) each; a single output may be a bare array. It is called from several threads.
 
-    `parameters`: `Parameter`s of the base model. `effects`: `Effect`s that it may lack. The rest is optional:
+    `parameters`: `Parameter`s of the base model. `effects`: `Effect`s that it may lack. One alone of these, of
+    nuisances, curves or experiments needs no brackets. The rest is optional:
 
     - `outputs`: names of the columns that `simulate` predicts; all others are its inputs. Needed if it returns bare
       arrays and records have more than one column besides time.
@@ -85,18 +87,18 @@ class FunctionSystem(System):
     def __init__(
         self,
         simulate: Simulate,
-        parameters: Iterable[Parameter],
-        effects: Iterable[Effect] = (),
+        parameters: Iterable[Parameter] | Parameter,
+        effects: Iterable[Effect] | Effect = (),
         *,
         outputs: Sequence[str] | str = (),
         name: str = "",
-        nuisances: Iterable[Parameter] | Callable[[Record], Iterable[Parameter]] = (),
+        nuisances: Iterable[Parameter] | Parameter | Callable[[Record], Iterable[Parameter] | Parameter] = (),
         regressors: Callable[[Record, Channels], Mapping[str, np.ndarray]] | None = None,
         sensor_noise: Mapping[str, float] | None = None,
         accuracy: Mapping[str, float] | None = None,
         noise_time_s: Mapping[str, float] | float | str = 0.0,
-        curves: Iterable[CorrectionSite] = (),
-        experiments: Iterable[CandidateExperiment] = (),
+        curves: Iterable[CorrectionSite] | CorrectionSite = (),
+        experiments: Iterable[CandidateExperiment] | CandidateExperiment = (),
         spare: Iterable[Hashable] | None = None,
         fixed: Mapping[str, float] | None = None,
         tied: Mapping[str, str] | None = None,
@@ -106,9 +108,10 @@ class FunctionSystem(System):
         self.trials: tuple[Record, ...] = ()
         self._last: Any = None  # what `simulate` returned last
         self._refills = False
-        given, library, sites = tuple(parameters), _library(effects), tuple(curves)
+        given, library, sites = several(parameters, Parameter), _library(effects), several(curves, CorrectionSite)
         _check_names([p.name for p in given], "parameter")
         _check_names([e.name for e in library], "effect")
+        _check_names([s.name for s in sites if s.name != LEARNT], "curve")  # which is what a curve may be called
         _all_different([*(p.name for p in given), *(e.name for e in library), *(s.name for s in sites)], "name")
         self.held = Held(dict(fixed or {}), dict(tied or {}))
         self.held.check(given, library)
@@ -117,6 +120,8 @@ class FunctionSystem(System):
             if p.at_least is not None:
                 fitted = [q.name for q in free]
                 _check_known(f"at_least of {p.name}", [p.at_least], fitted, "is no parameter that is fitted")
+        for effect in library:
+            _check_known(f"apart of effect {effect.name}", effect.apart, [p.name for p in given], "is no parameter")
         ordered = {p.name for p in free if p.at_least} | {p.at_least for p in free}
         self._coordinates = {p.name: of_parameter(p, p.name in ordered) for p in free}
         self.parameters = tuple(self._coordinates[p.name].of(p) for p in free)
@@ -132,7 +137,7 @@ class FunctionSystem(System):
                 )
             self._coordinates |= coordinates
             self._off |= effect.typical | dict.fromkeys(effect.size_names, effect.absent)
-        self._nuisances = nuisances if callable(nuisances) else tuple(nuisances)
+        self._nuisances = nuisances if callable(nuisances) else several(nuisances, Parameter)
         self._regressors = regressors or _regressors
         for what, told in (("accuracy", accuracy), ("sensor_noise", sensor_noise), ("noise_time_s", noise_time_s)):
             _check_amounts(what, told, by_output=what != "noise_time_s")
@@ -148,7 +153,8 @@ class FunctionSystem(System):
         self._sites = {site.name: site for site in sites}
         if isinstance(spare, str):
             raise DeclarationError(f"spare is a collection of conditions: write [{spare!r}].")
-        self._experiments, self._spare = tuple(experiments), None if spare is None else frozenset(spare)
+        self._experiments = several(experiments, CandidateExperiment)
+        self._spare = None if spare is None else frozenset(spare)
 
     def __repr__(self) -> str:
         return f"System({self.name!r}, {len(self.parameters)} parameters, {len(self.effects)} effects)"
@@ -160,9 +166,11 @@ class FunctionSystem(System):
         conditions, outputs = {t.condition for t in trials}, {name for t in trials for name in t.channels}
         experiments = {t.experiment for t in trials}
         _check_known("spare", self._spare or (), conditions)
-        for effect in self.effects.values():
-            if not experiments.intersection(effect.experiments):
-                _check_known(f"experiments of effect {effect.name}", effect.experiments, experiments)
+        seen_in = {f"effect {name}": effect.experiments for name, effect in self.effects.items()}
+        seen_in |= {f"curve {name}": site.experiments for name, site in self._sites.items()}
+        for which, named in seen_in.items():
+            if not experiments.intersection(named):
+                _check_known(f"experiments of {which}", named, experiments)
         for what, told in (("accuracy", self._accuracy), ("sensor_noise", self._sensor_noise)):
             _check_known(what, told, outputs)
         if isinstance(self._noise_time_s, Mapping):
@@ -187,12 +195,14 @@ class FunctionSystem(System):
         return self._with(_noise_time_s=dict(seconds), estimates_noise_time=False)
 
     def with_grains(self, grains: Mapping[str, float]) -> FunctionSystem:
-        """The same system, with `Parameter.grain` by full name, as fitted."""
+        """The same system, with `Parameter.grain` by full name, as fitted, where none is declared."""
         effects = {
-            name: replace(e, parameters=tuple(replace(p, grain=grains.get(e.full_name(p), 0.0)) for p in e.parameters))
+            name: replace(
+                e, parameters=tuple(replace(p, grain=p.grain or grains.get(e.full_name(p), 0.0)) for p in e.parameters)
+            )
             for name, e in self.effects.items()
         }
-        parameters = tuple(replace(p, grain=grains.get(p.name, 0.0)) for p in self.parameters)
+        parameters = tuple(replace(p, grain=p.grain or grains.get(p.name, 0.0)) for p in self.parameters)
         return self._with(parameters=parameters, effects=effects)
 
     # -- in the person's parameters ---------------------------------------------------------------------------
@@ -317,10 +327,19 @@ class FunctionSystem(System):
         return found if alike else _failed(trial)
 
     def nuisances(self, trial: Record) -> tuple[Parameter, ...]:
-        return tuple(self._nuisances(trial)) if callable(self._nuisances) else self._nuisances
+        given = self._nuisances
+        found = _told_by("nuisances", trial, lambda: several(given(trial), Parameter)) if callable(given) else given
+        for p in found:
+            if p.name in self._off or p.name in self._sites:
+                raise DeclarationError(f"trial {trial.name}: its nuisance {p.name} has the name of another parameter.")
+        return found
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
-        found = {name: np.asarray(column) for name, column in self._regressors(trial, prediction).items()}
+        found = _told_by(
+            "regressors",
+            trial,
+            lambda: {name: np.asarray(column) for name, column in self._regressors(trial, prediction).items()},
+        )
         for name, column in found.items():
             if column.shape != trial.time_s.shape or column.dtype.kind not in "fiub":
                 raise DeclarationError(
@@ -353,6 +372,16 @@ class FunctionSystem(System):
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
         return self._experiments
+
+
+def _told_by(what: str, trial: Record, ask: Callable[[], Any]) -> Any:
+    """What a function of the user's says of a record. Raises MisuseError where it fails."""
+    try:
+        return ask()
+    except LacunaError:
+        raise
+    except Exception as error:
+        raise MisuseError(f"trial {trial.name}: its {what} raise {type(error).__name__}: {error}") from error
 
 
 def _copy(found: Any) -> Any:
@@ -390,14 +419,14 @@ def _is_same(one: Any, other: Any) -> bool:
     return not isinstance(one, np.ndarray) or (isinstance(other, np.ndarray) and one.tobytes() == other.tobytes())
 
 
-def _library(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+def _library(effects: Iterable[Effect] | Effect) -> tuple[Effect, ...]:
     """`effects` given as a sequence, or as the mapping that the engine uses."""
     if isinstance(effects, Mapping):
         for key, effect in effects.items():
             if key != effect.name:
                 raise DeclarationError(f"effect {effect.name} is listed under the key {key}: use its name as the key.")
         effects = effects.values()
-    found = tuple(effects)
+    found = several(effects, Effect)
     _all_different([e.name for e in found], "effect")
     return found
 

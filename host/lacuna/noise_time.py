@@ -30,7 +30,7 @@ def left_over_s(diagnosis: Diagnosis) -> dict[str, float]:
             traces[key].append(evenly(trial.time_s, residual / max(float(np.std(known)), 1e-300)))
             periods[key].append(sample_period(trial.time_s))
     for (experiment, channel), members in traces.items():
-        if diagnosis.search.floor.channels[experiment, channel].repeats:
+        if diagnosis.search.floor.of(experiment, channel).repeats:
             continue
         samples = correlation_samples(members)  # of exponential memory: twice the correlation time
         period = float(np.median(periods[experiment, channel]))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import re
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 from lacuna.decimals import number
 from lacuna.errors import LacunaError, listed
 from lacuna.system import Record
+from lacuna.values import plain
 
 _TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # of a second
 _LABELS = ("name", "experiment", "condition", "order")
@@ -51,7 +53,7 @@ class Table:
         return Record(
             name=self.name,
             experiment=str(self.labels.get("experiment", "run")),
-            condition=_plain(self.labels.get("condition", self.name)),
+            condition=plain(self.labels.get("condition", self.name)),
             time_s=self.time_s,
             channels={name: _samples(self.columns[name], self.name, name) for name in outputs},
             session_order=_whole(self.labels.get("order"), self.name),
@@ -130,7 +132,8 @@ def _table(data: Any, name: str) -> Record | Table:
 
 
 def _of_columns(data: Any, name: str) -> Table:
-    columns, labels, time_s = _columns(data, name)
+    columns, attrs, time_s = _columns(data, name)
+    labels = {label: attrs.pop(label) for label in _LABELS if label in attrs}
     for label in _LABELS:
         if label in columns:
             labels[label] = _single(columns.pop(label), name, label)
@@ -142,12 +145,13 @@ def _of_columns(data: Any, name: str) -> Table:
             f"record {name} has no times: give a column time_s, in seconds. It has {listed(columns, _MOST_NAMED)}."
         )
     name = str(labels.get("name", name))
-    inputs = {n: _own(c, name, n) for n, c in columns.items()}
+    singles = {str(n): value for n, value in attrs.items() if isinstance(value, Real | np.bool_ | str)}
+    inputs = {n: _own(c, name, n) for n, c in (singles | columns).items()}
     return Table(name, _seconds(time_s, name) / _TIMES.get(clock, 1), inputs, labels, clock)
 
 
 def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
-    """Columns, labels, and what the index says of time."""
+    """Columns, attributes, and what the index says of time."""
     if _is_pandas(data):
         names = [str(c) for c in data.columns]
         if twice := [n for n in names if names.count(n) > 1]:
@@ -235,10 +239,6 @@ def _single(column: Any, record: str, label: str) -> Any:
     if len(set(cells.tolist())) != 1:
         raise RecordError(f"record {record}: its {label} differs from sample to sample; it must have one.")
     return cells[0]
-
-
-def _plain(label: Any) -> Hashable:
-    return label.item() if isinstance(label, np.generic) else label
 
 
 def _whole(order: Any, record: str) -> int | None:
@@ -483,7 +483,7 @@ def segments(data: Any, count: int = 10) -> list[Table]:
 
 def falling(time_s: np.ndarray) -> str:
     """Where times do not increase, in words; empty where they do."""
-    at = np.flatnonzero(~(np.diff(time_s) > 0.0))
+    at = np.flatnonzero(~(time_s[1:] > time_s[:-1]))  # a difference of unsigned integers is never negative
     if not len(at):
         return ""
     before, after = time_s[at[0] : at[0] + 2]

@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def diagnose(
     records: Any = None,
     *,
     seed: int = 0,
-    random_state: int | np.random.Generator | None = None,
+    random_state: int | np.random.Generator | np.random.RandomState | None = None,
     test: Iterable[str] = (),
     starts: int = 1,
     n_jobs: int | None = None,
@@ -65,7 +66,7 @@ def diagnose(
     if names := tuple(test):
         system = _tested_on(system, names)
     if random_state is not None:
-        seed = random_state if isinstance(random_state, int) else int(random_state.integers(2**32))
+        seed = _seed(random_state)
     shown = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
 
     def reported(what: str) -> None:
@@ -99,6 +100,18 @@ def diagnose(
     verdict = Verdict(system, found)
     _log.info("%s: %r", system.name, verdict)
     return verdict
+
+
+def _seed(random_state: Any) -> int:
+    """A number, or the next one that a generator draws. Raises MisuseError."""
+    if isinstance(random_state, np.random.RandomState):
+        return int(random_state.randint(2**32, dtype=np.int64))
+    if isinstance(random_state, np.random.Generator):
+        return int(random_state.integers(2**32))
+    try:
+        return index(random_state)
+    except TypeError:
+        raise MisuseError(f"random_state is {random_state!r}: give a whole number, or NumPy's generator.") from None
 
 
 def _in_steps(system: System) -> tuple[System, list[str]]:

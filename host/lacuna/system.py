@@ -32,15 +32,15 @@ class Parameter:
     """One number to be estimated.
 
     `value` is where the search starts; `lower` and `upper` bound it. `plausible` is the narrower range of
-    reasonable values (None: not known): a fit that leaves it is evidence against the model,
+    reasonable values, both ends finite (None: not known): a fit that leaves it is evidence against the model,
     not an error. `scale` is the change of the parameter that matters, in its own unit: derivatives step by
     a small fraction of it (never relative to the value, which may be 0). For a nuisance it is the standard
     deviation of its spread. `prior_sd`: standard deviation of its prior, around `value`; None: no prior.
-    `at_least` names another parameter that it cannot be below. `elsewhere`: further initial values for graduated
-    fits, for a parameter whose isolating trials fit equally well at several values. `factor_of`: of a nuisance, the
-    parameters that it multiplies in its trial; its derivatives are theirs then, to the last digit, and data do not
-    seem to tell a change of all trials' factors from one of the parameters. `grain`: the least change that changes a
-    prediction, where a model counts (a delay in whole samples): derivatives step as far at least. `periodic`:
+    `at_least`, of the base model, names another parameter that it cannot be below. `elsewhere`: further initial values
+    for graduated fits, for a parameter whose isolating trials fit equally well at several values. `factor_of`: of a
+    nuisance, the parameters that it multiplies in its trial; its derivatives are theirs then, to the last digit, and
+    data do not seem to tell a change of all trials' factors from one of the parameters. `grain`: the least change that
+    changes a prediction, where a model counts (a delay in whole samples): derivatives step as far at least. `periodic`:
     of an effect's own parameter, `lower` and `upper` mean the same and are no bounds (a phase). `prior_from_trials`:
     what is known of it beforehand comes from the trials that are fitted, by a base model that knew of no effect; it
     guides the search, and stands back where the parameters are finally told.
@@ -70,6 +70,8 @@ class Parameter:
             raise DeclarationError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
         if not self.lower <= self.value <= self.upper:
             raise DeclarationError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
+        if self.plausible is not None and not _is_range(self.plausible):
+            raise DeclarationError(f"{self.name}: plausible is {self.plausible!r}: give two numbers, the lower first")
 
     @property
     def step_scale(self) -> float:
@@ -77,6 +79,18 @@ class Parameter:
         if self.scale is not None:
             return self.scale
         return 0.1 * (abs(self.value) or min(self.upper - self.lower, 1e6))
+
+
+def _is_range(given: Any) -> bool:
+    """Whether these are two finite numbers, the lower first."""
+    if np.shape(given) != (2,) or not all(isinstance(end, Real) for end in given):
+        return False
+    return bool(-np.inf < given[0] < given[1] < np.inf)
+
+
+def several(given: Any, kind: type) -> tuple[Any, ...]:
+    """What was given as some of a kind, or as one of it without brackets."""
+    return (given,) if isinstance(given, kind) else tuple(given)
 
 
 @dataclass(frozen=True)
@@ -89,7 +103,8 @@ class Effect:
     sizes times each of `start_factors` (and with the other sign, where the bounds allow it). `enters` names
     the term of the model that changes ("body spring", "pressure sensor"), `experiments` those in which it
     can be visible (empty: all). `own` are parameters with a separate value in every trial (a phase): they
-    are fitted trial by trial, from the best of several values over their range. `frequency` names the
+    are fitted trial by trial, from the best of several values over their range; one without a `scale` may lie anywhere
+    in it. `frequency` names, as it is called in the effect, the
     parameter that is a frequency, in Hz: fits start at the peaks of the residual's spectrum, since from
     anywhere else they would not converge to it. `freed_at`: correction sites where this mechanism may act in another
     form than its formula's; a curve there is tried before another effect is called in. `apart`: base parameters
@@ -114,10 +129,20 @@ class Effect:
 
     def __post_init__(self) -> None:
         for each in ("parameters", "own"):
-            given = getattr(self, each)
-            object.__setattr__(self, each, (given,) if isinstance(given, Parameter) else tuple(given))
+            object.__setattr__(self, each, several(getattr(self, each), Parameter))
         if not 1 <= self.sizes <= len(self.parameters):
             raise DeclarationError(f"effect {self.name}: `sizes` is {self.sizes}, of {len(self.parameters)} parameters")
+        names = [p.name for p in self.parameters]
+        if self.frequency is not None and self.frequency not in names:
+            raise DeclarationError(
+                f"effect {self.name}: `frequency` is {self.frequency!r}, which is none of {', '.join(names)}"
+            )
+        for p in (*self.parameters, *self.own):
+            if p.at_least is not None:
+                raise DeclarationError(
+                    f"effect {self.name}: {p.name} has `at_least`, which is for base parameters: declare the difference"
+                    f" to {p.at_least} instead"
+                )
 
     def full_name(self, parameter: Parameter) -> str:
         return f"{self.name}.{parameter.name}"

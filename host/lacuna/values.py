@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+
+def plain(value: Any) -> Any:
+    """Numbers of NumPy as Python's own."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+
 
 class Values(dict[str, Any]):
     """A dict whose entries are attributes as well: `theta["mass_kg"]` is `theta.mass_kg`, `theta["coulomb.force_N"]` is

@@ -47,8 +47,12 @@ class CompletedModel:
         values = system.values(fitted, self._corrections)
         if unknown := set(given) - set(values):
             raise MisuseError(f"no parameter {', '.join(sorted(unknown))}; there are {', '.join(values)}.")
+        if held := [name for name in given if name in system.held]:
+            raise MisuseError(f"{held[0]} is fixed or tied, so it cannot be given: declare the system without that.")
+        values |= given
+        system.held.fill(values)
         try:
-            return system.simulated(record, Values(values | given))
+            return system.simulated(record, values)
         except KeyError as error:  # of a record, or of the model's own
             raise MisuseError(f"the model finds no {error.args[0]}.") from error
 
@@ -58,7 +62,10 @@ class CompletedModel:
 
 def _one(record: Any, outputs: tuple[str, ...]) -> Record:
     """A record, whichever form it has; outputs that it lacks have yet to be predicted."""
-    (found,) = read(record)
+    given = read(record)
+    if len(given) != 1:
+        raise MisuseError(f"the model is called with one record, not {len(given)}: call it with each of them.")
+    found = given[0]
     if isinstance(found, Record):
         return found
     return stretched(found, found.record([name for name in outputs if name in found.columns]), outputs)
@@ -102,7 +109,8 @@ class Verdict:
         return _written(path, render(diagnosis_page(self.system.name, self.record, self.diagnosis)))
 
     def to_frame(self, what: str = "parameters") -> Any:
-        """A pandas DataFrame: the `parameters` of the completed model with their 90 % intervals, or the explanations
+        """A pandas DataFrame: the `parameters` of the completed model with their 90 % intervals (where a curve was
+        learnt: the intervals of the explanation without it, so that a value may lie outside), or the explanations
         `compared`: by how much log-likelihood each is worse than the chosen one where nothing was fitted, the standard
         error of that, and its weight. Raises MisuseError for another word."""
         return _frame(self.record, self.theta, what)
@@ -111,7 +119,7 @@ class Verdict:
         """Write the verdict as JSON, to be read again with `lacuna.load`; return its path. The completed model is a
         function of yours with the values in `theta`."""
         kept = {"system": self.system.name, "record": self.record, "theta": dict(self.theta), "text": str(self)}
-        return _written(path, json.dumps(kept, indent=1))
+        return _written(path, json.dumps(kept, indent=1, default=float))
 
     def plot(self) -> Any:
         """A Matplotlib figure: error before and after, what was tried, and the worst predicted held-out records."""

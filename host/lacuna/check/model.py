@@ -11,6 +11,7 @@ from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.system import Channels, Record, System, Theta
 
 _NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent
+_ELSEWHERE = 0.03  # the same in an experiment where it need not be looked for, since it hardly acts
 _NEAR_ABSENT = 0.1  # of its typical size: how near the absent one an effect may come at least
 
 
@@ -32,8 +33,11 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
         )
     good = [t for t in trials if t.name not in failed]
     _check_deterministic(system, start, good[0], predictions)
-    system.regressors(good[0], predictions[good[0].name])
+    for trial in good:
+        system.regressors(trial, predictions[trial.name])
     _check_effects(system, start, good, predictions)
+    for offer in system.candidate_experiments():
+        predicted(system, start, (), offer.trial)
     warnings = (
         [f"With its parameters at their initial values the model cannot predict {listed(failed)}."] if failed else []
     )
@@ -89,20 +93,23 @@ def _check_deterministic(system: System, start: Theta, trial: Record, prediction
 
 
 def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:
-    """An effect at the size at which it is absent leaves the base model's prediction unchanged."""
+    """An effect at the size at which it is absent leaves the base model's prediction unchanged, and at its typical size
+    hardly changes it in other experiments than its own."""
     firsts = {t.experiment: t for t in reversed(trials)}
     for name, effect in system.effects.items():
         off = effect.typical | dict.fromkeys(effect.size_names, effect.absent)
         for trial in firsts.values():
-            if not effect.shows_in(trial):
-                continue
-            found = predicted(system, dict(start) | off, (name,), trial)
+            if effect.shows_in(trial):
+                theta, share, why = off, _NEUTRAL, f"its size is {effect.absent:g}, at which it is declared absent."
+            else:
+                theta, share = effect.typical, _ELSEWHERE
+                why = f"{trial.experiment} is none of its `experiments`: name that one, too."
+            found = predicted(system, dict(start) | theta, (name,), trial)
             for channel in trial.channels:
-                limit = _NEUTRAL * spread(trial.channels[channel])
+                limit = share * spread(trial.channels[channel])
                 if differ(found[channel], predictions[trial.name][channel], limit):
                     raise MisuseError(
-                        f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although its size"
-                        f" is {effect.absent:g}, at which it is declared absent."
+                        f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although {why}"
                     )
 
 

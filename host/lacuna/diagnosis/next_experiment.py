@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate
-from lacuna.estimation.noise import ChannelNoise, NoiseFloor
+from lacuna.estimation.noise import NoiseFloor
 from lacuna.system import CandidateExperiment, Channels
 
 _TELLS_APART = 5.0  # log-likelihood
@@ -53,17 +53,9 @@ def _predict(candidate: Candidate, offer: CandidateExperiment) -> Channels:
 
 def expected_gain(a: Channels, b: Channels, offer: CandidateExperiment, floor: NoiseFloor) -> float:
     """Half the squared difference in standard deviations, thinned to independent pieces."""
-    total = 0.0
-    for channel in a:
-        noise = _noise_of(offer.experiment, channel, floor)
-        if noise is None:
-            continue
+    total, known = 0.0, {channel for _, channel in floor.channels}
+    for channel in (c for c in a if c in known):
+        noise = floor.of(offer.experiment, channel)
         z = np.abs(a[channel] - b[channel]) / noise.sd
         total += 0.5 * float(np.nansum(np.minimum(z, 10.0) ** 2)) / noise.samples_per_piece
     return total
-
-
-def _noise_of(experiment: str, channel: str, floor: NoiseFloor) -> ChannelNoise | None:
-    """In an experiment that was never run, the most that the channel has had in others; None if it is in none."""
-    known = {key[0]: noise for key, noise in floor.channels.items() if key[1] == channel}
-    return known.get(experiment) or max(known.values(), key=lambda noise: noise.per_piece, default=None)

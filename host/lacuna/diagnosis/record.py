@@ -8,6 +8,7 @@ from typing import Any
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.residual_error import Error, Floor
 from lacuna.system import Correction, CorrectionSite
+from lacuna.values import plain
 
 FORMAT = 2
 _TRIED = 8  # explanations listed, the best first
@@ -71,7 +72,7 @@ def as_record(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": {
             "separates": list(d.next.separates),
             "experiment": d.next.experiment,
-            "settings": dict(d.next.settings),
+            "settings": {name: plain(value) for name, value in d.next.settings.items()},
         },
         "seconds": _number(d.seconds),
     }

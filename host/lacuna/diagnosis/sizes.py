@@ -51,7 +51,8 @@ def _at_peaks(parent: Fit, structure: Structure, effect: Effect, vector: np.ndar
     parameter = structure.parameters[index]
     problem = parent.problem
     found = []
-    for frequency in peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS):
+    prominent = peaks(problem.trials, parent.scaled_residuals(), parameter.lower, parameter.upper, _PEAKS)
+    for frequency in prominent or [parameter.value]:  # a range that no record resolves has no peaks
         moved = vector.copy()
         moved[index] = frequency
         found.append(moved)

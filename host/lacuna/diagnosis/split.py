@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
+from lacuna.errors import MisuseError, TooLittleDataError, listed
 from lacuna.system import Record, groups_of_repeats
 
 
@@ -51,7 +52,7 @@ def split_trials(
     trials: Sequence[Record], spare: Collection[tuple[str, Hashable]] = (), test: Collection[str] = ()
 ) -> Split:
     """Split by whole trials; deterministic. `test`: names of the trials that are `final`, if the person says which;
-    what would be otherwise selects then.
+    what would be otherwise selects then. Raises MisuseError where the others cannot be fitted and judge.
 
     `spare`: (experiment, condition) of those that are never fitted: the last repeat of each is `final`, the others are
     `unseen`. Of three or more repeats of any other condition a third goes to `final` and a third to `select`, which
@@ -80,6 +81,8 @@ def split_trials(
     if test:
         parts["select"] += parts["final"]
         parts["final"] = [t for t in trials if t.name in test]
+        _check_test(**parts)
+        return _split(trials, parts)
     known = {key for role in ("fit", "select", "unseen") for trial in parts[role] for key in _channels(trial)}
     alone = [trial for trial in parts["final"] if not _channels(trial) <= known]
     if not (parts["select"] or parts["unseen"] or alone):
@@ -87,6 +90,26 @@ def split_trials(
     for trial in alone:
         parts["final"].remove(trial)
         parts["fit"].append(trial)
+    return _split(trials, parts)
+
+
+def _check_test(fit: list[Record], select: list[Record], unseen: list[Record], final: list[Record]) -> None:
+    """A test informs nothing, so others have to be fitted and to judge, and to tell how noisy its channels are."""
+    if not fit or not (select or unseen):
+        raise TooLittleDataError(
+            f"test names {listed(t.name for t in final)}: of the other records none is left to"
+            f" {'judge explanations by' if fit else 'be fitted'}. Leave one of them out of the test, or measure more."
+        )
+    known = {channel for trial in (*fit, *select, *unseen) for channel in trial.channels}
+    for trial in final:
+        if alone := trial.channels.keys() - known:
+            raise MisuseError(
+                f"test names {trial.name}, but no other record has {listed(sorted(alone))}, to say how noisy it is:"
+                " leave it out of the test."
+            )
+
+
+def _split(trials: Sequence[Record], parts: Mapping[str, list[Record]]) -> Split:
     order = {trial.name: k for k, trial in enumerate(trials)}
     return Split(**{role: tuple(sorted(ts, key=lambda t: order[t.name])) for role, ts in parts.items()})
 

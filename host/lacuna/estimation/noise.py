@@ -60,9 +60,16 @@ class NoiseFloor:
 
     channels: Mapping[tuple[str, str], ChannelNoise]
 
+    def of(self, experiment: str, channel: str) -> ChannelNoise:
+        """In an experiment that informs nothing, the most that the channel has in others."""
+        if (experiment, channel) in self.channels:
+            return self.channels[experiment, channel]
+        others = (noise for (_, known), noise in self.channels.items() if known == channel)
+        return max(others, key=lambda noise: noise.per_piece)
+
     def sd(self, trial: Record, channel: str) -> np.ndarray:
         """Standard deviation of each sample of a trial, shape (n,): grows where the record moves fast."""
-        noise = self.channels[trial.experiment, channel]
+        noise = self.of(trial.experiment, channel)
         if noise.jitter_s == 0:
             return np.full(trial.time_s.shape, noise.sd)
         samples = _smooth(trial.channels[channel])
@@ -84,7 +91,7 @@ class NoiseFloor:
         return min(n.per_piece / other.channels[k].per_piece for k, n in self.channels.items())
 
     def samples_per_piece(self, trial: Record, channel: str) -> float:
-        return self.channels[trial.experiment, channel].samples_per_piece
+        return self.of(trial.experiment, channel).samples_per_piece
 
 
 def estimate_noise(

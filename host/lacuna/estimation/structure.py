@@ -43,9 +43,9 @@ class Structure:
         return (*self.system.nuisances(trial), *self.own(trial))
 
     def own(self, trial: Record) -> tuple[Parameter, ...]:
-        """The effects' parameters of which this trial has its own value."""
+        """The effects' parameters of which this trial has its own value: anywhere, if nothing is said of its spread."""
         return tuple(
-            replace(p, name=effect.full_name(p))
+            replace(p, name=effect.full_name(p), scale=p.scale or 0.25 * (p.upper - p.lower))
             for effect in (self.system.effects[name] for name in self.effects)
             if effect.shows_in(trial)
             for p in effect.own

@@ -18,7 +18,7 @@ def measured_rows(diagnosis: Diagnosis) -> list[Row]:
             groups[trial.experiment, channel].append(trial)
     rows = []
     for (experiment, channel), trials in groups.items():
-        noise = diagnosis.search.floor.channels[experiment, channel]
+        noise = diagnosis.search.floor.of(experiment, channel)
         conditions = len({t.condition for t in trials})
         basis = _pairs(noise.repeats) if noise.repeats else "the fast noise of the residual"
         piece = f"{noise.samples_per_piece:.3g}"

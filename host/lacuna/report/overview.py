@@ -70,7 +70,7 @@ def held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels
     before, after = (evaluate_on(fit, trials).predictions() for fit in (diagnosis.base, diagnosis.final))
     found = []
     for trial, first, last in zip(trials, before, after, strict=True):
-        floor = {c: diagnosis.search.floor.channels[trial.experiment, c].sd for c in trial.channels}
+        floor = {c: diagnosis.search.floor.of(trial.experiment, c).sd for c in trial.channels}
         error = {c: _rms(trial.channels[c] - first[c]) / floor[c] for c in trial.channels}
         worst = max(error, key=error.__getitem__)
         found.append((error[worst], (trial, worst, first, last, floor[worst])))

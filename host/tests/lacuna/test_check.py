@@ -12,9 +12,9 @@ import lacuna
 from lacuna.check import check
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.errors import DeclarationError, MisuseError, TooLittleDataError
-from lacuna.records import RecordError
+from lacuna.records import RecordError, falling
 from lacuna.run import with_records
-from lacuna.system import Effect, Parameter, Record, System
+from lacuna.system import CandidateExperiment, CorrectionSite, Effect, Parameter, Record, System
 
 T = np.linspace(0.0, 1.0, 101)
 DRAW = np.random.default_rng(0)
@@ -490,3 +490,61 @@ def test_a_model_may_return_one_array_again_and_again():
         found.append(lacuna.diagnose(system, given, progress=False))
     assert found[0].record["verdict"] == found[1].record["verdict"] == "identified"
     assert found[0].theta == found[1].theta
+
+
+# -- declarations that would lead nowhere -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("frequency", ["f", "hum.f_Hz"])
+def test_refuses_a_frequency_that_is_no_parameter_of_the_effect(frequency):
+    with pytest.raises(DeclarationError, match=f"hum: `frequency` is '{frequency}', which is none of size, f_Hz"):
+        Effect("hum", (replace(BEND, name="size"), Parameter("f_Hz", "Hz", 2.0, 0.5, 10.0)), frequency=frequency)
+
+
+def test_refuses_an_order_within_an_effect():
+    with pytest.raises(DeclarationError, match="stick: high has `at_least`, which is for base parameters"):
+        Effect("stick", (BEND, Parameter("high", "", 2.0, 0.5, 10.0, at_least="low")))
+
+
+@pytest.mark.parametrize("plausible", [(2.0, 1.0), (0.5, math.inf), (math.nan, 1.0), (1.0,), 1.0, ("1", "2")])
+def test_refuses_a_plausible_range_that_is_none(plausible):
+    with pytest.raises(DeclarationError, match=r"gain: plausible is .*: give two numbers, the lower first"):
+        Parameter("gain", "", 1.0, 0.1, 5.0, plausible=plausible)
+
+
+def test_refuses_to_part_what_is_no_parameter():
+    with pytest.raises(DeclarationError, match="apart of effect bend names 'slop', which is no parameter"):
+        lacuna.System(heater.simulate, heater.PARAMETERS, Effect("bend", BEND, apart=("slop",)))
+
+
+def test_refuses_curves_in_experiments_that_are_none_and_of_names_with_a_dot():
+    site = CorrectionSite("loss", "loss", "temperature (K)", "W", 0.0, 9.0, 0.1, experiments=("rum",))
+    with pytest.raises(DeclarationError, match=r"experiments of curve loss names 'rum'.*there are run"):
+        with_records(heater.system(curves=site), heater.records(1))
+    with pytest.raises(DeclarationError, match=r"curve 'loss\.left': choose another name, without a dot"):
+        heater.system(curves=replace(site, name="loss.left"))
+
+
+def test_refuses_an_effect_that_acts_in_other_experiments_than_its_own():
+    first, *others = Line().trials
+    bend = Effect("bend", BEND, experiments=("pull",))
+    with pytest.raises(MisuseError, match=r"run 0, channel y: effect bend .* push is none of its `experiments`"):
+        check(Line(effects={"bend": bend}, trials=(replace(first, experiment="push"), *others)))
+
+
+def test_refuses_an_experiment_on_offer_that_the_model_cannot_predict():
+    record = with_records(heater.system(), heater.records(1)).trials[0]
+    offer = CandidateExperiment("steps", {}, replace(record, name="longer", inputs={}))
+    with pytest.raises(MisuseError, match="trial longer, channel temperature_K: the model raises KeyError"):
+        check(with_records(heater.system(experiments=[offer]), heater.records(2)))
+
+
+@pytest.mark.parametrize("which", ["nuisances", "regressors"])
+def test_a_function_that_fails_is_told_with_its_record(which):
+    system = heater.system(**{which: lambda record, *_: record["nope"]})
+    with pytest.raises(MisuseError, match=f"steps_4W_1: its {which} raise KeyError: 'nope: record"):
+        lacuna.diagnose(system, heater.records(2), progress=pytest.fail)
+
+
+def test_unsigned_times_may_not_fall_either():
+    assert falling(np.array([0, 1, 2, 1, 3], np.uint32)).startswith("time does not increase from sample 2 (2 s)")

@@ -8,12 +8,14 @@ import pytest
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.errors import MisuseError
+from lacuna.errors import DeclarationError, MisuseError
+from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.records import Table, segments, stretched
 from lacuna.run import with_records
+from lacuna.system import CorrectionSite
 
 FAR = 1.3  # a gain from which the model fails
 
@@ -99,3 +101,35 @@ def test_records_that_the_model_cannot_predict_are_structure():
     verdict = lacuna.diagnose(system, heater.records(), progress=False)
     assert verdict.verdict == "unexplained"
     assert "could not predict" in " ".join(verdict.warnings)
+
+
+def test_one_alone_needs_no_brackets():
+    gain, tau = heater.PARAMETERS
+    site = CorrectionSite("loss", "loss", "temperature (K)", "W", 0.0, 9.0, 0.1)
+    system = lacuna.System(heater.simulate, gain, heater.SENSOR, outputs="temperature_K", nuisances=tau, curves=site)
+    trial = with_records(system, heater.records(1)).trials[0]
+    assert [p.name for p in system.parameters] == ["gain_K_W"]
+    assert list(system.effects) == ["sensor_lag"]
+    assert system.nuisances(trial) == (tau,)
+    assert list(system.correction_sites) == ["loss"]
+
+
+@pytest.mark.parametrize(
+    ("plausible", "fitted"), [((0.0, 2.0), (0.1, 2.0)), ((0.5, 9.0), (0.5, 9.0)), ((-1.0, 2.0), (0.1, 2.0))]
+)
+def test_a_plausible_range_from_0_begins_at_the_bound_of_what_is_fitted_by_its_logarithm(plausible, fitted):
+    system = lacuna.System(heater.simulate, Parameter("gain_K_W", "K/W", 1.0, 0.1, 5.0, plausible=plausible))
+    assert system.parameters[0].plausible == pytest.approx(np.log(fitted))
+    structure = Structure(system)
+    drawn = [values[0] for values in spread_starts(structure, structure.start(), 20, 0)]
+    assert np.log(0.1) <= min(drawn) < max(drawn) <= np.log(5.0)
+
+
+def test_a_plausible_range_of_a_limit_has_an_end_where_its_inverse_has_one():
+    def limited(lower):
+        limit = Parameter("limit_W", "W", 8.0, lower, 99.0, plausible=(0.0, 20.0))
+        return heater.system(Effect("saturation", limit, absent=np.inf)).effects["saturation"].parameters[0]
+
+    assert limited(1.0).plausible == (0.05, 1.0)
+    with pytest.raises(DeclarationError, match=r"limit_W: plausible is 0\.0 to 20\.0, of which its bounds leave no"):
+        limited(0.0)

@@ -71,3 +71,9 @@ def test_a_delay_in_whole_samples_is_named_alone_and_pointed_out(delay_s):
     lower, upper = effect.interval["delay_s"]
     assert lower < delay_s < upper < lower + 2.0 * SAMPLE_S
     assert any("delay.delay_s changes predictions only in steps, of about 0.1" in one for one in found.warnings)
+
+
+def test_a_declared_grain_stays():
+    declared = Parameter("tau_s", "s", 1.0, 0.1, 10.0, grain=0.25)
+    system = lacuna.System(lambda record, theta: record, [PARAMETERS[0], declared])
+    assert [p.grain for p in system.with_grains({"gain": 0.5, "tau_s": 0.5}).parameters] == [0.5, 0.25]

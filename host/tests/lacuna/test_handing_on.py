@@ -2,13 +2,17 @@
 
 import json
 import logging
+from dataclasses import replace
 
 import heater
 import numpy as np
 import pytest
 
 import lacuna
+from lacuna.diagnosis.next_experiment import NextExperiment
+from lacuna.diagnosis.record import as_record
 from lacuna.diagnosis.split import split_trials
+from lacuna.errors import MisuseError
 from lacuna.system import Record
 
 
@@ -65,12 +69,20 @@ def test_a_random_state_is_a_seed(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("lacuna.run.engine.diagnose", seen)
-    given = [{"seed": 3}, {"random_state": 3}, {"random_state": np.random.default_rng(0)}]
-    for how in (*given, given[-1] | {"random_state": np.random.default_rng(0)}):
+    given = [
+        3,
+        np.int64(3),
+        *(np.random.default_rng(0) for _ in range(2)),
+        *(np.random.RandomState(0) for _ in range(2)),
+    ]
+    for how in ({"seed": 3}, *({"random_state": state} for state in given)):
         with pytest.raises(KeyboardInterrupt):
             lacuna.diagnose(heater.system(), heater.records(repeats=2), progress=False, **how)
-    assert seeds[0] == seeds[1] == 3
-    assert seeds[2] == seeds[3]
+    assert seeds[0] == seeds[1] == seeds[2] == 3
+    assert seeds[3] == seeds[4]
+    assert seeds[5] == seeds[6]
+    with pytest.raises(MisuseError, match="random_state is 'now'"):
+        lacuna.diagnose(heater.system(), heater.records(repeats=2), progress=False, random_state="now")
 
 
 def test_a_person_says_which_records_are_the_test():
@@ -87,3 +99,12 @@ def test_a_person_says_which_records_are_the_test():
     assert {*held_out["repeats"], *held_out["conditions"]} == {"steps_4W_2", "sweep_10W_3"}
     with pytest.raises(lacuna.LacunaError, match="no record is called"):
         lacuna.diagnose(heater.system(), given, test=["steps_5W_1"], progress=False)
+
+
+def test_numbers_of_numpy_are_written_as_plain_ones(tmp_path):
+    held = heater.system(fixed={"tau_s": np.int64(15)})
+    found = lacuna.diagnose(held, heater.records(seed=2, repeats=2), progress=False)
+    assert lacuna.load(found.save(tmp_path / "verdict.json")).theta.tau_s == 15
+    following = NextExperiment(("a", "b"), "steps", {"size_W": np.int64(4), "times_s": np.arange(2)})
+    record = as_record(replace(found.diagnosis, next=following))
+    assert json.loads(json.dumps(record))["next_experiment"]["settings"] == {"size_W": 4, "times_s": [0, 1]}

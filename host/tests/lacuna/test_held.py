@@ -1,12 +1,19 @@
 """Parameters that are fixed or tied: what the model is given, what is told of them, and what is refused."""
 
+from dataclasses import replace
+
 import heater
 import numpy as np
 import pytest
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.errors import DeclarationError
+from lacuna.errors import DeclarationError, MisuseError
+from lacuna.estimation.fit import fit
+from lacuna.estimation.noise import estimate_noise
+from lacuna.estimation.structure import Structure
+from lacuna.system import Record
+from lacuna.verdict import CompletedModel
 
 SPREAD = Effect(
     "spread", (Parameter("size", "", 0.2, -1.0, 1.0), Parameter("at_W", "W", 5.0, 1.0, 20.0)), equation="size, at"
@@ -70,3 +77,28 @@ def test_an_order_needs_both_to_be_fitted():
     upper = Parameter("mu_s", "", 0.3, 0.0, 1.0, at_least="mu_k")
     with pytest.raises(DeclarationError, match="at_least of mu_s names 'mu_k', which is no parameter that is fitted"):
         lacuna.System(lambda record, theta: record, [lower, upper], fixed={"mu_k": 0.2})
+
+
+def test_a_completed_model_ties_again_what_is_tied_and_takes_nothing_that_is_held():
+    def simulate(record, theta):
+        return {"y": theta.left * np.sin(record.time_s) + theta.right * np.cos(record.time_s) + theta.known}
+
+    parameters = [Parameter(name, "", 1.0, 0.1, 5.0) for name in ("left", "right", "known")]
+    time_s = np.linspace(0.0, 10.0, 101)
+    trials = tuple(Record(f"{k}", "run", "c", time_s, {"y": np.sin(time_s) + 0.1 * k}) for k in range(3))
+    system = lacuna.System(simulate, parameters, tied={"right": "left"}, fixed={"known": 1.0}).with_trials(trials)
+    model = CompletedModel(system, fit(Structure(system), trials, estimate_noise(system, trials)))
+    assert model(trials[0], {"left": 3.0})["y"][0] == 4.0
+    for name in ("right", "known"):
+        with pytest.raises(MisuseError, match=f"{name} is fixed or tied"):
+            model(trials[0], {name: 3.0})
+    with pytest.raises(MisuseError, match="called with one record, not 3"):
+        model(trials)
+
+
+def test_a_nuisance_of_the_name_of_a_fixed_parameter_is_refused():
+    rest = Parameter("rest_K", "K", 0.0, -1.0, 1.0)
+    parameters, nuisance = (*heater.PARAMETERS, rest), replace(rest, scale=0.1)
+    system = lacuna.System(heater.simulate, parameters, fixed={"rest_K": 0.0}, nuisances=nuisance)
+    with pytest.raises(DeclarationError, match="steps_4W_1: its nuisance rest_K has the name of another"):
+        lacuna.diagnose(system, heater.records(2), progress=pytest.fail)

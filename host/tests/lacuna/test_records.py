@@ -297,3 +297,14 @@ def test_what_scripts_outside_import_keeps_its_name(name):
 
 def test_scripts_elsewhere_turn_progress_off_by_this_name():
     assert lacuna.diagnose.__kwdefaults__["progress"] is True
+
+
+def test_single_values_in_attrs_are_inputs_of_the_record():
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"time_s": np.arange(10.0), "y": np.arange(10.0), "room_K": np.full(10, 295.0)})
+    frame.attrs = {"ambient_K": 300.0, "pump": "on", "room_K": 1.0, "condition": np.int64(3), "units": {"y": "m"}}
+    (table,) = read(frame)
+    record = table.record(["y"])
+    assert (record.condition, record["ambient_K"], record["pump"]) == (3, 300.0, "on")
+    assert sorted(record.inputs) == ["ambient_K", "pump", "room_K"]
+    assert record["room_K"][0] == 295.0, "a column says it better"

@@ -1,6 +1,7 @@
 """Rules that are too small for a file of their own."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,9 +9,10 @@ import lacuna
 from lacuna import Effect, Parameter
 from lacuna.cores import usable_cores
 from lacuna.diagnosis.next_experiment import expected_gain
-from lacuna.diagnosis.sizes import sized
+from lacuna.diagnosis.sizes import grown, sized, starts
 from lacuna.estimation.autocorrelation import correlation_samples
-from lacuna.estimation.noise import ChannelNoise, NoiseFloor
+from lacuna.estimation.fit import fit
+from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
 from lacuna.estimation.structure import Structure
 from lacuna.system import CandidateExperiment, Record
 
@@ -50,3 +52,31 @@ def test_missing_samples_are_no_neighbours():
     sparse = np.full(len(smooth) * 4, np.nan)
     sparse[::4] = smooth
     assert correlation_samples([sparse]) == correlation_samples([smooth]) > 4.0
+
+
+def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():
+    """Sampled at 10 Hz: no spectrum has a peak there, and without a start it would never be tried."""
+    hum = Effect("hum", (Parameter("size", "", 0.3, 0.0, 5.0), Parameter("f_Hz", "Hz", 50.3, 20.0, 100.0)), sizes=1)
+    hum = replace(hum, frequency="f_Hz")
+    time_s = np.arange(0.0, 10.0, 0.1)
+    trials = tuple(Record(f"{k}", "run", "c", time_s, {"y": np.sin(time_s + 0.01 * k)}) for k in range(4))
+
+    def simulate(record, theta):
+        at = 2.0 * np.pi * theta.hum.f_Hz * record.time_s
+        return {"y": theta.slope * np.sin(record.time_s) + theta.hum.size * np.sin(at)}
+
+    system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -5.0, 5.0)], hum).with_trials(trials)
+    parent = fit(Structure(system), trials, estimate_noise(system, trials))
+    structure = grown(parent, "hum").structure
+    begun = starts(parent, structure, "hum")
+    assert {v[structure.names.index("hum.f_Hz")] for v in begun} == {50.3}
+
+
+def test_what_a_trial_has_of_its_own_may_lie_anywhere_if_nothing_is_said_of_its_spread():
+    phase = Parameter("phase_rad", "rad", 0.0, 0.0, 8.0)
+    trial = Record("1", "run", "c", np.arange(9.0), {"y": np.arange(9.0)})
+    for own, scale in ((phase, 2.0), (replace(phase, scale=0.1), 0.1)):
+        hum = Effect("hum", Parameter("size", "", 0.3, 0.0, 5.0), own=own)
+        system = lacuna.System(lambda r, t: r.time_s, Parameter("slope", "", 1.0, -5.0, 5.0), hum)
+        (found,) = Structure(system, ("hum",)).own(trial)
+        assert found.step_scale == scale

@@ -6,6 +6,7 @@ import pytest
 
 import lacuna
 from lacuna.diagnosis.split import split_trials
+from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.system import Record
 
 T = np.linspace(0.0, 1.0, 50)
@@ -48,3 +49,38 @@ def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
     assert verdict.verdict in str(verdict)
     assert "<html" in verdict.report(tmp_path / "page.html").read_text()
     assert verdict.plot()
+
+
+def test_what_a_person_makes_the_test_is_it_though_it_is_of_an_experiment_of_its_own():
+    given = (*trials(*"aabbcc"), Record("v", "validation", "v", T, {"y": T}))
+    assert names(split_trials(given, (), ["v"]).final) == ["v"]
+
+
+@pytest.mark.parametrize(
+    ("given", "spare", "test", "says"),
+    [
+        ("abc", (), "2", "test names 2: of the other records none is left to judge"),
+        ("abcd", (), "23", "test names 2, 3: of the other records none is left to judge"),
+        ("aabb", [("steps", "a")], "23", "test names 2, 3: of the other records none is left to be fitted"),
+    ],
+)
+def test_a_test_that_leaves_too_little_is_refused(given, spare, test, says):
+    with pytest.raises(TooLittleDataError, match=says):
+        split_trials(trials(*given), spare, test)
+
+
+def test_a_test_of_what_nothing_else_measures_is_refused():
+    given = (*trials(*"aabbcc"), Record("v", "steps", "v", T, {"y": T, "force_N": T}))
+    with pytest.raises(MisuseError, match="test names v, but no other record has force_N"):
+        split_trials(given, (), ["v"])
+
+
+def test_a_validation_of_its_own_experiment_is_held_against_the_noise_of_the_others(tmp_path):
+    given = heater.records(seed=1, sensor_lag__lag_s=3.0)
+    for repeat in (1, 2):
+        given[f"steps_4W_{repeat}"] |= {"experiment": "validation", "condition": "checked"}
+    verdict = lacuna.diagnose(heater.system(), given, test=["steps_4W_1", "steps_4W_2"], progress=False)
+    assert [e.name for e in verdict.effects] == ["sensor_lag"]
+    assert verdict.record["held_out"]["conditions"] == ["steps_4W_1", "steps_4W_2"]
+    assert verdict.record["error"]["after"]["by_experiment"]["validation"] == pytest.approx(1.0, abs=0.15)
+    assert "validation" in verdict.report(tmp_path / "page.html").read_text()
