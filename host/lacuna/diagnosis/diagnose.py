@@ -113,9 +113,10 @@ def diagnose(
     executor: Executor | None = None,
 ) -> Diagnosis:
     """Diagnose what the base model of `system` lacks, from its trials. Deterministic for a seed. Effects that are
-    `suspected`, as by a diagnosis of fewer trials, are fitted whatever they promise. Explanations are tried on
-    `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves are tried ends that
-    with the best so far. Raises MisuseError before the search where the system or its trials would mislead it."""
+    `suspected`, as by a diagnosis of fewer trials, are fitted whatever they promise, unless the base model suffices.
+    Explanations are tried on `executor`, if there is one that can ship the system. Ctrl-C while explanations or curves
+    are tried ends that with the best so far. Raises MisuseError before the search where the system or its trials would
+    mislead it."""
     began = time.monotonic()
     if unknown := sorted(set(suspected) - set(system.effects)):
         raise MisuseError(f"suspected: there is no effect {unknown[0]!r}; there are {', '.join(system.effects)}.")

@@ -86,7 +86,7 @@ def race(
         keep(done)
         if enough(done[0]):
             least = policy.rival * max(one.gain for one in promises)
-            rest = [one for one in rest if one.gain > least]
+            rest = [one for one in rest if one.gain > least or one.suspected]
     raced = sorted([*raced, *coarse_fits(parent, rest, split, workers)], key=_cost)
     keep(raced)
     chosen = [c for c in raced if _worth_it(c, parent, done, enough)][: most - len(done)]

@@ -27,11 +27,12 @@ _ABSORBED = 0.02  # a change in the residual of which less than this share is le
 
 class Promise(NamedTuple):
     """A set of effects, where a smaller set would go on with it, and the log-likelihood that it promises to gain, once
-    that is known."""
+    that is known; `suspected`: it is fitted whatever that is."""
 
     problem: Problem
     start: Point
     gain: float = 0.0
+    suspected: bool = False
 
     @property
     def effect(self) -> str:

@@ -120,11 +120,8 @@ def _ranked(tried: dict[frozenset[str], Candidate], size: int) -> list[Candidate
 def _singles(case: Case, scores: Scores) -> list[Promise]:
     """The effects that promise most, those of which a score says little, and the suspected ones."""
     library = case.system.effects
-    return [
-        promise
-        for rank, promise in enumerate(scores.singles())
-        if rank < _RACED[1] or _blind(library[promise.effect]) or promise.effect in case.suspected
-    ]
+    singles = (one._replace(suspected=one.effect in case.suspected) for one in scores.singles())
+    return [one for rank, one in enumerate(singles) if rank < _RACED[1] or _blind(library[one.effect]) or one.suspected]
 
 
 def _blind(effect: Effect) -> bool:
@@ -145,8 +142,8 @@ def _larger(
         fresh = [e for e in library if e not in parent.effects]
         for promise in score(with_derivatives(parent).fitted, fresh, workers).singles():
             gain = best.fitted.cost - parent.fitted.cost + promise.gain
-            offers.append(promise._replace(gain=gain))
-            if parent is best and (library[promise.effect].apart or promise.effect in case.suspected):
+            offers.append(promise._replace(gain=gain, suspected=parent is best and promise.effect in case.suspected))
+            if offers[-1].suspected or (parent is best and library[promise.effect].apart):
                 always.append(offers[-1])
     for one, other in combinations(ranked[:_JOINED], 2):
         if len({*one.effects, *other.effects}) == size:

@@ -86,6 +86,8 @@ def test_what_is_suspected_is_fitted_whatever_it_promises():
         found = search(case, case.judge(case.fit_base(1)), enough=lambda _: False, workers=NOBODY)
         tried = {c.effects for c in found.tried if "tone_8" in c.effects}
         assert {len(effects) for effects in tried} >= {1, 2} if suspected else not tried
+        soon = search(case, case.judge(case.fit_base(1)), enough=lambda c: bool(c.effects), workers=NOBODY)
+        assert any(c.effects == ("tone_8",) for c in soon.tried) == bool(suspected), "one is enough"
     with pytest.raises(MisuseError, match="suspected: there is no effect 'tone_9'; there are tone_0, tone_1"):
         lacuna.diagnose(system, suspected=["tone_8", "tone_9"], progress=False)
 
