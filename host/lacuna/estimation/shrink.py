@@ -34,14 +34,14 @@ def shrunk(fitted: Fit) -> Fit:
         knots = [knot_name(site, row, knot) for row in range(len(site.rows)) for knot in range(site.knots)]
         places = np.array([structure.names.index(knot) for knot in knots])
         own = np.array([solution.free.index(place) for place in places])
-        sizes[name], told = _size(values[places], known[np.ix_(own, own)], _NONE * site.scale)
+        sizes[name], told = likeliest_size(values[places], known[np.ix_(own, own)], _NONE * site.scale)
         values[places[~told]] = 0.0
     problem, begin = fitted.problem.sized(sizes), replace(solution.point, values=values)
     solution = solve(problem, begin, free=solution.free, sensitivities=solution.sensitivities)
     return replace(fitted, problem=problem, solution=solution)
 
 
-def _size(values: np.ndarray, covariance: np.ndarray, least: float) -> tuple[float, np.ndarray]:
+def likeliest_size(values: np.ndarray, covariance: np.ndarray, least: float) -> tuple[float, np.ndarray]:
     """The standard deviation of which `values` (n,), known to within `covariance`, are the likeliest draw, or `least`;
     and which of them the data tell then."""
     variances, ways = np.linalg.eigh(covariance)

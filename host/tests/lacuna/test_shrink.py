@@ -7,7 +7,7 @@ import lacuna
 from lacuna import CorrectionSite, Parameter, Record
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import estimate_noise
-from lacuna.estimation.shrink import _size, shrunk
+from lacuna.estimation.shrink import likeliest_size, shrunk
 from lacuna.estimation.structure import Structure, is_learnt
 from lacuna.estimation.uncertainty import uncertainty
 
@@ -67,7 +67,7 @@ def test_a_curve_that_is_seen_whole_stays_as_it_is():
 
 
 def test_a_curve_that_is_but_noise_is_none():
-    size, told = _size(np.random.default_rng(0).standard_normal(33), 4.0 * np.eye(33), least=0.01)
+    size, told = likeliest_size(np.random.default_rng(0).standard_normal(33), 4.0 * np.eye(33), least=0.01)
     assert size == pytest.approx(0.01)
     assert not told.any()
 
