@@ -88,7 +88,7 @@ def _seen(trial: Trial) -> tuple[str | None, str]:
 def _snaps(time_s: np.ndarray, seen_mm: np.ndarray) -> bool:
     """Whether it goes a good part of its way within moments, in whatever unit; filling alone takes a second."""
     step = max(1, round(_SNAP_S / float(np.median(np.diff(time_s)))))
-    return bool(np.abs(seen_mm[step:] - seen_mm[:-step]).max() > _SNAP * np.ptp(seen_mm) > 0.0)
+    return bool(np.abs(seen_mm[step:] - seen_mm[:-step]).max(initial=0.0) > _SNAP * np.ptp(seen_mm) > 0.0)
 
 
 def _stroke_mm(trial: Trial) -> float:

@@ -32,6 +32,16 @@ def test_a_length_in_another_unit_is_named(any_day, unit):
         assert f"is it in {unit}?" in found[2]
 
 
+@pytest.mark.parametrize("rows", [2, 5])
+def test_a_walk_of_a_few_rows_is_no_traceback(day, rows):
+    walk = day.of("locomotion")[0]
+
+    def cut(trial):
+        return with_columns(trial, **{name: values[:rows] for name, values in trial.columns.items()})
+
+    assert not [file for file, _, _ in units_found(mistaken(day, walk.file, cut)) if file != walk.file]
+
+
 @pytest.mark.parametrize("unit", FORCES)
 def test_a_force_in_another_unit_is_named(any_day, unit):
     for trial in any_day.of("static_loading"):
