@@ -18,7 +18,7 @@ class Anatomy:
 
     extension_s, contraction_s: from the body's command to the passing of its unstable point; NaN if it never passes.
     tail_lead_s: how long before the body extends the tail is told to anchor; head_lead_s: the head, before the body
-    contracts (negative: after). extended_psi, contracted_psi: body pressure when the next command comes.
+    contracts (negative: after). extended_psi, contracted_psi: pressure in the body when the next command comes.
     """
 
     gait: Gait
@@ -44,7 +44,7 @@ def anatomy(model: Model, gait: Gait) -> Anatomy:
     unstable = model.body_stiffness.unstable_m
     on = _switch(gait, "body", to_positive=True)
     off = _switch(gait, "body", to_positive=False)
-    body_psi = record["pressure_body_psi"]
+    body_psi = record["body_psi"]
     return Anatomy(
         gait=gait,
         record=record,

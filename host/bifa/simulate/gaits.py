@@ -34,12 +34,6 @@ class Advance:
         """Speed of the last cycle."""
         return 1e3 * self.advance_m[..., -1] / self.period_s
 
-    @property
-    def unsettled(self) -> np.ndarray:
-        """Spread of the last three cycles' advance over the last one's size (at least 1 mm): 0 when periodic."""
-        last = self.advance_m[..., -3:]
-        return np.ptp(last, axis=-1) / np.maximum(np.abs(last[..., -1]), 1e-3)
-
 
 def speed(model: Model | Plant, gait: Gait, cycles: int = 10, tolerance_m: float = FAST_TOLERANCE_M) -> Advance:
     """One gait from rest; shapes (cycles,). Use tolerance 1e-6 or less to verify what a search has found."""

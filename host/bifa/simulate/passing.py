@@ -64,7 +64,7 @@ def passing(
     behind = record["displacement_tail_mm"] > 1e3 * passed_at_m(obstacles)
     seconds = float(record["time_s"][np.argmax(behind)]) if behind.any() else float("nan")
     clear = walk(model, gait, _SETTLED_CYCLES, inclination_deg=inclination_deg)
-    pressure = clear["pressure_body_psi"][clear["time_s"] >= (_SETTLED_CYCLES - 1) * gait.period_s]
+    pressure = clear["body_psi"][clear["time_s"] >= (_SETTLED_CYCLES - 1) * gait.period_s]
     resists, restores = model.body_stiffness.peaks
     slope = np.radians(inclination_deg)
     along = GRAVITY_M_S2 * (model["mu_s"] * np.cos(slope) + np.sin(slope))  # friction and weight of 1 kg, uphill

@@ -19,6 +19,7 @@ from bifa.simulate.plant import Plant, plant
 from bifa.simulate.rigs import SimulationError
 from bifa.simulate.stepper import (
     OFF,
+    P_BODY,
     V_HEAD,
     V_SMALL_HEAD,
     V_SMALL_TAIL,
@@ -123,6 +124,7 @@ def _walked(flat: Plant, commands: Timeline, rows: np.ndarray, time_s: np.ndarra
         "velocity_head_m_s": rows[V_HEAD],
         "velocity_tail_m_s": rows[V_TAIL],
         "body_m": rows[X_HEAD] - rows[X_TAIL],
+        "body_psi": rows[P_BODY],
         "small_head_m": rows[X_SMALL_HEAD],
         "small_tail_m": rows[X_SMALL_TAIL],
         "small_head_velocity_m_s": rows[V_SMALL_HEAD],

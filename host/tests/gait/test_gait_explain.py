@@ -8,6 +8,8 @@ from bifa.gait.metric import Metric
 from bifa.gait.sensitivity import Front, sensitivity
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Gait, nominal
+from bifa.simulate import Supports, tunnel
+from bifa.simulate.passing import passing
 
 ROBUST = Gait(2.6729, 193.168, 325.634, 0.654, 0.4303, 0.4303)
 
@@ -60,3 +62,13 @@ def test_sensitivity_scans_every_parameter_around_the_gait(runs, nominal_plant):
 def test_the_front_keeps_what_nothing_beats():
     front = Front(np.zeros((4, 6)), np.array([23.0, 22.0, 21.0, 22.5]), np.array([0.0, 21.8, 21.7, 20.0]))
     np.testing.assert_array_equal(front.efficient, [True, True, False, True])
+
+
+def test_what_a_body_builds_up_is_not_what_its_sensor_says(both):
+    """With a gain of -0.3 a walk that passes was said to lack force."""
+    misread = nominal().with_effects({"sensor_calibration": {"gain": -0.3, "offset_psi": 0.0}})
+    before, after = (passing(model, BASELINE, tunnel(), Supports()) for model in (nominal(), misread))
+    assert after.extension.built_up_N == before.extension.built_up_N > before.extension.needed_N
+    assert after.contraction.built_up_N == before.contraction.built_up_N
+    found = anatomy(misread, BASELINE)
+    assert (found.extended_psi, found.contracted_psi) == (both[0].extended_psi, both[0].contracted_psi)
