@@ -49,8 +49,8 @@ class Robot:
         return float(speeds(self.model, gait_rows([_gait(gait)]), cycles, 1e-6).speed_mm_s[0])
 
     def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None) -> Verdict:
-        """What this robot's model lacks, by a data set: a `lacuna.Verdict`. `matters`: RMS error by column up to which
-        a prediction is good enough. Minutes of processor for a whole campaign."""
+        """What this robot's base model lacks, by a data set: a `lacuna.Verdict`. `matters`: RMS error by column up to
+        which a prediction is good enough. Minutes of processor for a whole campaign."""
         import lacuna
         from bifa.identify.start import prepare
         from bifa.problem.accuracy import accuracies

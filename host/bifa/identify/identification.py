@@ -52,7 +52,7 @@ _GIVEN_BY = {
 
 @dataclass(frozen=True)
 class Open:
-    """A parameter that this data set does not determine: the initial value kept, and what would determine it."""
+    """A parameter that this data set does not determine: its value in the model, and what would determine it."""
 
     name: str
     value: float
@@ -101,14 +101,15 @@ def identify(
     intervals = _intervals(system, fit, known)
     intervals |= _profiles(fit, intervals)
     sd = {name: interval.sd for name, interval in intervals.items()}
+    identified = described(system.model_at(fit.theta), fit, known, "bifa fit", date, sd)
     return Identification(
         system=system,
-        model=described(system.model_at(fit.theta), fit, known, "bifa fit", date, sd),
+        model=identified,
         fit=fit,
         uncertainty=known,
         intervals=intervals,
         statics=fit_statics(dataset),
-        open=_open(system, dataset, known, intervals),
+        open=_open(system, identified, dataset, known, intervals),
         error=_errors(fit),
     )
 
@@ -149,7 +150,11 @@ _SETTLED = 0.7  # of the prior's standard deviation: half of what is known after
 
 
 def _open(
-    system: RobotSystem, dataset: Dataset, known: Uncertainty, intervals: Mapping[str, IntervalEstimate]
+    system: RobotSystem,
+    identified: Model,
+    dataset: Dataset,
+    known: Uncertainty,
+    intervals: Mapping[str, IntervalEstimate],
 ) -> tuple[Open, ...]:
     prior_sd = {p.name: p.prior_sd for p in system.parameters}
     # what the data tell hardly more of than was known before is as open as what they do not tell
@@ -158,9 +163,9 @@ def _open(
         e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)
     }
     loose = {e.name for e in known.estimates} - settled
-    absent = [n for n in system.model.parameters if n not in system.fitted and n not in dataset.known]
-    names = [n for n in system.model.parameters if n in loose or n in absent]
-    found = [Open(n, system.model.parameters[n].value, _GIVEN_BY[n]) for n in names]
+    absent = [n for n in identified.parameters if n not in system.fitted and n not in dataset.known]
+    names = [n for n in identified.parameters if n in loose or n in absent]
+    found = [Open(n, identified[n], _GIVEN_BY[n]) for n in names]
     for actuator, prefix in (("large", "body"), ("small", "small")):
         if prefix not in system.curves:
             needs = f"static_loading of the {actuator} actuator at 0 psi"

@@ -41,12 +41,12 @@ def session_drifts(fit: Fit) -> dict[str, float]:
     """RMS over the session of what was learnt to drift, by the scatter that it adds to: the next walk is at a place in
     another session, which nobody knows."""
     learnt = {c.site: float(np.sqrt(np.mean(c.table**2))) for c in fit.structure.corrections(fit.theta)}
-    usual_psi = cast(RobotSystem, fit.structure.system).model["supply_positive_psi"]
-    push_N = fit.theta.get("body_area_N_psi", 0.0) * fit.theta.get("supply_positive_psi", usual_psi)
+    own = cast(RobotSystem, fit.structure.system).model  # has what is known and so not fitted
+    area_N_psi, supply_psi = (fit.theta.get(name, own[name]) for name in ("body_area_N_psi", "supply_positive_psi"))
     found = {
         "friction": learnt.get("friction_of_the_day", 0.0),
         "pressure_psi": learnt.get("vacuum_of_the_day", 0.0),
-        "force_N": learnt.get("area_of_the_day", 0.0) * push_N,
+        "force_N": learnt.get("area_of_the_day", 0.0) * area_N_psi * supply_psi,
     }
     return {name: drift for name, drift in found.items() if drift > 0.0}
 

@@ -34,14 +34,15 @@ def prepare(
     dataset: Dataset, model: Model | None = None, on_progress: Callable[[str], None] = lambda stage: None
 ) -> RobotSystem:
     """A system ready to be fitted to `dataset`: what the lab knows is taken over from it, curves, areas and supplies
-    stand where the static stage leaves them, and the rest is as in `model` (default: nominal).
+    stand where the static stage leaves them, and the rest is as in `model` (default: nominal), a base model.
 
     `on_progress` is told the stage's name. Raises UndeterminedError where the data set holds nothing that can be
-    fitted.
+    fitted, ModelParameterError where the model has effects or learnt curves.
     """
     if not dataset.trials:
         raise UndeterminedError("the data set holds no trials: nothing can be fitted")
     model = model or robot.nominal()
+    _refuse_completed(model)
     on_progress("static loading: stiffness and area")
     statics = fit_statics(dataset)
     values = _known(dataset, model) | _supplies(dataset, model)
@@ -51,6 +52,16 @@ def prepare(
     if not system.parameters:
         raise UndeterminedError("these trials constrain no unknown parameter of the model")
     return system
+
+
+def _refuse_completed(model: Model) -> None:
+    tables = [f"[effects.{name}]" for name in model.effects] + [f"[learnt.{name}]" for name in model.learnt]
+    if tables:
+        raise ModelParameterError(
+            f"model {model.name!r} has {', '.join(tables)}, but a fit starts from a base model: give one without, such "
+            "as the nominal one; `bifa diagnose` finds effects and curves again (with `--suspect EFFECT` it tries one "
+            "that was named before in any case)"
+        )
 
 
 def fit_statics(dataset: Dataset) -> dict[str, StaticFit]:

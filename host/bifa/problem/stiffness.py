@@ -130,7 +130,7 @@ def fit_stiffness(
     displacement_m, force_N: shape (n,); loading: shape (n,), True while extending.
     reach_m: the least and greatest displacement that the curve will be asked for, if known.
 
-    Raises UndeterminedError if there are too few points or they cover next to nothing.
+    Raises UndeterminedError if there are too few points, they cover next to nothing, or the force never changes.
     """
     x, force = np.asarray(displacement_m, float), np.asarray(force_N, float)
     if len(x) < _MIN_POINTS:
@@ -139,6 +139,8 @@ def fit_stiffness(
     width = covered[1] - covered[0]
     if width < 1e-3:
         raise UndeterminedError(f"the static test moved by {width * 1e3:.2f} mm only: no curve can be fitted to it")
+    if np.ptp(force) == 0.0:
+        raise UndeterminedError(f"the force is {force[0]:g} N throughout: is the load cell connected?")
     lower, upper = covered[0] - CONTINUATION * width, covered[1] + CONTINUATION * width
     if reach_m is not None:
         lower = max(lower, min(reach_m[0], covered[0]) - 0.01 * width)

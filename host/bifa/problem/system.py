@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bifa import robot
-from bifa.data import Dataset, Trial
+from bifa.data import Dataset, DatasetError, Trial
 from bifa.errors import BifaError
 from bifa.problem import candidates, regressors, sites
 from bifa.problem.accuracy import accuracy_of
@@ -55,6 +55,7 @@ _PIPE = ("wall_offset_m", "mu_s", "mu_k")
 _PLACES = {"wall_offset_m": (0.017, 0.022, 0.026, 0.031)}
 _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
 _WALL = ("wall_stiffness_N_m", "wall_damping_Ns_m")
+_MACHINE = {"displacement_mm": "the cross-head", "force_N": "the load cell"}  # what a testing machine measures
 _MASSES = ("head_mass_kg", "tail_mass_kg", "small_mass_kg")
 _FELT = {STAND_MASS: (STEP, "large"), LOAD_CELL: (ANCHOR, None)}
 # Which experiments see which parameters; the shapes of the curves are added in `matters`.
@@ -80,6 +81,7 @@ class RobotSystem(System):
     name = "pipe robot"
 
     def __init__(self, dataset: Dataset, model: Model, curves: Mapping[str, FittedCurve], fitted: Sequence[str]):
+        _refuse_dead_machine(dataset)
         self.dataset, self.model, self.curves = dataset, model, dict(curves)
         self.fitted = tuple(fitted)
         self.accuracies: Mapping[str, float] = {}  # RMS by quantity, up to which a prediction is good enough
@@ -224,7 +226,7 @@ class RobotSystem(System):
     # -- from a vector to a model -----------------------------------------------------------------------------
 
     def model_at(self, theta: Theta, effects: Iterable[str] = ()) -> Model:
-        """The model with the values of `theta`, curves included, and these effects active."""
+        """The model with the values of `theta`, springs included, and these effects active; nothing learnt."""
         values = {name: theta[name] for name in self.fitted}
         chosen = {
             effect: {p.name: theta[f"{effect}.{p.name}"] for p in self.effects[effect].parameters} for effect in effects
@@ -232,7 +234,9 @@ class RobotSystem(System):
         curves: dict[str, Any] = {
             f"{prefix}_stiffness": curve.curve(self._shapes[prefix](theta)) for prefix, curve in self.curves.items()
         }
-        return replace(self.model.with_values(values).with_effects(chosen), **curves)
+        # Learnt curves and a covariance go with the values of the fit that they come from.
+        base = replace(self.model, learnt={}, covariance=None)
+        return replace(base.with_values(values).with_effects(chosen), **curves)
 
     def _named(self, name: str) -> Parameter:
         p = self.model.parameters[name]
@@ -268,6 +272,20 @@ class RobotSystem(System):
         values = self._unfitted | dict(zip(self.fitted, named, strict=True))
         values |= {f"{effect}.{name}": v for effect, own in effects.items() for name, v in own.items()}
         return of_values(values, effects, body, small), (body.contracted_m, small.contracted_m)
+
+
+def _refuse_dead_machine(dataset: Dataset) -> None:
+    """DatasetError where a channel of the testing machine never changes: no cross-head rests all the time, and a fit
+    would take a dead load cell for the robot."""
+    for trial in (*dataset.of(STATIC), *dataset.of(ANCHOR)):
+        for column, instrument in _MACHINE.items():
+            if np.ptp(values := trial.columns[column]) == 0.0:
+                raise DatasetError(
+                    f"every sample reads {values[0]:g}: is {instrument} connected? Record this trial again, or remove "
+                    "it from dataset.toml",
+                    file=trial.file,
+                    column=column,
+                )
 
 
 def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, ...]:

@@ -89,6 +89,7 @@ def test_what_no_experiment_tells_is_said_with_what_would(found):
     for name in ("small_mass_kg", "wall_stiffness_N_m", "wall_damping_Ns_m"):
         assert name in named or found.intervals[name].sd < 0.7 * PRIOR_SD[name], "told, or said to be open"
     assert "head_mass_kg" not in named  # the lab knows it
+    assert all(missing.value == found.model[missing.name] for missing in found.open)  # the curves are told
     assert all(missing.needs for missing in found.open)
     assert all(any(missing.needs in line for line in remarks(found)) for missing in found.open)
 

@@ -40,9 +40,10 @@ def test_what_was_learnt_to_drift_over_the_session_adds_to_the_scatter():
     day = np.linspace(-1.0, 1.0, 65)[None]
     learnt = (Correction("vacuum_of_the_day", 0.3 * day), Correction("area_of_the_day", 0.02 * day))
     structure = SimpleNamespace(corrections=lambda theta: learnt, system=SimpleNamespace(model=nominal()))
-    drifts = session_drifts(SimpleNamespace(structure=structure, theta={"body_area_N_psi": 9.0}))
     rms = np.sqrt(np.mean(day**2))
-    assert drifts == pytest.approx({"pressure_psi": 0.3 * rms, "force_N": 0.02 * rms * 9.0 * 8.5})
+    for theta, area_N_psi in (({"body_area_N_psi": 8.0}, 8.0), ({}, nominal()["body_area_N_psi"])):  # fitted, known
+        drifts = session_drifts(SimpleNamespace(structure=structure, theta=theta))
+        assert drifts == pytest.approx({"pressure_psi": 0.3 * rms, "force_N": 0.02 * rms * area_N_psi * 8.5})
 
 
 def test_few_gaits_tell_less_of_the_next_than_many():

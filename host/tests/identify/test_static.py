@@ -111,6 +111,11 @@ def test_a_static_test_that_did_not_move_is_refused():
         fit_stiffness(np.full(500, 1e-3), np.zeros(500), np.ones(500, bool))
 
 
+def test_a_force_that_never_changes_is_refused():
+    with pytest.raises(UndeterminedError, match="0 N throughout: is the load cell connected"):
+        fit_stiffness(np.linspace(0.0, 0.05, 500), np.zeros(500), np.ones(500, bool))
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     rate=st.floats(0.5, 20.0),

@@ -6,12 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.data import Dataset
+from bifa.data import Dataset, DatasetError
 from bifa.identify.start import prepare
+from bifa.measure.plan import EXTENDED
 from bifa.problem.inputs import inputs_of
 from bifa.problem.library import engine_effects
 from bifa.problem.stiffness import UndeterminedError
-from bifa.robot import ModelParameterError
+from bifa.problem.system import RobotSystem
+from bifa.robot import ModelParameterError, nominal
+from bifa.robot.learnt import LearntCurve
 from bifa.simulate import static_loading
 from lacuna.estimation.fit import spread_starts
 from lacuna.estimation.graduated import solve_graduated
@@ -163,6 +166,17 @@ def test_candidates_can_be_predicted(system, theta):
     assert all(np.isfinite(v).all() for v in system.predict(theta, (), cheap.trial).values())
 
 
+def test_the_head_of_a_candidate_pull_is_extended_as_that_of_a_recorded_one(system, theta):
+    """With play in the spring it then holds otherwise: the experiment that tells backlash from hysteresis."""
+    pulls = [c.trial for c in system.candidate_experiments() if c.experiment == "anchor_pull"]
+    assert {pull.payload.extended_psi for pull in pulls} == set(EXTENDED.values())
+    vented = next(pull for pull in pulls if pull.payload.pressure_psi == 0.0)
+    never = replace(vented, payload=replace(vented.payload, extended_psi=0.0))
+    with_play = theta | {"backlash.gap_m": 0.0012}
+    once, not_once = (system.predict(with_play, ("backlash",), pull)["force_N"] for pull in (vented, never))
+    assert abs(once.max() - not_once.max()) > 1.0
+
+
 def test_a_learnt_spring_adds_its_force(system, theta):
     trial = system.trials[0]
     site = system.correction_sites["body_spring"]
@@ -178,6 +192,13 @@ def test_the_identified_model_predicts_what_the_system_does(system, theta):
     path = (inputs.displacement_m - model.body_stiffness.contracted_m) * 1e3
     record = static_loading(model, "large", inputs.time_s, path, inputs.pressure_psi)
     assert record["force_N"] == pytest.approx(system.predict(theta, (), trial)["force_N"], abs=1e-9)
+
+
+def test_a_model_at_a_fit_has_only_what_was_fitted(dataset, system, theta):
+    """A curve that the model to start from had was written back as if it had been."""
+    curve = LearntCurve(-0.8, 0.8, np.full((1, 9), 30.0))
+    bent = RobotSystem(dataset, replace(system.model, learnt={"body_damper": curve}), system.curves, system.fitted)
+    assert not bent.model_at(theta).learnt
 
 
 def test_what_remembers_travel_sees_a_turn_between_samples(dataset, system, theta):
@@ -201,6 +222,30 @@ def test_an_empty_data_set_is_refused():
         prepare(Dataset(path=None, name="empty", known={}, trials=()))
 
 
+@pytest.mark.parametrize(
+    ("experiment", "column", "instrument"),
+    [
+        ("static_loading", "force_N", "load cell"),
+        ("anchor_pull", "force_N", "load cell"),
+        ("anchor_pull", "displacement_mm", "cross-head"),
+    ],
+)
+def test_a_dead_channel_of_the_testing_machine_is_named_with_its_file(dataset, experiment, column, instrument):
+    dead = dataset.of(experiment)[0]
+    silent = replace(dead, columns={**dead.columns, column: np.zeros_like(dead.columns[column])})
+    trials = tuple(silent if trial is dead else trial for trial in dataset.trials)
+    with pytest.raises(DatasetError, match=rf"{dead.file}, column {column}: every sample reads 0: is the {instrument}"):
+        prepare(replace(dataset, trials=trials))
+
+
 def test_knowledge_of_what_the_model_does_not_have_is_refused(dataset):
     with pytest.raises(ModelParameterError, match="colour"):
         prepare(replace(dataset, known=dataset.known | {"colour": 3.0}))
+
+
+def test_a_model_with_effects_or_learnt_curves_is_no_base_model(dataset):
+    """They were left out without a word."""
+    curve = LearntCurve(-0.8, 0.8, np.zeros((1, 9)))
+    completed = replace(nominal().with_effects({"choked_flow": {}}), learnt={"body_damper": curve})
+    with pytest.raises(ModelParameterError, match=r"\[effects.choked_flow\], \[learnt.body_damper\].* base model"):
+        prepare(dataset, completed)
