@@ -14,13 +14,12 @@ from bifa.link.table import CHAMBERS
 from bifa.link.units import set_point_psi
 from bifa.link.uno import DEAD_TIME_S, PRESSURES_AFTER_S
 from bifa.measure.alignment import AlignmentError, ClockLine, camera_rate, resampled
-from bifa.measure.plan import PULL_MM, PlannedTrial
+from bifa.measure.plan import EXTENDED, PULL_MM, SNAP_PSI, PlannedTrial
 from bifa.measure.recording import BEFORE_MARK_S, LEAD_S, Bench, Recording, idle, mount
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
 from bifa.printable import counted
 
 CHAMBER_OF = {"large": "body", "small": "head"}
-SNAP_PSI = 8.5  # extends every actuator
 SETTLE_S = 6.0  # of a pressure: five of the slowest time constants of about 1 s
 RELIEF_S = 12.0  # the regulator lets air out more slowly
 
@@ -69,7 +68,7 @@ def _static(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress
 
 
 def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) -> Recorded:
-    mount(bench, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM)
+    mount(bench, uno, "anchor_pull", rate_mm_s=planned.rate_mm_s, travel_mm=PULL_MM, **planned.settings)
     trial = planned.as_trial()
     psi = trial.commanded_psi
     # Extended first: a head holds with no pressure at all, but it has to snap out for that.
@@ -77,7 +76,7 @@ def _pull(bench: Bench, uno: Uno, planned: PlannedTrial, on_progress: Progress) 
     if psi != SNAP_PSI:
         _pressurise(bench, uno, "head", psi, RELIEF_S if psi < SNAP_PSI else SETTLE_S)
     columns, extra, lost = _moved(bench, uno, on_progress, "head", psi, PULL_MM / trial.commanded_mm_s)
-    return columns, extra | {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}, lost
+    return columns, extra | EXTENDED, lost
 
 
 def _moved(

@@ -8,16 +8,19 @@ from typing import Any
 
 from bifa.data import Trial
 from bifa.data.layout import GAIT_OPTIONAL
+from bifa.link.units import set_point_psi
 from bifa.robot.gait import BASELINE, Gait, GaitFile
 
 EXPERIMENTS = ("static_loading", "step_response", "anchor_pull", "locomotion")
 ACTUATORS = ("large", "small")
-REPEATS = 3
-QUICK_REPEATS = 2
+REPEATS, CYCLES = 3, 5
+QUICK_REPEATS, QUICK_CYCLES = 2, 3
 
 STATIC_RATE_MM_S = 2.0
 PULL_RATE_MM_S = 20.0  # paper, IV.B
 PULL_MM = 40.0
+SNAP_PSI = 8.5  # extends every actuator
+EXTENDED = {"extended_psi": round(set_point_psi(SNAP_PSI), 4)}  # noted of a pull, whose head is extended first
 
 # Two more gaits, with other phases and unequal duties, so that a walk is not one point in the space of gaits.
 BRISK = Gait(3.4, 208.9, 331.9, 0.65, 0.44, 0.44)
@@ -92,11 +95,11 @@ def session(
     experiments: Sequence[str] = EXPERIMENTS,
     *,
     actuators: Sequence[str] = ACTUATORS,
-    repeats: int = REPEATS,
+    repeats: int | None = None,
     pressures_psi: Sequence[float] | None = None,
     rate_mm_s: float | None = None,
     gaits: Sequence[Gait] = (BASELINE, BRISK, AMBLE),
-    cycles: int = 5,
+    cycles: int | None = None,
     settings: Mapping[str, Any] | None = None,
     quick: bool = False,
 ) -> tuple[PlannedTrial, ...]:
@@ -104,10 +107,11 @@ def session(
 
     45 of them by default. All conditions are gone through once, then again, so that the repeats of a condition are
     spread over the day and a drift shows between them. `quick`: the same conditions, since a verdict rests on those
-    that are never fitted, but twice instead of three times, with faster cross-heads and shorter walks.
+    that are never fitted, but twice instead of three times, with faster cross-heads and shorter walks; `repeats` and
+    `cycles`, where given, win. At 0 psi nothing walks; where no pressure is given, walks have the Uno's own.
     """
-    if quick:
-        repeats, cycles = min(repeats, QUICK_REPEATS), min(cycles, 3)
+    repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
+    cycles = cycles or (QUICK_CYCLES if quick else CYCLES)
     conditions: list[PlannedTrial] = []
     if "static_loading" in experiments:
         speed = rate_mm_s or (5 * STATIC_RATE_MM_S if quick else STATIC_RATE_MM_S)
@@ -125,5 +129,7 @@ def session(
             conditions.append(PlannedTrial("anchor_pull", None, pressure, rate_mm_s or PULL_RATE_MM_S))
     if "locomotion" in experiments:
         slope = dict(settings or {})
-        conditions += [PlannedTrial("locomotion", gait=gait, cycles=cycles, settings=slope) for gait in gaits]
+        for pressed in [{"pressure_psi": psi} for psi in pressures_psi or () if psi > 0.0] or [{}]:
+            for gait in gaits:
+                conditions += walks(GaitFile(gait, pressed), 1, cycles=cycles, settings=slope)
     return tuple(replace(condition, repeat=repeat) for repeat in range(1, repeats + 1) for condition in conditions)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bifa.data import Dataset, Trial
-from bifa.measure.plan import BRISK, PULL_MM, PlannedTrial
+from bifa.measure.plan import BRISK, EXTENDED, PULL_MM, PlannedTrial
 from bifa.robot.cpg import CHAMBERS
 from bifa.robot.gait import BASELINE, Gait
 from bifa.simulate import of_gait
@@ -62,7 +62,7 @@ def _pull(rate: float, pressure: float) -> tuple[Mapping[str, Any], Trial]:
     time_s = np.arange(0.0, PULL_MM / rate, 0.02)
     planned = PlannedTrial("anchor_pull", None, pressure, rate)
     columns = {"time_s": time_s, "displacement_mm": rate * time_s, **_unknown(time_s, "force_N", "pressure_psi")}
-    return {"pressure_psi": pressure, "rate_mm_s": rate}, planned.as_trial(columns)
+    return {"pressure_psi": pressure, "rate_mm_s": rate}, planned.as_trial(columns, extra=EXTENDED)
 
 
 def _walk(gait: Gait, inclination_deg: float) -> tuple[Mapping[str, Any], Trial]:

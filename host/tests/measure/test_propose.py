@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 from bifa.cli import app
 from bifa.data import DatasetError
 from bifa.data.export import read_export
+from bifa.files import TargetError
 from bifa.measure.bench_file import read_exports
 from bifa.measure.propose import declaration, look, parsed
 from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
@@ -89,6 +90,22 @@ def test_nothing_is_written_unasked_and_nothing_declared_twice(tmp_path):
     said = asked(path, tmp_path, "y")
     assert said.exit_code != 0
     assert "already" in str(said.exception)
+
+
+def test_a_strobe_column_that_is_not_there_is_asked_again(tmp_path):
+    path = exported(tmp_path, "testxpert", "machine")
+    said = asked(path, tmp_path, "y", "", "", "", "", "n", "", "", "n", "D10", "Standardkraft", "3", "y")
+    assert said.exit_code == 0, said.output
+    assert "D10" in said.output
+    assert read_exports(tmp_path / "bench.toml")["machine"].sync == "Standardkraft"
+
+
+def test_where_a_declaration_cannot_be_written_is_said_before_anything_is_asked(tmp_path):
+    path = exported(tmp_path, "testxpert", "machine")
+    for bench in (tmp_path / "nowhere" / "bench.toml", path):
+        said = CliRunner().invoke(app, ["instrument", str(path), "--bench", str(bench)])
+        assert isinstance(said.exception, TargetError)
+        assert "Whose file" not in said.output
 
 
 def test_what_is_no_table_is_refused(tmp_path):

@@ -80,6 +80,15 @@ def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(r
 
 
 @pytest.mark.uno
+def test_a_stand_that_cannot_pull_backward_is_not_taken_to_have_done_so():
+    backward = PlannedTrial("anchor_pull", None, 8.5, 40.0, settings={"direction": "backward"})
+    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        with pytest.raises(ValueError, match="anchor_pull has no setting direction"):
+            record_trial(bench_of(rig), uno, backward)
+
+
+@pytest.mark.uno
 def test_valves_switch_when_the_record_of_a_walk_has_them_switch():
     """Held against the edges of the pins in the simulated chip. The Uno switches at whole ticks, so that single edges
     are off by half a tick either way, and on the average none."""
@@ -154,6 +163,30 @@ def test_a_session_holds_45_trials_and_spreads_the_repeats():
     assert len({trial.file for trial in trials}) == 45
     assert {trial.experiment for trial in trials} == set(EXPERIMENTS)
     assert [trial.repeat for trial in trials] == sorted(trial.repeat for trial in trials)
+
+
+@pytest.mark.parametrize(("given", "repeats", "cycles"), [({}, 2, 3), ({"repeats": 3, "cycles": 6}, 3, 6)])
+def test_what_is_asked_for_wins_over_quick(given, repeats, cycles):
+    trials = session(["locomotion"], quick=True, **given)
+    assert (max(trial.repeat for trial in trials), trials[0].cycles) == (repeats, cycles)
+
+
+def test_walks_are_at_the_pressures_asked_for():
+    trials = session(pressures_psi=(0.0, 5.0), repeats=1)
+    walks = [trial for trial in trials if trial.experiment == "locomotion"]
+    assert {(walk.pressure_psi, walk.parameters["pressure_psi"]) for walk in walks} == {(5.0, 5.0)}
+    assert len(walks) == 3
+    assert {walk.pressure_psi for walk in session(["locomotion"])} == {None}
+
+
+@pytest.mark.uno
+def test_a_walk_at_a_pressure_is_fed_with_it():
+    (walk, *_) = session(["locomotion"], pressures_psi=(5.0,), cycles=1)
+    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
+        uno.connect()
+        trial = record_trial(bench_of(rig), uno, walk)
+    assert trial.pressure_psi == 5.0
+    assert 4.0 < trial.columns["pressure_body_psi"].max() < 5.2
 
 
 def test_the_pipes_slope_is_a_setting_of_walks_only():
