@@ -75,11 +75,19 @@ KNOWN = typer.Option(
 )
 RERUN = typer.Option(help="Run this stage again even if it is up to date.", metavar="STAGE", autocompletion=stages)
 WATCH = typer.Option(help="Folder in which your instruments save, subfolders included (serial port).")
-BENCH = typer.Option(help="File that declares how your instruments write theirs (bifa instrument).")
+BENCH_FILE = Path("bench.toml")
+BENCH = file_option(f"File that declares how your instruments write theirs (bifa instrument); else {BENCH_FILE}.")
 QUICK = typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
 PROFILE = typer.Option(help="Profile of a virtual robot; ideal: the paper's equations and white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
 NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
+
+
+def requires(needed: str, **options: object) -> None:
+    """Usage error where one of `options` is given, neither None nor False: it does nothing without what is `needed`."""
+    given = [name for name, value in options.items() if value is not None and value is not False]
+    if idle := [f"--{name.replace('_', '-')}" for name in given]:
+        raise typer.BadParameter(f"{' and '.join(idle)} {'require' if idle[1:] else 'requires'} {needed}")
 
 
 def kept(out: Path, what: str) -> str:

@@ -5,7 +5,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import KNOWN, PROFILE, QUICK, RERUN, WATCH, Profile, port_option, stoppable
+from bifa.cli._options import (
+    BENCH_FILE,
+    KNOWN,
+    PROFILE,
+    QUICK,
+    RERUN,
+    WATCH,
+    Profile,
+    port_option,
+    requires,
+    stoppable,
+)
 from bifa.computer import EXAMPLE_PORT
 from bifa.printable import counted
 
@@ -24,20 +35,26 @@ EXAMPLES = (
 )
 
 
+_PROFILE: Profile = "realistic"
+
+
 def campaign(
     out: Annotated[Path, typer.Option(help="Folder of all artefacts; give it again to resume.")] = Path("out/campaign"),
     port: Annotated[str, port_option("`virtual`, a serial port, or the name of your own rig.")] = "virtual",
     seed: Annotated[
-        int, typer.Option(min=0, help="Random seed of a virtual robot, its undisclosed effect and all noise.")
+        int,
+        typer.Option(
+            min=0, help="Random seed of the searches; and of a virtual robot, its undisclosed effect and all noise."
+        ),
     ] = 0,
     quick: Annotated[bool, QUICK] = False,
     watch: Annotated[Path | None, WATCH] = None,
     bench: Annotated[
         Path,
         typer.Option(help="What is known of your bench, and how your instruments write their files (serial port)."),
-    ] = Path("bench.toml"),
+    ] = BENCH_FILE,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
-    profile: Annotated[Profile, PROFILE] = "realistic",
+    profile: Annotated[Profile, PROFILE] = _PROFILE,
     rerun: Annotated[list[str], RERUN] = [],  # noqa: B006
 ) -> None:
     """Run the whole loop on a robot; a virtual one has an undisclosed effect.
@@ -53,11 +70,15 @@ def campaign(
     """
     from bifa.campaign.stages import check_folder
     from bifa.files import check_targets
-    from bifa.rig import check_port
+    from bifa.rig import check_port, is_offered
 
     check_targets(folders=(out,))
     check_folder(out)
     check_port(port)
+    if port != "virtual":
+        requires("--port virtual", profile=profile != _PROFILE)
+    if is_offered(port):
+        requires("a serial port", watch=watch)
 
     from contextlib import closing
     from dataclasses import replace

@@ -18,7 +18,7 @@ def compare(
 
     from bifa.files import check_targets
 
-    check_targets(report)
+    check_targets(report, inputs=tuple(file for run in runs for file in run.glob("*")))
 
     from bifa.screen import Console
 

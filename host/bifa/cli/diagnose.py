@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bifa import cluster
-from bifa.cli._options import DATASET, WATCH, file_option, port_option
+from bifa.cli._options import BENCH_FILE, DATASET, WATCH, file_option, port_option, requires
+from bifa.cli.campaign import at_desk
 from bifa.cli.check import warn_of_units
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def diagnose(
     json: Annotated[Path | None, typer.Option(help="Write the verdict as JSON.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write the model, completed by the effects found.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report with the evidence.")] = None,
-    model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Base model to start from; the nominal one if left out.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed; the same seed gives the same verdict.")] = 0,
     resolve: Annotated[
         bool, typer.Option("--resolve", help="Run the experiment that separates confusable effects, and continue.")
@@ -74,8 +75,14 @@ def diagnose(
     from contextlib import nullcontext
 
     from bifa.files import check_targets, named
+    from bifa.rig import check_port, is_offered
 
-    check_targets(json, out, report)
+    if not resolve:
+        requires("--resolve", port=port, watch=watch)
+    elif is_offered(port):
+        requires("a serial port", watch=watch)
+    check_targets(json, out, report, inputs=(model,))
+    check_port(port)
 
     from rich.progress import Progress, SpinnerColumn, TimeElapsedColumn
 
@@ -93,8 +100,10 @@ def diagnose(
         warn_of_units(console, measured)
     beside = named(dataset)
     resolved = beside.with_name(f"{beside.name}-resolved")  # where --resolve records
+    hands = None
     if resolve:
         further.refuse_leftovers(resolved)
+        hands = None if is_offered(port) else at_desk(console, watch, BENCH_FILE)[1]
     workers = cluster.cluster(dask, cluster.Tls(dask_ca, dask_cert, dask_key)) if dask else nullcontext((None, 0))
     robot = load_model(model) if model else None
     with console.status("starting"):
@@ -117,12 +126,13 @@ def diagnose(
         with workers as (executor, _):
             found = diagnosed(measured)
             if resolve:
-                from bifa.cli.campaign import at_desk
-                from bifa.rig import is_offered
-
-                hands = None if is_offered(port) else at_desk(console, watch, Path("bench.toml"))[1]
                 rigs = _rigs(measured, port, progress)
-                _, found, _ = further.resolve(measured, found, diagnosed, rigs, resolved, said, hands)
+                try:
+                    measured, found, _ = further.resolve(measured, found, diagnosed, rigs, resolved, said, hands)
+                except BaseException:  # whatever became of the rig, what the data say is told
+                    progress.stop()
+                    _report(console, measured, found, json, out, report)
+                    raise
     _report(console, measured, found, json, out, report)
 
 

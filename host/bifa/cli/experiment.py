@@ -6,7 +6,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from bifa.cli._options import BENCH, KNOWN, PORT, PROFILE, WATCH, Profile, file_option, kept, stoppable
+from bifa.cli._options import (
+    BENCH,
+    BENCH_FILE,
+    KNOWN,
+    PORT,
+    PROFILE,
+    WATCH,
+    Profile,
+    file_option,
+    kept,
+    requires,
+    stoppable,
+)
 from bifa.computer import EXAMPLE_PORT
 from bifa.printable import counted
 
@@ -29,6 +41,13 @@ EXAMPLES = (
 
 
 NAMES = ("static_loading", "step_response", "anchor_pull", "locomotion", "all")
+_USED_BY = {  # options that other experiments make no use of
+    "actuator": ("static_loading", "step_response"),
+    "rate": ("static_loading", "anchor_pull"),
+    "gait": ("locomotion",),
+    "cycles": ("locomotion",),
+    "inclination": ("locomotion",),
+}
 
 
 def _named(text: str) -> str:
@@ -55,17 +74,15 @@ def experiment(
     pressure: Annotated[list[float] | None, typer.Option(help="Pressure in psi; may be given several times.")] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, help="Cross-head or pull speed in mm/s.")] = None,
     gait: Annotated[list[Path] | None, file_option("Gait file to walk; otherwise three built-in gaits.")] = None,
-    cycles: Annotated[int, typer.Option(min=1, help="Cycles of each walk.")] = 5,
+    cycles: Annotated[int | None, typer.Option(min=1, help="Cycles of each walk; 5, or 3 with --quick.")] = None,
     inclination: Annotated[float, typer.Option(help="Pipe inclination in degrees (positive = uphill).")] = 0.0,
-    repeats: Annotated[int, typer.Option(min=1, help="Repeats of each condition.")] = 3,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Quick run: two repeats instead of three, at higher speed.")
-    ] = False,
+    repeats: Annotated[int | None, typer.Option(min=1, help="Repeats of each condition; 3, or 2 with --quick.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Quick run: fewer repeats and cycles, higher speed.")] = False,
     profile: Annotated[Profile | None, PROFILE] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Random seed of a virtual rig's noise.")] = None,
     known: Annotated[list[str], KNOWN] = [],  # noqa: B006
     watch: Annotated[Path | None, WATCH] = None,
-    bench: Annotated[Path, BENCH] = Path("bench.toml"),
+    bench: Annotated[Path | None, BENCH] = None,
     instrument: Annotated[Path | None, file_option("File of your own instrument, instead of a rig's.")] = None,
     telemetry: Annotated[
         Path | None, typer.Option(help="The Uno's telemetry of the same trial (bifa record).", exists=True)
@@ -88,8 +105,14 @@ def experiment(
     from bifa.files import check_targets
     from bifa.rig import check_port
 
-    if add and instrument is None:
-        raise typer.BadParameter("--add requires --instrument; a session on a rig is resumed by the same command")
+    given = {"actuator": actuator, "rate": rate, "gait": gait, "cycles": cycles, "inclination": inclination or None}
+    for option, users in _USED_BY.items():
+        if name not in (*users, "all"):
+            requires(f"{', '.join(users)} or all", **{option: given[option]})
+    if instrument is None:
+        requires("--instrument", telemetry=telemetry, add=add)
+    else:
+        requires("a rig, not --instrument", port=port, watch=watch, profile=profile, seed=seed)
     check_targets(folders=(out,))
     check_port(port)
 
@@ -106,11 +129,11 @@ def experiment(
         refuse_existing(out)
     for psi in pressure or []:
         _check_within("--pressure", psi, *RANGES["pressure_psi"])
+        if psi == 0.0 and name == "locomotion":
+            raise typer.BadParameter("--pressure 0: at 0 psi nothing walks; give a pressure above it")
     _check_within("--inclination", inclination, *INCLINATION_RANGE_DEG, "degrees")
     if rate is not None and not math.isfinite(rate):
         raise typer.BadParameter(f"--rate must be a finite number of mm/s, not {rate:g}")
-    if inclination and name not in ("locomotion", "all"):
-        raise typer.BadParameter(f"--inclination applies to walks only; leave it out, or run locomotion, not {name}")
     gaits = [_load(path) for path in gait] if gait else [BASELINE, plan.BRISK, plan.AMBLE]
     trials = plan.session(
         plan.EXPERIMENTS if name == "all" else (name,),
@@ -124,7 +147,7 @@ def experiment(
         quick=quick,
     )
     if instrument is not None:
-        _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add, bench)
+        _import(console, instrument, telemetry, _only(trials), out, parse_known(known), add, bench or BENCH_FILE)
         return
     options = {key: value for key, value in (("profile", profile), ("seed", seed)) if value is not None}
     with stoppable(lambda: f"valves off; {kept(out, 'finished trial')}; run the same command to resume"):
@@ -155,7 +178,7 @@ def _run(
     name: str,
     known: dict[str, float],
     watch: Path | None,
-    bench: Path,
+    bench: Path | None,
 ) -> None:
     from contextlib import nullcontext
 
@@ -178,7 +201,11 @@ def _run(
     cycles = max(trial.cycles for trial in trials)
     errors: list[float] = []
     with open_rig(port, **options) as rig:
-        hands = at_desk(console, watch, bench)[1] if rig.instruments is None else None
+        hands = None
+        if rig.instruments is None:
+            hands = at_desk(console, watch, bench or BENCH_FILE)[1]
+        else:
+            requires("a rig without instruments", watch=watch, bench=bench)
         bars = Progress(*columns, console=console)
         task = bars.add_task(name, total=len(trials))
 

@@ -17,7 +17,7 @@ EXAMPLES = (
 def fit(
     dataset: Annotated[Path, DATASET],
     out: Annotated[Path, typer.Option(help="Model file to write.")],
-    model: Annotated[Path | None, file_option("Model to start from; the nominal one if left out.")] = None,
+    model: Annotated[Path | None, file_option("Base model to start from; the nominal one if left out.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report.")] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
 ) -> None:
@@ -28,7 +28,7 @@ def fit(
     """
     from bifa.files import check_targets, written_into
 
-    check_targets(out, report, folders=(pictures,))
+    check_targets(out, report, folders=(pictures,), inputs=(model,))
 
     import time
     from datetime import date

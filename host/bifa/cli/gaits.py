@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bifa.cli._options import file_option, gait_names, stoppable
+from bifa.cli._options import file_option, gait_names, requires, stoppable
 
 if TYPE_CHECKING:
     from bifa.screen import Console
@@ -23,12 +23,11 @@ def gaits(
     only: Annotated[
         list[str], typer.Option(help="Only this gait; repeatable.", metavar="GAIT", autocompletion=gait_names)
     ] = [],  # noqa: B006
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the searches.")] = 0,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the searches; 0 if left out.")] = None,
 ) -> None:
     """List the gaits for scenarios, with predicted speeds and files for `bifa upload`; or recompute them."""
     from rich.table import Table
 
-    from bifa.errors import BifaError
     from bifa.files import check_targets
     from bifa.gait import library
     from bifa.screen import Console
@@ -39,11 +38,9 @@ def gaits(
         folder = out or library.FOLDER
         check_targets(folders=(folder,))
         with stoppable(lambda: f"the gaits listed above are in {folder}"):
-            _make(console, model, folder, names, seed)
+            _make(console, model, folder, names, seed or 0)
         return
-    idle = [name for name, given in (("--model", model), ("--out", out), ("--seed", seed)) if given]
-    if idle:
-        raise BifaError(f"{idle[0]} applies to a new search: add --make, or leave it out to list the existing gaits")
+    requires("--make", model=model, out=out, seed=seed)
     title = "Gaits of the nominal robot: mm/s; head, tail ahead; vacuum of body, head, tail"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("gait", "speed", "9 in 10", "period, s", "ahead, °", "vacuum"):

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bifa.cli._options import BENCH_FILE
+
 if TYPE_CHECKING:
     from bifa.data.export import Export
     from bifa.measure.propose import Look
@@ -26,14 +28,14 @@ def instrument(
         typer.Argument(help="An export of the instrument.", show_default=False, exists=True, dir_okay=False),
     ] = None,
     role: Annotated[str | None, typer.Option(help="machine or camera; otherwise you are asked.")] = None,
-    bench: Annotated[Path, typer.Option(help="File to write the declaration to.")] = Path("bench.toml"),
+    bench: Annotated[Path, typer.Option(help="File to write the declaration to.")] = BENCH_FILE,
     presets: Annotated[bool, typer.Option("--presets", help="List the programs whose exports are known.")] = False,
 ) -> None:
     """Look at an instrument's export, and declare how it is written.
 
-    Shows the names of its columns, its first rows, its row of units and a small plot of each column, proposes which
-    column is what, and asks. The declaration is checked on the file and written into the bench's file, from where `bifa
-    campaign` and `bifa experiment` read it. Nothing is declared without asking you.
+    Shows the names of its columns, its first rows, its row of units and a small plot of each of the first eight
+    columns, proposes which column is what, and asks. The declaration is checked on the file and written into the
+    bench's file, from where `bifa campaign` and `bifa experiment` read it. Nothing is declared without asking you.
     """
     from bifa.data.export import presets as known
     from bifa.screen import Console
@@ -49,10 +51,11 @@ def instrument(
         raise typer.BadParameter(f"--role must be machine or camera, not {role}")
 
     from bifa.errors import BifaError
-    from bifa.files import write_text
+    from bifa.files import check_targets, write_text
     from bifa.measure.bench_file import read_exports
     from bifa.measure.propose import declaration, look
 
+    check_targets(bench, inputs=(file,))
     seen = look(file)
     _show(console, file, seen)
     role = role or _choice("Whose file is it?", _ROLES, None)
@@ -61,9 +64,9 @@ def instrument(
             f"{bench} declares [instrument.{role}] already: remove that table first, or name another --bench"
         )
     table = _asked(console, seen, role)
-    _prove(console, file, role, table)
     text = declaration(role, table)
-    console.print(f"\n{text}")
+    console.print(f"\n{text}")  # before it is proved: what was answered is not lost where that fails
+    _prove(console, file, role, table)
     if typer.confirm(f"Write this into {bench}?", default=False):
         before = bench.read_text(encoding="utf-8") if bench.exists() else ""
         write_text(bench, f"{before.rstrip()}\n\n{text}" if before.strip() else text)
@@ -129,23 +132,29 @@ def _asked(console: "Console", seen: "Look", role: str) -> dict[str, Any]:
     if not given or any(given.columns.get(n) != c or given.units.get(n) != units[n] for n, c in columns.items()):
         table |= {"columns": columns, "units": units}
     table |= {key: value for key, value in more.items() if not given or getattr(given, key) != value}
-    return table | ({"sign": sign} if sign else {}) | _sync(seen)
+    return table | ({"sign": sign} if sign else {}) | _sync(console, seen)
 
 
 def _column(console: "Console", seen: "Look", name: str, proposed: str | None) -> str:
-    from bifa.data.errors import DatasetError
-
     while True:
         optional = "" if name == "time_s" else " (- if there is none)"
         column = typer.prompt(f"Which column is {name}{optional}?", default=proposed)
         if column == "-" and optional:
             return column
-        try:
-            for part in column.split(" + "):
-                seen.sheet.find(part)
+        if all(_is_there(console, seen, part) for part in column.split(" + ")):
             return column
-        except DatasetError as error:
-            console.print(str(error))
+
+
+def _is_there(console: "Console", seen: "Look", column: str) -> bool:
+    """Whether the export has the column; where it has not, that is said."""
+    from bifa.data.errors import DatasetError
+
+    try:
+        seen.sheet.find(column)
+    except DatasetError as error:
+        console.print(str(error))
+        return False
+    return True
 
 
 def _choice(question: str, allowed: list[str], proposed: str | None) -> str:
@@ -167,19 +176,20 @@ def _clock(unit: str, given: "Export | None") -> dict[str, Any]:
     return ({"date_format": form} if form else {}) | ({"zone": zone} if zone != "UTC" else {})
 
 
-def _sync(seen: "Look") -> dict[str, Any]:
+def _sync(console: "Console", seen: "Look") -> dict[str, Any]:
     """Where the strobe's edges are recorded."""
-    answer = typer.prompt(
-        "Where is the strobe (D10)? file: edges in a file beside it; frames: every row is a frame that it triggered; "
-        "or the column in which it was sampled",
-        default="file",
-    )
-    if answer == "file":
-        return {}
-    if answer == "frames":
-        return {"sync": "frames"}
-    seen.sheet.find(answer)
-    return {"sync": {"column": answer, "threshold": typer.prompt("High above?", default=2.5, type=float)}}
+    while True:
+        answer = typer.prompt(
+            "Where is the strobe (D10)? file: edges in a file beside it; frames: every row is a frame that it "
+            "triggered; or the column in which it was sampled",
+            default="file",
+        )
+        if answer == "file":
+            return {}
+        if answer == "frames":
+            return {"sync": "frames"}
+        if _is_there(console, seen, answer):
+            return {"sync": {"column": answer, "threshold": typer.prompt("High above?", default=2.5, type=float)}}
 
 
 def _prove(console: "Console", file: Path, role: str, table: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT, file_option
+from bifa.cli._options import PORT, file_option, requires
 
 _WEB_PORT = 8765
 
@@ -23,7 +23,10 @@ def monitor(
     gait: Annotated[Path | None, file_option("Upload this gait first.")] = None,
     run: Annotated[bool, typer.Option("--run", help="Start walking.")] = False,
     web: Annotated[bool, typer.Option("--web", help="Open a page in the browser, with sliders for the gait.")] = False,
-    web_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = _WEB_PORT,
+    web_port: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help=f"Port of the page, {_WEB_PORT} if left out; 0: any free one."),
+    ] = None,
     model: Annotated[Path | None, file_option("Model for the page's predictions; the nominal one if left out.")] = None,
     seconds: Annotated[
         float | None, typer.Option(min=0.1, help="Stop after this many seconds (default: until Ctrl-C).")
@@ -36,8 +39,8 @@ def monitor(
 
     Opening the port restarts an Uno. At the end, Ctrl-C included, all valves are off.
     """
-    if not web and (model is not None or web_port != _WEB_PORT):
-        raise typer.BadParameter("--model and --web-port require --web")
+    if not web:
+        requires("--web", model=model, web_port=web_port)
 
     from bifa.rig import check_port
 
@@ -80,7 +83,7 @@ def monitor(
                 page = LivePage(pilot, live_page(), robot)
             pilot.is_watched = page.is_watched
             say = partial(console.print, soft_wrap=True)
-            with served(page, web_port) as address:
+            with served(page, _WEB_PORT if web_port is None else web_port) as address:
                 say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
                 fly(pilot, SameBoard(port), page.tell, say, seconds, begin, adjust)
         except KeyboardInterrupt:

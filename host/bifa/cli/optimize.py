@@ -110,7 +110,7 @@ def optimize(
             return
         what = "pictures: what changed and why, sensitivity, front, distribution"
         with console.status(what), written_into(folder) as aside:
-            reasons = _pictures(robot, pool, best, aside)
+            reasons = draw_pictures(robot, pool, best, aside)
         for sentence in reasons:
             console.print(f"- {sentence}")
         console.print(f"pictures: {folder}")
@@ -165,10 +165,14 @@ def _summary(optimum: "Optimum") -> "Table":
     return table
 
 
-def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: Path) -> list[str]:
+def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: Path) -> list[str]:
+    from dataclasses import replace
+
     from bifa.gait import Settings, library, optimize
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
+    from bifa.gait.prediction import FINE_M
+    from bifa.gait.search import possible_robots
     from bifa.gait.sensitivity import front, sensitivity
     from bifa.report.gaits import distribution_chart, front_chart, sensitivity_chart
     from bifa.report.picture import draw_chart
@@ -177,14 +181,17 @@ def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: P
     from bifa.simulate import gait_rows, plant
 
     flat, settings = plant(robot), optimum.settings
-    draws = optimum.spread.plants(robot, 48, settings.seed + 3_000_017)
+    # The robots that the optimum's own speeds are of, judged alike: at a cliff others tell another story.
+    count, seed = optimum.speeds_mm_s.size, settings.seed + 2_000_003
+    robots = possible_robots(robot, pool, optimum.spread, settings, count, seed)
+    metric = replace(settings.rules.in_full(), tolerance_m=FINE_M)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)
     walks = [
         Walk(f"{title}: {one.speed_mm_s:.1f} mm/s", one.gait.period_s, {SIMULATED: one.record.columns})
         for title, one in (("baseline", before), ("optimised", after))
     ]
     draw_walks(walks, folder / "changes.png")
-    scans = sensitivity(pool, flat, draws[:24], optimum.gait, settings.metric.quicker())
+    scans = sensitivity(pool, flat, robots[:24], optimum.gait, metric)
     draw_chart(sensitivity_chart(scans), folder / "sensitivity.png")
     if settings.robust:
         robust = optimum.gait
@@ -194,11 +201,10 @@ def _pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folder: P
     else:
         robust, fast = library.load("robust").gait, optimum.gait
         other = {"the library's robust gait": robust}
-    found = front(pool, flat, draws, robust, fast, settings.metric.quicker())
+    found = front(pool, flat, robots[:48], robust, fast, metric)
     draw_chart(front_chart(found, (optimum.nominal_mm_s, optimum.quantile_mm_s)), folder / "front.png")
-    fresh = optimum.spread.plants(robot, optimum.speeds_mm_s.size, settings.seed + 2_000_003)
     shown = {"baseline": BASELINE, **other}
-    speeds = distribution(pool, fresh, gait_rows(list(shown.values())), settings.metric)
+    speeds = distribution(pool, robots, gait_rows(list(shown.values())), metric)
     draw_chart(
         distribution_chart(optimum, dict(zip(shown, speeds, strict=True))), folder / "distribution.png", width_in=6.4
     )

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT, file_option, kept, stoppable
+from bifa.cli._options import PORT, file_option, kept, requires, stoppable
+
+_CYCLES, _REPEATS = 6, 1
 
 EXAMPLES = (
     "bifa record --out out/walks --port virtual --gait gait.toml --cycles 10",
@@ -19,8 +21,12 @@ def record(
     gait: Annotated[
         Path | None, file_option("Gait to walk; otherwise the baseline, or no walk (without instruments).")
     ] = None,
-    cycles: Annotated[int, typer.Option(min=1, help="Cycles per walk (with instruments).")] = 6,
-    repeats: Annotated[int, typer.Option(min=1, help="Number of walks (with instruments).")] = 1,
+    cycles: Annotated[
+        int | None, typer.Option(min=1, help=f"Cycles per walk, {_CYCLES} if left out (with instruments).")
+    ] = None,
+    repeats: Annotated[
+        int | None, typer.Option(min=1, help=f"Number of walks, {_REPEATS} if left out (with instruments).")
+    ] = None,
     seconds: Annotated[
         float | None,
         typer.Option(min=0.1, help="Stop after this many seconds (without instruments; default: until Ctrl-C)."),
@@ -51,9 +57,11 @@ def record(
     with open_rig(port) as rig:
         has_instruments = rig.instruments is not None
         if has_instruments:
+            requires("a rig without instruments", seconds=seconds)
             console.print(f"gait: {gait or 'the baseline'}, {steps}")
             with stoppable(lambda: f"valves off; {kept(out, 'finished walk')}; the same command resumes"):
-                record_walks(rig, port, out, gait, cycles, repeats, console)
+                record_walks(rig, port, out, gait, cycles or _CYCLES, repeats or _REPEATS, console)
     if not has_instruments:
+        requires("a rig with instruments", cycles=cycles, repeats=repeats)
         console.print(f"gait: {gait}, {steps}" if gait else "no --gait: recording without walking")
         record_telemetry(SameBoard(port), out, gait, seconds, console)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bifa.cli._options import PICTURES, Obstacle, file_option
+from bifa.cli._options import PICTURES, Obstacle, file_option, requires
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -43,15 +43,18 @@ def simulate(
         typer.Option(help="Obstacle from the paper, placed 10 cm ahead.", show_default=False),
     ] = None,
     buckling: Annotated[
-        float, typer.Option(help="Force in N that buckles a ring of supports (assumed).")
-    ] = _BUCKLING_N,
+        float | None,
+        typer.Option(
+            help=f"Force in N that buckles a ring of an --obstacle's supports; {_BUCKLING_N:g}, assumed, if left out."
+        ),
+    ] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
     out: Annotated[Path | None, typer.Option(help="CSV of all channels at 100 Hz, as a data set's locomotion.")] = None,
     paper: Annotated[
         bool,
         typer.Option(
             "--paper",
-            help="Compare the paper's figures and obstacles with the model's; --gait: the model's fastest gait.",
+            help="Compare the paper's figures and obstacles with the model's; --gait: its fastest gait.",
         ),
     ] = False,
 ) -> None:
@@ -60,8 +63,10 @@ def simulate(
     The model may hold effects (`bifa diagnose` adds them); they act here as they did in the data.
     """
     walks = (cycles, inclination, payload, obstacle, buckling, pictures, out)
-    if paper and walks != (_CYCLES, 0.0, 0.0, None, _BUCKLING_N, None, None):
+    if paper and walks != (_CYCLES, 0.0, 0.0, None, None, None, None):
         raise typer.BadParameter("--paper simulates walks of its own; only --model and --gait can be combined with it")
+    if not obstacle:
+        requires("--obstacle", buckling=buckling)
 
     from bifa.files import check_targets, written_into
 
@@ -76,13 +81,14 @@ def simulate(
     if file.others:
         console.print(f"not simulated: {', '.join(file.others)} (the Uno's; the model has its own supply pressure)")
     if paper:
-        _print_paper(console, chosen if model else None, file.gait if gait else None)
+        _print_paper(console, chosen if model or gait else None, file.gait if gait else None)
         return
     chosen = chosen.with_values({"tail_mass_kg": chosen["tail_mass_kg"] + payload})
     with console.status("simulating"):
         from bifa.simulate import Supports, gait_rows, obstacles, speeds, terrain, walk
 
-        ahead, supports = obstacles(obstacle) if obstacle else (), Supports(buckling)
+        ahead = obstacles(obstacle) if obstacle else ()
+        supports = Supports(_BUCKLING_N if buckling is None else buckling)
         place: dict[str, Any] = {"inclination_deg": inclination}
         if ahead:
             place["terrain"] = terrain(ahead, supports)
@@ -120,7 +126,9 @@ def _print_walk(console: "Console", model: "Model", gait: "Gait", progress: "Adv
     found = settling(1e3 * progress.advance_m[0])
     if found.is_settled:
         console.print(f"settled from cycle {found.begins + 1} on")
-    elif len(progress.advance_m[0]) >= LEAST:
+    elif found.cycles < LEAST:
+        console.print("its last cycles are too few to tell whether it settles; try more --cycles")
+    else:
         console.print(f"not settled: its last {found.cycles} cycles vary by {found.varies:.1%}; try more --cycles")
 
 
@@ -156,7 +164,7 @@ def _print_passing(
 
 
 def _print_paper(console: "Console", model: "Model | None", gait: "Gait | None") -> None:
-    """Both shipped models, or the one given, with its fastest gait."""
+    """Both shipped models with their fastest gaits, or one model and gait."""
     from rich.table import Table
     from rich.text import Text
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from bifa.cli._options import PORT
+from bifa.cli._options import PORT, requires
 from bifa.computer import EXAMPLE_PORT
 
 EXAMPLES = (
@@ -32,8 +32,8 @@ def upload(
     Opening the port restarts an Uno: it stops walking, and comes back with its start preset. At the end of --run all
     valves are off.
     """
-    if seconds is not None and not run:
-        raise typer.BadParameter("--seconds requires --run")
+    if not run:
+        requires("--run", seconds=seconds)
 
     from bifa.rig import check_port
 

@@ -3,11 +3,13 @@
 from types import SimpleNamespace
 
 import pytest
+from typer.testing import CliRunner
 
 from bifa.campaign.resolve import ROUNDS, joined, planned, resolve
+from bifa.cli import app
 from bifa.data import Dataset
 from bifa.measure.plan import PlannedTrial
-from bifa.rig import open_rig
+from bifa.rig import RigError, open_rig
 from bifa.robot.gait import BASELINE
 from lacuna.diagnosis.next_experiment import NextExperiment
 
@@ -56,6 +58,38 @@ def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
     assert seen == [(dataset, {"leak", "hysteresis", "viscoelasticity"})], "what was named is tried again"
     assert [t.actuator for t in dataset.trials] == ["small"] * 3
     assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
+
+
+@pytest.fixture
+def diagnosing(monkeypatch, tmp_path):
+    """`bifa diagnose` of an empty day, and what it comes to: what was diagnosed, and what reported."""
+    done = []
+    monkeypatch.setattr("bifa.data.read_dataset", lambda folder: DAY)
+    monkeypatch.setattr("bifa.identify.start.prepare", lambda *_: SimpleNamespace())
+    monkeypatch.setattr(
+        "lacuna.diagnosis.diagnose.diagnose", lambda *_, **__: done.append("diagnosed") or "the verdict"
+    )
+    monkeypatch.setattr("lacuna.diagnosis.record.as_record", str)
+    monkeypatch.setattr("bifa.cli.diagnose.print_diagnosis", lambda console, record, labels: done.append(record))
+    return lambda *options: (CliRunner().invoke(app, ["diagnose", str(tmp_path), *options]).exception, done)
+
+
+def test_where_it_cannot_resolve_is_said_before_the_diagnosis(diagnosing, tmp_path):
+    for options in (["--port", "nowhere"], ["--port", "/dev/nowhere", "--watch", str(tmp_path / "nowhere")]):
+        error, done = diagnosing("--resolve", *options)
+        assert "nowhere" in str(error)
+        assert not done
+
+
+def test_the_verdict_is_told_where_the_rig_fails_after_it(diagnosing, monkeypatch, tmp_path):
+    def fails(*_):
+        raise RigError("gone")
+
+    monkeypatch.setattr("bifa.campaign.resolve.resolve", fails)
+    error, done = diagnosing("--resolve", "--port", "virtual", "--json", str(tmp_path / "verdict.json"))
+    assert isinstance(error, RigError)
+    assert done == ["diagnosed", "the verdict"]
+    assert (tmp_path / "verdict.json").read_text() == '"the verdict"\n'
 
 
 @pytest.mark.uno

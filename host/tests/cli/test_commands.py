@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 import typer
@@ -225,23 +227,84 @@ def test_the_gaits_are_listed_whole_on_any_terminal(width):
     assert all(figure in said for figure in ("speed", "period", "23.5", "208, 334", "0.65, 0.43,"))
 
 
+EXPERIMENT = ["experiment", "--out", "{missing}"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["monitor", "--model", "{here}", "--port", "nowhere"], "require --web"),
-        (["monitor", "--web-port", "0", "--port", "nowhere"], "require --web"),
+        (["monitor", "--model", "{here}", "--port", "nowhere"], "--model requires --web"),
+        (["monitor", "--model", "{here}", "--web-port", "0"], "--model and --web-port require --web"),
         (["monitor", "--web", "--model", "{missing}", "--port", "nowhere"], "does not exist"),
         (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds requires --run"),
         (["compare", "{here}"], "two campaigns or more"),
+        (["gaits", "--seed", "0"], "--seed requires --make"),
+        (["simulate", "--buckling", "5"], "--buckling requires --obstacle"),
+        (["diagnose", "{folder}", "--port", "nowhere", "--watch", "x"], "--port and --watch require --resolve"),
+        (["diagnose", "{folder}", "--resolve", "--port", "virtual", "--watch", "x"], "--watch requires a serial port"),
+        (["campaign", "--port", "virtual", "--watch", "x"], "--watch requires a serial port"),
+        (["campaign", "--port", "/dev/x", "--profile", "worn"], "--profile requires --port virtual"),
+        ([*EXPERIMENT, "locomotion", "--rate", "5"], "--rate requires static_loading, anchor_pull or all"),
+        ([*EXPERIMENT, "locomotion", "--actuator", "large"], "requires static_loading, step_response or all"),
+        ([*EXPERIMENT, "anchor_pull", "--actuator", "large"], "requires static_loading, step_response or all"),
+        ([*EXPERIMENT, "anchor_pull", "--gait", "{here}"], "--gait requires locomotion or all"),
+        ([*EXPERIMENT, "anchor_pull", "--cycles", "5"], "--cycles requires locomotion or all"),
+        ([*EXPERIMENT, "anchor_pull", "--inclination", "5"], "--inclination requires locomotion or all"),
+        ([*EXPERIMENT, "step_response", "--rate", "5"], "--rate requires static_loading, anchor_pull or all"),
+        ([*EXPERIMENT, "all", "--telemetry", "{here}", "--add"], "--telemetry and --add require --instrument"),
+        ([*EXPERIMENT, "all", "--instrument", "{here}", "--watch", "x"], "--watch requires a rig, not --instrument"),
+        ([*EXPERIMENT, "all", "--bench", "{missing}"], "does not exist"),
+        ([*EXPERIMENT, "locomotion", "--pressure", "0"], "at 0 psi nothing walks"),
     ],
     ids=" ".join,
 )
 def test_options_that_do_nothing_are_refused_before_anything_else(tmp_path, arguments, words):
     save_gait(tmp_path / "here", BASELINE)
-    places = {"here": tmp_path / "here", "missing": tmp_path / "missing"}
+    places = {"here": tmp_path / "here", "missing": tmp_path / "missing", "folder": tmp_path}
     result = invoke(*(argument.format(**places) for argument in arguments), columns=300)
     assert result.exit_code == 2
     assert words in result.output
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["fit", "{day}", "--model", "{model}", "--out", "{model}"],
+        ["fit", "{day}", "--model", "{model}", "--out", "x.toml", "--report", "{model}"],
+        ["diagnose", "{day}", "--model", "{model}", "--json", "{model}"],
+        ["compare", "{day}", "{day}/../day", "--report", "{day}/summary.json"],
+    ],
+    ids=" ".join,
+)
+def test_what_a_command_reads_it_does_not_write_over(tmp_path, arguments):
+    (tmp_path / "day").mkdir()
+    for name in ("model", "day/summary.json"):
+        (tmp_path / name).write_text("mine")
+    result = invoke(*(argument.format(day=tmp_path / "day", model=tmp_path / "model") for argument in arguments))
+    assert isinstance(result.exception, TargetError), result.output
+    assert "is an input of this command" in str(result.exception)
+
+
+def test_walks_are_not_asked_of_a_rig_without_instruments(tmp_path, monkeypatch):
+    monkeypatch.setattr("bifa.rig.open_rig", lambda port: nullcontext(SimpleNamespace(instruments=None)))
+    result = invoke("record", "--out", tmp_path / "out", "--cycles", 6, "--repeats", 1)
+    assert "--cycles and --repeats require a rig with instruments" in result.output
+
+
+@pytest.mark.uno
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["record", "--seconds", "1"], "--seconds requires a rig without instruments"),
+        (["experiment", "anchor_pull", "--watch", "."], "--watch requires a rig without instruments"),
+    ],
+    ids=" ".join,
+)
+def test_options_that_do_nothing_on_this_rig_are_refused(tmp_path, arguments, words):
+    result = invoke(*arguments, "--port", "virtual", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert words in result.output
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.uno

@@ -1,15 +1,19 @@
 """`bifa optimize` and `bifa gaits` from the outside."""
 
 import tomllib
+from dataclasses import replace
 from typing import get_args
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from bifa.cli import app, optimize
 from bifa.errors import BifaError
+from bifa.gait import Settings, library, objectives, search
 from bifa.gait.methods import METHODS
-from bifa.robot import load_gait, nominal, save_model
+from bifa.robot import Covariance, load_gait, nominal, save_model
+from bifa.simulate import gait_rows
 
 
 def invoke(*arguments):
@@ -30,6 +34,31 @@ def test_optimize_writes_a_gait_with_its_origin_and_the_figures(tmp_path):
     assert pictures == {"changes.png", "sensitivity.png", "front.png", "distribution.png"}
     assert "The body has" in result.output
     assert "10th percentile of 1024 robots" in result.output
+
+
+def test_pictures_compare_gaits_on_the_robots_of_the_optimums_own_speeds(runs, tmp_path, monkeypatch):
+    """Without those that do not walk with a gait that is known to walk, and by the same steps."""
+    unsure = replace(nominal(), covariance=Covariance(("body_area_N_psi",), np.array([[0.5]])))
+    known = library.load("robust").gait
+    found = search.optimize(unsure, runs, Settings(robust=False, evaluations=24, seed=5, begin=(known,)))
+    for drawing in ("report.gaits.sensitivity_chart", "report.gaits.front_chart", "report.gaits.distribution_chart"):
+        monkeypatch.setattr(f"bifa.{drawing}", lambda *_: None)
+    for drawing in ("report.picture.draw_chart", "report.walks.draw_walks"):
+        monkeypatch.setattr(f"bifa.{drawing}", lambda *_, **__: None)
+    met = {}
+
+    def meets(name, told):
+        monkeypatch.setattr(f"bifa.gait.{name}", lambda *given, **_: met.update({name: told(*given)}) or ((), ()))
+
+    meets("sensitivity.sensitivity", lambda runs, nominal, draws, gait, metric: (draws, metric))
+    meets("sensitivity.front", lambda runs, nominal, draws, robust, fast, metric: (draws, metric))
+    distribution = objectives.distribution
+    meets("objectives.distribution", lambda runs, draws, rows, metric: (draws, metric))
+    optimize.draw_pictures(unsure, runs, found, tmp_path)
+    for draws, metric in met.values():
+        speeds = distribution(runs, draws, gait_rows([found.gait]), metric)[0]
+        np.testing.assert_array_equal(speeds, found.speeds_mm_s[: len(draws)])
+    assert len(met) == 3
 
 
 @pytest.mark.parametrize(
@@ -80,7 +109,7 @@ def test_the_list_of_gaits_is_readable_at_80_columns():
 def test_options_of_a_search_are_refused_where_gaits_are_listed(tmp_path):
     (tmp_path / "mine.toml").touch()
     for options in (["--seed", "3"], ["--out", tmp_path], ["--model", tmp_path / "mine.toml"]):
-        assert f"{options[0]} applies to a new search" in str(invoke("gaits", *options).exception)
+        assert f"{options[0]} requires --make" in invoke("gaits", *options).output
 
 
 @pytest.mark.parametrize("make", [["--make"], []])

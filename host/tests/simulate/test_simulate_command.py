@@ -95,7 +95,7 @@ def test_an_obstacle_that_does_not_exist_is_refused_with_those_that_do():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--buckling", "-1"], "outside its range 0 to 1000 N"),
+        (["--obstacle", "arcs", "--buckling", "-1"], "outside its range 0 to 1000 N"),
         (["--payload", "4"], "tail_mass_kg = 4.175 is outside its range 0.02 to 1 kg"),
     ],
 )
@@ -111,6 +111,22 @@ def test_a_pipe_steeper_than_vertical_is_refused_with_the_range(degrees):
     assert result.exit_code == 2
     said = " ".join(result.output.replace("│", " ").split())  # a frame, wrapped anywhere
     assert "than or equal to " + ("90" if degrees == "91" else "-90") in said
+
+
+def test_the_papers_table_takes_a_gait_without_a_model(tmp_path, monkeypatch):
+    compared = []
+    monkeypatch.setattr("bifa.simulate.paper.compare", lambda *pair: compared.append(pair) or [])
+    monkeypatch.setattr("bifa.simulate.paper.obstacle_rows", lambda *pair: compared.append(pair) or [])
+    robot.save_gait(tmp_path / "hasty.toml", FAST)
+    assert _run("--paper", "--gait", tmp_path / "hasty.toml").exit_code == 0
+    assert compared == [(robot.nominal(), FAST)] * 2
+
+
+@pytest.mark.parametrize(("cycles", "words"), [(2, "too few to tell"), (4, "too few to tell"), (6, "not settled")])
+def test_of_few_cycles_nothing_is_said_to_be_unsettled(monkeypatch, cycles, words):
+    """As a gait that never settles gives them."""
+    monkeypatch.setattr("bifa.gait.settling.WITHIN", -1.0)
+    assert words in _words(_run("--cycles", cycles))
 
 
 @pytest.mark.parametrize(
