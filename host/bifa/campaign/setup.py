@@ -59,7 +59,7 @@ class Setup:
 def about(setup: Setup, effort: Effort) -> tuple[str, list[tuple[str, str]]]:
     """The robot in words, and how the campaign was made; the same for the same settings."""
     words = ["bifa", "campaign", "--port", setup.port]
-    if setup.is_virtual:
+    if setup.is_virtual or setup.seed:  # which seeds searches and the diagnosis on any rig
         words += ["--seed", str(setup.seed)]
     if "profile" in setup.options:
         words += ["--profile", str(setup.options["profile"])]
