@@ -61,14 +61,25 @@ def _moved(asked: np.ndarray, weights: np.ndarray, order: np.ndarray) -> np.ndar
 
 
 def _added(fitted: Fit, ordered: list[int], column: int, moved: np.ndarray) -> float:
-    """What such shifts add to the mean square of the residual in the experiment where they add most."""
+    """What such shifts add to the mean square of the residual in the experiment where they add most; in a channel where
+    that is within the accuracy that counts, nothing."""
     squares: dict[str, float] = defaultdict(float)
     pieces: dict[str, float] = defaultdict(float)
-    jacobians = fitted.solution.jacobians
+    by_channel: dict[tuple[str, str], list[float]] = defaultdict(lambda: [0.0, 0.0])
+    jacobians, floor = fitted.solution.jacobians, fitted.problem.floor
     for k, shift in zip(ordered, moved, strict=True):
         trial, derivative = fitted.problem.trials[k], jacobians[k][0][:, column]
         squares[trial.experiment] += float(derivative @ derivative) * shift**2
-        pieces[trial.experiment] += pieces_of(trial, fitted.problem.floor)
+        pieces[trial.experiment] += pieces_of(trial, floor)
+        known = [np.isfinite(values).sum() for values in trial.channels.values()]
+        for channel, part in zip(trial.channels, np.split(derivative, np.cumsum(known)[:-1]), strict=True):
+            of_channel = by_channel[trial.experiment, channel]
+            of_channel[0] += float(part @ part) * shift**2
+            of_channel[1] += len(part) / floor.samples_per_piece(trial, channel)
+    for (experiment, channel), (square, count) in by_channel.items():
+        enough = (fitted.structure.system.accuracy(experiment, channel) / floor.of(experiment, channel).sd) ** 2
+        if square <= enough * count:
+            squares[experiment] -= square
     return max(squares[e] / pieces[e] for e in squares)
 
 

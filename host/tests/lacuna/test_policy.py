@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from toy import case_of, hide
+from toy import ToySystem, case_of, hide
 
 from lacuna.diagnosis.candidate import implausibility
 from lacuna.diagnosis.decide import Comparison, choose, weigh
@@ -109,6 +109,14 @@ def test_a_drift_below_relevance_is_told_and_the_verdict_is_none():
     again = diagnose(hide({}, seed=16, repeats=6, drift=0.02), policy=lenient)
     assert (again.verdict, bool(again.drifts)) == ("none", True)
     assert "over the session" in again.signature.text
+
+
+@pytest.mark.slow
+def test_a_drift_within_the_accuracy_that_counts_is_told_and_the_verdict_is_none(monkeypatch):
+    monkeypatch.setattr(ToySystem, "accuracy", lambda *_: 1.0)  # mm
+    found = diagnose(hide({}, seed=16, repeats=6, drift=0.02))
+    assert (found.verdict, [drift.share for drift in found.drifts]) == ("none", [0.0] * len(found.drifts))
+    assert found.drifts
 
 
 # --- Which mechanisms are supported? ---
