@@ -35,6 +35,7 @@ class Ending(StrEnum):
 
     PREDICTED = "predicted"
     UNCHANGED = "unchanged"
+    FALLS = "falls"  # the model with its walks among the data expects none of its own gaits to walk
     MOST = "most"  # as many as there may be
 
 
@@ -96,11 +97,12 @@ def ending(rounds: Sequence[Round]) -> Ending | None:
 @dataclass(frozen=True)
 class Trades:
     """What a round is made of: a diagnosis of all data, which suspects what was named before, gives the completed model
-    and what it names, an optimiser its gait, beginning from those walked before, and the robot walks it into a data
-    set; walk(number, model, gait, folder) numbers the rounds from 2 on."""
+    and what it names, an optimiser its gait, beginning from those walked before, or None where the model itself
+    expects it to fall, and the robot walks it into a data set; walk(number, model, gait, folder) numbers the rounds
+    from 2 on."""
 
     complete: Callable[[Dataset, tuple[str, ...]], tuple[Model, tuple[str, ...]]]
-    optimize: Callable[[Model, tuple[Gait, ...]], Gait]
+    optimize: Callable[[Model, tuple[Gait, ...]], Gait | None]
     walk: Callable[[int, Model, Gait, Path], Dataset]
 
 
@@ -146,7 +148,7 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     Writes rounds.json, the walks of further rounds (rounds/walks-2, ...), the last round's model and the fastest gait.
     Rounds that an interrupted run has walked there are not walked again.
     """
-    model, gait = load_model(inputs / "model-completed.toml"), load_gait(inputs / "gait-completed.toml")
+    model, found = load_model(inputs / "model-completed.toml"), [load_gait(inputs / "gait-completed.toml")]
     walks = read_dataset(inputs / "walks-completed")
     base = read_dataset(inputs / "walks-base")
     # the bench has walked the baseline, for another length of time
@@ -155,15 +157,18 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
     began = tuple({Gait(**trial.walked): None for trial in before.trials})
     (outputs / "rounds").mkdir(exist_ok=True)
     rounds = [judged(model, effects, walks)]
-    found = [gait]
     while (ended := ending(rounds)) is None:
         number = len(rounds) + 1
         dataset = joined(dataset, walks, f"walks-{number - 1}/")
         completed, named = trades.complete(dataset, effects)
         # Where nothing is named any more fits have lost their way: what explained the bench is not given up for that.
-        if named or not effects:
-            model, effects = completed, named
-        found.append(trades.optimize(model, (*began, *found)))
+        if effects and not named:
+            completed, named = model, effects
+        if (gait := trades.optimize(completed, (*began, *found))) is None:
+            ended = Ending.FALLS
+            break
+        model, effects = completed, named
+        found.append(gait)
         folder = outputs / "rounds" / f"walks-{number}"
         walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)
         rounds.append(judged(model, effects, walks, at_edge=True))

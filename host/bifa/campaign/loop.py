@@ -35,6 +35,7 @@ from lacuna.diagnosis.record import as_record
 
 BENCH_NAME = "campaign: characterisation"  # of its data set
 AT_EDGE = 0.05  # of the robots that may fall off
+_LIKELY = 0.5  # to walk: less, and a gait at the edge is not worth the robot's time
 _SEPARATING = 10  # the first of the rig's numbers for experiments that separate confusable effects,
 _FURTHER = 20  # and for walks of further rounds
 
@@ -119,16 +120,25 @@ def _optimize(which: str, walked: tuple[str, ...], setup: Setup, on_progress: On
 
 
 def _gait_of(
-    robot: Model, setup: Setup, on_progress: OnProgress, walked: tuple[Gait, ...], spread: float | None = SPREAD
+    robot: Model, setup: Setup, on_progress: OnProgress, walked: tuple[Gait, ...]
 ) -> tuple[Gait, dict[str, Any]]:
-    """The gait found with a model, robust against `spread` or, None, against what is known, and where it comes from. A
-    base model that lacks much may have none that walks, and neither may a robot whose bench shakes it: that ends no
-    campaign, and the gait walked last stands in, or the baseline."""
+    """The robust gait found with a model, and where it comes from. A base model that lacks much may have none that
+    walks, and neither may a robot whose bench shakes it: that ends no campaign, and the gait walked last stands in, or
+    the baseline."""
     try:
-        best = found_gait(robot, setup.seed, spread, on_progress, walked)
+        best = found_gait(robot, setup.seed, SPREAD, on_progress, walked)
     except SearchError as error:
         return (BASELINE, *walked)[-1], {"made_by": "bifa campaign", "instead_of": f"a gait of {robot.name}: {error}"}
     return best.gait, provenance(best, robot.name, "bifa campaign")
+
+
+def gait_at_edge(robot: Model, seed: int, on_progress: OnProgress, walked: tuple[Gait, ...]) -> Gait | None:
+    """The gait for what is known of the model; None where there is none or the model itself expects it to fall."""
+    try:
+        best = found_gait(robot, seed, None, on_progress, walked)
+    except SearchError:
+        return None
+    return best.gait if best.prediction.walks_probability >= _LIKELY else None
 
 
 def found_gait(
@@ -213,7 +223,7 @@ def _again(setup: Setup, effort: Effort, on_progress: OnProgress) -> Stage:
         for folder in sorted((inputs / "separating").iterdir()):
             dataset = joined(dataset, read_dataset(folder), f"{folder.name}_")
         named = json.loads((inputs / "diagnosis.json").read_text())["effects"]
-        trades = Trades(complete, lambda robot, walked: _gait_of(robot, setup, on_progress, walked, None)[0], walk)
+        trades = Trades(complete, lambda robot, walked: gait_at_edge(robot, setup.seed, on_progress, walked), walk)
         again(inputs, outputs, dataset, tuple(effect["name"] for effect in named), trades)
 
     walked = ("walks-base", "walks-completed")

@@ -2,14 +2,17 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bifa.campaign.again import ROUNDS, Ending, Trades, again, ending, judged, read_rounds
+from bifa.campaign.loop import gait_at_edge
 from bifa.campaign.stages import StageError
 from bifa.campaign.walks import planned_cycles
 from bifa.data import Dataset, Trial, read_dataset, write_dataset
+from bifa.gait import SearchError
 from bifa.gait.settling import MOST_CYCLES
 from bifa.robot import Model, load_model, nominal, save_model
 from bifa.robot.gait import BASELINE, Gait, load_gait, save_gait
@@ -62,6 +65,11 @@ def folders(tmp_path):
 
 def walk_into(number, model, gait, folder):
     write_dataset(folder, walked({f"round-{number}": gait}, number))
+    return read_dataset(folder)
+
+
+def fall(number, model, gait, folder):
+    write_dataset(folder, stood(gait, number))
     return read_dataset(folder)
 
 
@@ -150,15 +158,39 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
         seen.append(sorted({trial.file.split("/")[0] for trial in dataset.trials}))
         return ROBOT, ()
 
-    def fall(number, model, gait, folder):
-        write_dataset(folder, stood(gait, number))
-        return read_dataset(folder)
-
     rounds = rounds_of(folders, ROBOT, Trades(complete, lambda model, walked: FASTER, fall))
     assert len(rounds) == ROUNDS
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]
     assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
     assert load_gait(folders[1] / "gait-last.toml") == FAST, "the robust gait is what is kept"
+
+
+def test_a_gait_that_its_own_model_expects_to_fall_is_not_walked(folders):
+    """Choked flow, 906: a third diagnosis took a miss of 0.8 % for a tether, and walked what it gave a probability of
+    0.16; 20.3 mm/s became 6.4."""
+    answers, gaits = iter([ROBOT, SLIPPERY]), iter([FASTER, None])
+
+    def complete(dataset, suspected):
+        return next(answers), (*suspected, "hysteresis")
+
+    rounds = rounds_of(folders, SLIPPERY, Trades(complete, lambda model, walked: next(gaits), fall))
+    assert [(tuple(r["effects"]), r["ended"]) for r in rounds] == [((), None), (("hysteresis",), "falls")]
+    assert load_model(folders[1] / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"]), "that of the last walk"
+    assert load_gait(folders[1] / "gait-last.toml") == FAST
+    assert not (folders[1] / "rounds" / "walks-3").exists()
+
+
+@pytest.mark.parametrize(("probability", "gait"), [(0.97, FASTER), (0.16, None), (None, None)])
+def test_at_the_edge_there_may_be_no_gait(monkeypatch, probability, gait):
+    """None walks, or the best of them probably would not."""
+
+    def found(*_):
+        if probability is None:
+            raise SearchError("none of 40 gaits walks")
+        return SimpleNamespace(gait=FASTER, prediction=SimpleNamespace(walks_probability=probability))
+
+    monkeypatch.setattr("bifa.campaign.loop.found_gait", found)
+    assert gait_at_edge(ROBOT, 0, lambda what, share: None, (FAST,)) == gait
 
 
 def stood(gait, seed):

@@ -92,7 +92,10 @@ def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
     assert "It ended after round 2: the speed of its gait is predicted to within the scatter of repeats" in section
 
 
-@pytest.mark.parametrize(("ended", "why"), [("unchanged", "predicted no better"), ("most", "at most 3 rounds")])
+@pytest.mark.parametrize(
+    ("ended", "why"),
+    [("unchanged", "predicted no better"), ("falls", "so it was not walked"), ("most", "at most 3 rounds")],
+)
 def test_rounds_that_end_without_a_prediction_say_so(ended, why):
     section = rounds_section([*sample.ROUNDS[:1], sample.ROUNDS[1] | {"ended": ended}])
     assert section.paragraphs[-1].startswith("It ended after round 2: ")
