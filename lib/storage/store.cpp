@@ -117,8 +117,11 @@ Result Store::save_record(const char* name, const void* payload) {
 
 Result Store::forget(const char* name) {
   if (busy()) return Result::kBusy;
-  Record record;
-  if (!is_name(name) || !newest(name, record)) return Result::kNoPreset;
+  bool known = false;  // also by a later firmware, whose records are taken
+  for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
+    known = known || (has(slot, kLive | kTaken) && is_named(slot, name));
+  }
+  if (!is_name(name) || !known) return Result::kNoPreset;
   scan();
   doom(name);
   job_ = Job::kVoid;

@@ -41,7 +41,7 @@ def carried_path() -> Path | None:
 def carried_image(folder: Path = FOLDER) -> Path:
     """The package's image, checked: undamaged, and of the tables that this host speaks."""
     try:
-        noted = Image(**tomllib.loads((folder / HEAD).read_text("utf-8")))
+        noted = _noted(folder / HEAD)
         found = image_of(folder / HEX)
     except FileNotFoundError as error:
         raise ImageError(
@@ -70,6 +70,13 @@ def image_of(path: Path) -> Image:
         raise ImageError(f"{path} is not a bifa firmware image")
     version, protocol, table = (group.decode() for group in says.groups())
     return Image(version, int(protocol), table, hashlib.sha256(text).hexdigest())
+
+
+def _noted(path: Path) -> Image:
+    try:
+        return Image(**tomllib.loads(path.read_text("utf-8")))
+    except (ValueError, TypeError) as error:  # no text, no TOML, other keys
+        raise ImageError(f"{path} is damaged: reinstall the wheel of bifa") from error
 
 
 def _check_tables(image: Image, path: Path) -> None:

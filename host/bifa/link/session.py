@@ -146,8 +146,11 @@ class Session:
                 f"this is bifa {__version__} (protocol {PROTOCOL_VERSION}, table {TABLE_HASH:08x}); "
                 "bring the Uno up to date with: bifa flash"
             )
-        # One key for all attempts: a hello that was already under way answers an earlier one.
-        key = self._random.randrange(1, 0x10000)
+        # One key for all attempts: a hello that was already under way answers an earlier one. Not that of a session
+        # which is there: it would not be opened anew.
+        key = hello.session_key
+        while key == hello.session_key:
+            key = self._random.randrange(1, 0x10000)
         while hello.session_key != key:
             hello = self._greet("connect", (hello.boot_nonce, key), deadline)
         self.key = key

@@ -9,7 +9,7 @@ from bifa.link.uno import Uno
 SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
 MOVING = ("run", "hold")
-REPLACING = ("load", "defaults")  # the parameters
+REPLACING = ("load", "defaults", "set host_timeout_s")  # what the guard stands for
 
 
 def is_answer(line: str) -> bool:
@@ -47,7 +47,7 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
         uno.may_move = True
     with uno.unguarded() if word == "save" else nullcontext():
         lines = _answered(uno, line, clock)
-    if word in REPLACING:
+    if " ".join(line.split()).startswith(REPLACING) and lines[-1].startswith("ok"):
         uno.guard_again()
     return lines
 

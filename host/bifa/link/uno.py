@@ -85,7 +85,8 @@ class Uno:
         self.session.on_sample = self._take_sample
         self.session.on_renewed = self._stream_again
         self.may_move = False
-        self._is_guarded = False  # `host_timeout_s` is GUARD_S where it would be 0
+        # Once guarded: `host_timeout_s` (wire units) as it was chosen; GUARD_S stands for 0.
+        self._own_timeout: int | None = None
         self.clock_relation = ClockRelation()
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
@@ -128,7 +129,7 @@ class Uno:
         self._time_us = None
         self._last_sample = None
         self._streaming = False
-        self._is_guarded = False
+        self._own_timeout = None
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
         self._read_set()
@@ -186,10 +187,13 @@ class Uno:
         the Uno ends up with anything but what was meant.
         """
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
+        own_timeout = wanted.get("host_timeout_s", self._own_timeout)
         wanted = {**self._read_set()[0], **wanted}
-        if self._is_guarded and wanted["host_timeout_s"] == 0:
+        if self._own_timeout is not None and own_timeout == 0:
             wanted["host_timeout_s"] = to_wire("host_timeout_s", GUARD_S)
         self._replace(wanted)
+        if self._own_timeout is not None:
+            self._own_timeout = own_timeout
         if wait:
             self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
         if save is not None:
@@ -206,22 +210,20 @@ class Uno:
     def guard(self) -> None:
         """From now on, until it restarts, the Uno vents by itself GUARD_S after this host has fallen silent (killed,
         or hanging), unless it has a `host_timeout_s` already. Whatever moves air calls this."""
-        if not self._is_guarded and self._read_set()[0]["host_timeout_s"] == 0:
-            self._is_guarded = True
-            try:
-                self.upload({})
-            except BaseException:
-                self._is_guarded = False
-                raise
+        if self._own_timeout is None:
+            own_timeout = self._read_set()[0]["host_timeout_s"]
+            if own_timeout == 0:
+                self.upload({"host_timeout_s": GUARD_S})
+            self._own_timeout = own_timeout
 
     @contextmanager
     def unguarded(self) -> Iterator[None]:
         """Inside, the Uno holds the parameters as they were meant, without the guard: to be saved for another day
         and a bare terminal."""
-        if not self._is_guarded:
+        if self._own_timeout != 0:
             yield
             return
-        self._is_guarded = False
+        self._own_timeout = None
         self.upload({"host_timeout_s": 0.0})
         try:
             yield
@@ -229,9 +231,9 @@ class Uno:
             self.guard()
 
     def guard_again(self) -> None:
-        """After a parameter set without the guard has been adopted."""
-        if self._is_guarded:
-            self._is_guarded = False
+        """After `host_timeout_s` has been replaced, by itself or with its set."""
+        if self._own_timeout is not None:
+            self._own_timeout = None
             self.guard()
 
     def _wait_for_boundary(self, period_s: float) -> None:
@@ -371,9 +373,9 @@ class Uno:
 
     def stream(self, on: bool) -> None:
         """Telemetry in frames, 100 samples a second."""
-        self.session.call("stream", int(on))
         if on and not self._streaming:
-            self._last_sample = None
+            self._last_sample = None  # before the call, within which the first samples may come
+        self.session.call("stream", int(on))
         self._streaming = on
 
     def mark_strobe(self, timeout_s: float = 1.0) -> int:

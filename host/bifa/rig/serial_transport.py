@@ -19,7 +19,7 @@ class SerialTransport:
         self.device = device
         try:
             self._port = serial.Serial(device, BAUD, timeout=0, write_timeout=2.0, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as error:
+        except Exception as error:  # pyserial lets termios.error pass, which Windows does not have
             raise PortGoneError(why_unopened(device, error)) from error
 
     def write(self, data: bytes) -> None:
@@ -35,7 +35,8 @@ class SerialTransport:
             self._port.timeout = timeout_s
             first = self._port.read(1)
             return first + self._port.read(self._port.in_waiting) if first else b""
-        except (serial.SerialException, OSError, TypeError) as error:  # pyserial: TypeError when closed meanwhile
+        # pyserial: TypeError when closed meanwhile, ValueError when it sets the baud rate of a port that has just gone
+        except (serial.SerialException, OSError, TypeError, ValueError) as error:
             raise self._gone() from error
 
     def close(self) -> None:

@@ -39,13 +39,14 @@ def holder_of(port: str) -> str | None:
 
 
 def _locked_by(port: str) -> int | None:
-    """From lines like `1: FLOCK ADVISORY WRITE 4711 fe:00:1027 0 EOF`."""
+    """From lines like `1: FLOCK ADVISORY WRITE 4711 fe:00:1027 0 EOF`. One that has ended still stands there while its
+    children keep its lock."""
     with suppress(OSError, ValueError):
         stat = os.stat(port)
         place = f"{os.major(stat.st_dev):02x}:{os.minor(stat.st_dev):02x}:{stat.st_ino}"
         for line in (_PROC / "locks").read_text().splitlines():
             _, kind, _, _, pid, where, *_ = line.split()
-            if kind == "FLOCK" and where == place and int(pid) > 0:
+            if kind == "FLOCK" and where == place and (_PROC / pid).is_dir():
                 return int(pid)
     return None
 

@@ -263,6 +263,14 @@ def test_records_of_a_later_format_are_left_alone():
     assert bench.names() == ["one"]
 
 
+def test_records_of_a_later_format_are_forgotten_by_their_name():
+    bench = Bench((old_record(3, 5, b"later", bytes(26)) * 2 + BLANK)[:SIZE])
+    assert bench.forget("late") == NO_PRESET
+    assert bench.forget("later") == OK
+    assert [bench.image()[slot * SLOT] for slot in range(2)] == [0, 0]
+    assert bench.forget("later") == NO_PRESET
+
+
 def test_a_sequence_that_is_used_up_is_said_and_erasing_begins_anew():
     """No Uno lives that long, but a stranger's EEPROM may say so: nothing is "saved" that cannot be read again."""
     bench = Bench((old_record(2, 0xFFFFFF00, b"last", parameter_set(1)) + BLANK)[:SIZE])

@@ -57,6 +57,44 @@ def test_a_timeout_that_is_chosen_is_kept(board, connected):
     assert connected.get("host_timeout_s") == 0.5
 
 
+CHOICES = {
+    "set": lambda uno, board, timeout_s: uno.set("host_timeout_s", timeout_s),
+    "typed": lambda uno, board, timeout_s: type_line(uno, f"set  host_timeout_s {timeout_s:g}", board),
+}
+
+
+@pytest.mark.parametrize("choose", CHOICES)
+@pytest.mark.parametrize("timeout_s", [5.0, GUARD_S])
+def test_a_timeout_that_is_chosen_while_guarded_is_kept_and_saved(board, connected, choose, timeout_s):
+    connected.run()
+    CHOICES[choose](connected, board, timeout_s)
+    connected.save("fast")
+    assert connected.get("host_timeout_s") == timeout_s
+    board.type("load fast")  # past the host
+    assert f"[host_timeout_s {timeout_s:g} s" in "".join(board.type("show host_timeout_s"))
+
+
+@pytest.mark.parametrize("choose", CHOICES)
+def test_no_timeout_is_no_choice_once_something_has_moved(board, connected, choose):
+    connected.set("host_timeout_s", 5.0)
+    connected.run()
+    CHOICES[choose](connected, board, 0.0)
+    assert connected.get("host_timeout_s") == GUARD_S
+    connected.halt()
+    connected.run()
+    board.sleep(GUARD_S + 0.1)
+    assert (board.valves, board.state) == (0, "fault")
+
+
+def test_a_refused_line_does_not_make_the_guard_a_choice(board, connected):
+    connected.run()
+    assert type_line(connected, "load nobody", board)[-1].startswith("error no such preset")
+    assert type_line(connected, "set host_timeout_s 61", board)[-1].startswith("error out of range")
+    connected.save("fast")
+    board.type("load fast")  # past the host
+    assert "[host_timeout_s 0 s" in "".join(board.type("show host_timeout_s"))
+
+
 def test_what_is_kept_on_the_uno_knows_no_guard(board, connected):
     """A preset is for a bare terminal as well, where nobody feeds it."""
     connected.run()

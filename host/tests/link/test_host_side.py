@@ -122,6 +122,27 @@ def test_lost_samples_are_counted():
     assert samples[0].command[1:] == (0.0, 1.0)
 
 
+def test_samples_that_come_with_the_answer_are_counted_from_where_the_stream_begins():
+    class Batches(Board):
+        """As USB hands bytes on: those of some milliseconds at once."""
+
+        def read(self, timeout_s: float) -> bytes:
+            self.sleep(0.016)
+            return self.receive()
+
+    board = Batches()
+    uno = Uno(board, board)
+    uno.connect()
+    for _ in range(2):
+        uno.stream(True)
+        sequences = [sample.sequence for sample in uno.samples(0.1)]
+        assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
+        uno.stream(False)
+        uno.taken_samples()
+        board.sleep(700.0)  # more samples than 16 bits count
+    assert uno.counters.lost == 0
+
+
 @given(st.floats(-5e-3, 5e-3), st.floats(0, 1000), st.integers(0, 2**32))
 @settings(max_examples=40, deadline=None)
 def test_the_clock_relation_keeps_its_bound(drift, offset_s, seed):

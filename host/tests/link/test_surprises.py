@@ -198,6 +198,14 @@ def test_an_answer_of_another_kind_is_none(board, ask):
         ask(uno)
 
 
+def test_a_session_with_the_key_of_the_one_before_is_another(board):
+    """Of the same seed; or by chance, where opening the port restarts no Uno."""
+    for _ in range(2):
+        uno = Uno(board, board, seed=1)
+        uno.connect()
+        assert uno.status().state == "idle"
+
+
 def test_an_uno_that_greets_before_any_session_is_said_to_have_restarted():
     """Another program has a session with it; this one has not connected yet."""
     board = Board()

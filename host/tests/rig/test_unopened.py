@@ -1,11 +1,13 @@
 """A port that does not open: one sentence with the cause that is known."""
 
+import contextlib
 import errno
 import os
 import pty
 import re
 import subprocess
 import sys
+import termios
 import tty
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import serial
 
 from bifa.link import PortGoneError
 from bifa.rig import open_rig
+from bifa.rig.serial_transport import SerialTransport
 from bifa.rig.unopened import holder_of, why_unopened
 
 pytestmark = pytest.mark.skipif(not Path("/proc/locks").exists(), reason="the system tells nobody who holds a port")
@@ -66,6 +69,16 @@ def test_who_has_a_port_open_without_a_lock_is_found_as_well(port, held):
     assert f"process {program.pid}" in holder_of(port)
 
 
+def test_who_keeps_the_lock_of_a_program_that_has_ended_is_named(port):
+    """A worker, for instance, where the program itself was killed."""
+    forks = HOLD.format(lock=True).replace("sys.stdin", "import os; os.fork() and os._exit(0); sys.stdin")
+    with subprocess.Popen([sys.executable, "-c", forks, port], stdin=subprocess.PIPE) as program:
+        program.wait()
+        holder = holder_of(port)
+        assert holder.startswith("`-c 'import serial")
+        assert f"process {program.pid}" not in holder
+
+
 def test_a_command_of_bifa_is_named_as_it_is_typed(port, tmp_path):
     record = [sys.executable, "-m", "bifa", "record", "--port", port, "--out", str(tmp_path / "telemetry")]
     with subprocess.Popen(record, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as program:
@@ -89,6 +102,27 @@ def test_a_command_of_bifa_is_named_as_it_is_typed(port, tmp_path):
 )
 def test_each_cause_has_its_remedy(error, said):
     assert re.search(said, why_unopened("COM3", error))
+
+
+def test_a_port_that_goes_as_it_is_opened_is_gone(port, monkeypatch):
+    def gone(*_: object) -> None:
+        raise termios.error(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(termios, "tcflush", gone)
+    with pytest.raises(PortGoneError, match="does not open"):
+        SerialTransport(port)
+
+
+def test_a_port_that_goes_as_its_baud_rate_is_set_is_gone(port, monkeypatch):
+    """pyserial sets it anew with every time-out."""
+
+    def gone(*_: object) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    with contextlib.closing(SerialTransport(port)) as transport:
+        monkeypatch.setattr("fcntl.ioctl", gone)
+        with pytest.raises(PortGoneError, match="is gone"):
+            transport.read(0.01)
 
 
 def test_a_recording_that_never_began_ends_with_the_cause_and_does_not_wait(tmp_path):

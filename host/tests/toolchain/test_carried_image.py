@@ -78,6 +78,15 @@ def test_an_image_knows_itself():
     assert image_of(BUILT).table == f"{TABLE_HASH:08x}"
 
 
+@pytest.mark.parametrize("kept", [0, 10, -3], ids=["nothing", "its start", "all but its end"])
+def test_an_image_of_which_nobody_knows_what_it_should_be_is_not_written(package, kept):
+    """Half unpacked, for instance where the disk was full."""
+    head = package / "uno.toml"
+    head.write_bytes(head.read_bytes()[:kept])
+    with pytest.raises(ImageError, match=r"uno\.toml is damaged"):
+        carried_image(package)
+
+
 @pytest.mark.parametrize("at", [0, 1000, -3], ids=["its start", "in the middle", "its end"])
 def test_a_damaged_image_is_not_written(package, at):
     hex_file = package / "uno.hex"
