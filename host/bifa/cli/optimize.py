@@ -172,7 +172,7 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
     from bifa.gait.prediction import FINE_M
-    from bifa.gait.search import possible_robots
+    from bifa.gait.search import verifying_robots
     from bifa.gait.sensitivity import front, sensitivity
     from bifa.report.gaits import distribution_chart, front_chart, sensitivity_chart
     from bifa.report.picture import draw_chart
@@ -181,9 +181,8 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     from bifa.simulate import gait_rows, plant
 
     flat, settings = plant(robot), optimum.settings
-    # The robots that the optimum's own speeds are of, judged alike: at a cliff others tell another story.
-    count, seed = optimum.speeds_mm_s.size, settings.seed + 2_000_003
-    robots = possible_robots(robot, pool, optimum.spread, settings, count, seed)
+    # Judged alike: at a cliff other robots tell another story.
+    robots = verifying_robots(robot, pool, optimum.spread, settings)
     metric = replace(settings.rules.in_full(), tolerance_m=FINE_M)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)
     walks = [

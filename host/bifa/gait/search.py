@@ -182,7 +182,7 @@ def optimize(
     else:
         refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
         gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
-    fresh = possible_robots(model, runs, spread, settings, VERIFYING_DRAWS, settings.seed + 2_000_003)
+    fresh = verifying_robots(model, runs, spread, settings)
     speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric.in_full(), tolerance_m=FINE_M))[0]
     on_progress("verify", 1.0, nominal)
     return Optimum(
@@ -339,6 +339,11 @@ def possible_robots(
     walk = np.hstack([speeds, distribution(runs, more, rows, metric)]) >= least
     walking = [robot for robot, walks in zip((*drawn, *more), walk.all(axis=0), strict=True) if walks]
     return walking[:count] if len(walking) >= count else drawn
+
+
+def verifying_robots(model: Model, runs: Simulations, spread: Knowledge, settings: Settings) -> list[Plant]:
+    """Those that an optimum's speeds are of."""
+    return possible_robots(model, runs, spread, settings, VERIFYING_DRAWS, settings.seed + 2_000_003)
 
 
 def _nominally(
