@@ -253,6 +253,7 @@ class FunctionSystem(System):
 
     def _called(self, record: Record, values: Values) -> Any:
         """A model that fills one array of its own again and again is called by one thread at a time."""
+        values = values.at_hand()
         if self._refills:
             with _ONE_AT_A_TIME:
                 return _copy(self.simulate(record, values))

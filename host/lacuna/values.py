@@ -25,3 +25,13 @@ class Values(dict[str, Any]):
         if not members:
             raise AttributeError(f"{name}: there are {', '.join(self)}")
         return Values(members)
+
+    def at_hand(self) -> Values:
+        """A copy with its entries as plain attributes: what loops over samples read is looked up by name once."""
+        found, parts = Values(self), dict[str, Values]()
+        for name, value in self.items():
+            owner, _, own = name.rpartition(".")
+            part = parts.setdefault(owner, Values()) if owner else found
+            part[own] = vars(part)[own] = value
+        vars(found).update(parts)
+        return found
