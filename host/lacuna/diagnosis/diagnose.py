@@ -20,6 +20,7 @@ from lacuna.diagnosis.doubts import (
     followed_by_nothing,
     not_predicted,
     perhaps_absent,
+    repeats_apart,
 )
 from lacuna.diagnosis.drift import Drift, find_drift
 from lacuna.diagnosis.eliminate import eliminate, may_be_absent
@@ -122,7 +123,9 @@ def diagnose(
         raise MisuseError(f"suspected: there is no effect {unknown[0]!r}; there are {', '.join(system.effects)}.")
     cautions = check(system)
     split = split_trials(system.trials, system.spare(), system.test())
-    if not split.fit or not split.judging:
+    if not split.fit:
+        raise TooLittleDataError("Every condition is `spare`, and none is left to be fitted: name fewer.")
+    if not split.judging:
         raise TooLittleDataError(
             "There is nothing to judge explanations by besides what is fitted: a diagnosis needs at least three trials."
         )
@@ -263,10 +266,10 @@ def _doubts(
     if judged.verdict == "none":
         return not_predicted(judged.base, case.split, errors[0], judged.floor, case.policy)
     if not effects:
-        return but_too_little(choice, case.split, judged.tested) if choice.candidate.effects else []
+        return but_too_little(choice, case.split, judged.tested, case.policy) if choice.candidate.effects else []
     within, library = case.intervals(choice.candidate), case.system.effects
     absent = [name for name in choice.candidate.effects if may_be_absent(library[name], within)]
-    return [*doubts(choice, case.split, judged.tested, case.policy), *perhaps_absent(absent)]
+    return [*doubts(choice, case.split, judged.tested), *perhaps_absent(absent)]
 
 
 def _reported(
@@ -302,6 +305,7 @@ def _reported(
         left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
+            *repeats_apart(judged.floor),
             *_doubts(case, choice, judged, effects, (before, explained)),
             *said,
             *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
@@ -349,7 +353,8 @@ def _verdict(
         return "unexplained"
     # of what passes for noise, or nuisances take up, there is no gap to close half of
     hidden = unshared or _taken_up(case, choice, found)
-    explains = case.closed(choice.explanation, found.base) >= case.policy.half and (tested is None or tested >= 0.0)
+    closed = [case.closed(choice.explanation, found.base), *([] if tested is None else [tested])]
+    explains = min(closed) >= case.policy.half
     return "identified" if explains or (hidden and case.suffices(choice.explanation)) else "unexplained"
 
 

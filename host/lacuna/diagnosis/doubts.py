@@ -14,6 +14,7 @@ from lacuna.estimation.fit import Fit
 from lacuna.estimation.uncertainty import pieces_of
 
 _SURELY = 4.0  # standard deviations
+_APART = 3.0  # times the noise: what is left of repeats hardly differs by as much, unless their predictions do
 
 
 def not_predicted(found: Fit, split: Split, error: Error, floor: Floor, policy: Policy) -> list[str]:
@@ -29,27 +30,36 @@ def not_predicted(found: Fit, split: Split, error: Error, floor: Floor, policy: 
     ]
 
 
-def but_too_little(choice: Choice, split: Split, tested: float | None) -> list[str]:
+def repeats_apart(floor: Floor) -> list[str]:
+    """Of repeats that were measured alike and are predicted differently: what they differ by is taken for noise, and
+    hides what is missing."""
+    most = max(floor.fitted, floor.held_out)
+    if not most > _APART:
+        return []
+    return [
+        f"What the model leaves of one repeat differs from what it leaves of another by {most:.3g} times the noise, and"
+        " what repeats differ by passes for noise: was one recorded otherwise, or does the model count samples where"
+        " times differ?"
+    ]
+
+
+def but_too_little(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
     """Of a choice that predicts better, and is still not named. `tested`: what it closes on the final trials."""
     named = " and ".join(choice.candidate.effects)
-    if tested is not None and tested < 0.0:
+    if tested is not None and tested < policy.half:
         final = listed([trial.name for trial in split.final])
+        how = "worse than without" if tested < 0.0 else f"by only {100 * tested:.0f} % of what is missing there"
         return [
-            f"With {named} most records are predicted better, but those that chose nothing ({final}) worse than"
-            " without: it is not named. Do they differ in something that is not told?"
+            f"With {named} most records are predicted better, but those that chose nothing ({final}) {how}: it is not"
+            " named. Do they differ in something that is not told?"
         ]
     return [f"{named}: a better prediction beyond doubt, but too little of what is missing to be named."]
 
 
-def doubts(choice: Choice, split: Split, tested: float | None, policy: Policy) -> list[str]:
+def doubts(choice: Choice, split: Split, tested: float | None) -> list[str]:
     """Of named effects: an explanation of more weight, and final trials that tell little. `tested`: what the
     effects close there, if there is a gap."""
     said = []
-    if tested is not None and tested < policy.half:
-        said.append(
-            f"Of what is missing in the records that chose nothing ({listed([t.name for t in split.final])}) only"
-            f" {100 * tested:.0f} % is closed, of the others, each predicted from the rest, at least half."
-        )
     likeliest, weight = max(choice.weights.items(), key=lambda found: found[1])
     if weight > 0.5 and frozenset(likeliest) > frozenset(choice.candidate.effects):
         further = [effect for effect in likeliest if effect not in choice.candidate.effects]

@@ -64,15 +64,15 @@ def test_where_something_matters_it_is_told_where():
 
 
 def test_final_records_and_a_likelier_set_speak_against_a_verdict(found):
-    assert doubts(found.choice, found.split, 0.9, POLICY) == []
-    (little,) = doubts(found.choice, found.split, 0.3, POLICY)
-    assert "only 30 % is closed" in little
-    (harm,) = but_too_little(found.choice, found.split, -0.3)
+    assert doubts(found.choice, found.split, 0.9) == []
+    (little,) = but_too_little(found.choice, found.split, 0.3, POLICY)
+    assert "by only 30 % of what is missing there: it is not named" in little
+    (harm,) = but_too_little(found.choice, found.split, -0.3, POLICY)
     assert "With delay most records are predicted better, but those that chose nothing" in harm
     assert found.split.final[0].name in harm
-    assert "too little" in but_too_little(found.choice, found.split, 0.3)[0]
+    assert "too little" in but_too_little(found.choice, found.split, None, POLICY)[0]
     likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
-    (odds,) = doubts(likelier, found.split, None, POLICY)
+    (odds,) = doubts(likelier, found.split, None)
     assert "With stiction, too," in odds
 
 
