@@ -113,6 +113,9 @@ class FunctionSystem(System):
         _check_names([e.name for e in library], "effect")
         _check_names([s.name for s in sites if s.name != LEARNT], "curve")  # which is what a curve may be called
         _all_different([*(p.name for p in given), *(e.name for e in library), *(s.name for s in sites)], "name")
+        for what, held in (("fixed", fixed), ("tied", tied)):
+            if not isinstance(held, Mapping | None):
+                raise DeclarationError(f'{what} is {held!r}: say of which parameters, {{"NAME": ...}}.')
         self.held = Held(dict(fixed or {}), dict(tied or {}))
         self.held.check(given, library)
         free = self.held.free(given)
@@ -133,7 +136,7 @@ class FunctionSystem(System):
             if not np.isfinite(self.effects[effect.name].absent):
                 raise DeclarationError(
                     f"effect {effect.name} is absent at infinity: its size has to keep its sign, so let one of its"
-                    " bounds be 0, or both on the same side of it."
+                    " bounds be 0, or both on the same side of it, and its value be a typical one, which is not 0."
                 )
             self._coordinates |= coordinates
             self._off |= effect.typical | dict.fromkeys(effect.size_names, effect.absent)
@@ -151,7 +154,7 @@ class FunctionSystem(System):
         self._test: tuple[str, ...] = ()
         self._raised: dict[tuple[str, str], float] = {}
         self._sites = {site.name: site for site in sites}
-        if isinstance(spare, str):
+        if isinstance(spare, str) or not isinstance(spare, Iterable | None):
             raise DeclarationError(f"spare is a collection of conditions: write [{spare!r}].")
         self._experiments = several(experiments, CandidateExperiment)
         self._spare = None if spare is None else frozenset(spare)

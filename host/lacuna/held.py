@@ -43,8 +43,9 @@ class Held:
     def check(self, parameters: Sequence[Parameter], library: Sequence[Effect]) -> None:
         """Raises DeclarationError where one of these may not be held, or not in this way."""
         sizing = {name for effect in library for name in effect.size_names}
-        shaping = [name for e in library for p in e.parameters if (name := e.full_name(p)) not in sizing]
-        able = [*(p.name for p in parameters), *shaping]
+        shaping = [(name, p) for e in library for p in e.parameters if (name := e.full_name(p)) not in sizing]
+        bounds = {name: (p.lower, p.upper) for name, p in [*((p.name, p) for p in parameters), *shaping]}
+        able = list(bounds)
         for name in (*self.fixed, *self.tied):
             if name in sizing:
                 raise DeclarationError(f"{name} sizes an effect, so it can be neither fixed nor tied.")
@@ -55,6 +56,10 @@ class Held:
                 raise DeclarationError(f"{name} is both fixed and tied: choose one of the two.")
             if not isinstance(value, Real) or not isfinite(value):
                 raise DeclarationError(f"{name} is fixed at {value!r}, which is no number.")
+            if not bounds[name][0] <= value <= bounds[name][1]:
+                raise DeclarationError(
+                    f"{name} is fixed at {value:g}, outside its bounds {bounds[name][0]:g} to {bounds[name][1]:g}."
+                )
         for name, other in self.tied.items():
             if other not in able or other in self.tied:
                 free = ", ".join(n for n in able if n not in self.tied)

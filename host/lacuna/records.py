@@ -242,12 +242,12 @@ def _single(column: Any, record: str, label: str) -> Any:
 
 
 def _whole(order: Any, record: str) -> int | None:
-    try:
-        return None if order is None else int(order)
-    except (TypeError, ValueError):
-        raise RecordError(
-            f"record {record}: its order is {order!r}: give its place in the day, a whole number."
-        ) from None
+    if order is None:
+        return None
+    whole = number(order) if isinstance(order, str) else order
+    if not isinstance(whole, Real) or not float(whole).is_integer():
+        raise RecordError(f"record {record}: its order is {order!r}: give its place in the day, a whole number.")
+    return int(float(whole))
 
 
 def _folder(folder: Path) -> list[Record | Table]:
@@ -442,8 +442,8 @@ def windows(
     sample = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     every = seconds if every is None else every
     asked = {"seconds": (seconds, _FEWEST), "every": (every, 1), "period": (seconds if period is None else period, 1)}
-    for what, (given, samples) in asked.items():
-        if not samples * sample <= given < np.inf:
+    for what, (given, samples) in (asked | {"skip": (skip, 0)}).items():
+        if not isinstance(given, Real) or not samples * sample <= float(given) < np.inf:
             raise RecordError(f"record {table.name}: {what} is {given!r}; its samples are {sample:g} s apart.")
     starts = np.arange(skip, time[-1] - seconds + 1.5 * sample, every)
     if len(starts) < 3:

@@ -26,7 +26,7 @@ from lacuna.misfit import compared_at_misfit
 from lacuna.noise_time import left_over_s
 from lacuna.progress import Progress
 from lacuna.records import Table, read, stretched
-from lacuna.system import Record, System
+from lacuna.system import Record, System, several
 from lacuna.verdict import Verdict
 
 _log = logging.getLogger("lacuna")
@@ -61,12 +61,13 @@ def diagnose(
     Ctrl-C during the search ends it with the best result so far. Raises MisuseError, RecordError and DeclarationError
     before the search, naming trial and channel.
     """
-    if records is not None:
+    _check_how(starts, n_jobs, executor, policy, progress)
+    seed = _seed("seed", seed) if random_state is None else _seed("random_state", random_state)
+    suspects = several(suspected, str)
+    if records is not None or not hasattr(system, "predict"):  # which is said there
         system = with_records(system, records)
-    if names := tuple(test):
+    if names := several(test, str):
         system = _tested_on(system, names)
-    if random_state is not None:
-        seed = _seed(random_state)
     shown = Progress(len(system.effects)) if progress is True else progress or (lambda _: None)
 
     def reported(what: str) -> None:
@@ -81,7 +82,7 @@ def diagnose(
                 seed=seed,
                 starts=starts,
                 policy=policy,
-                suspected=tuple(suspected),
+                suspected=suspects,
                 on_progress=reported,
                 executor=workers,
             )
@@ -102,16 +103,33 @@ def diagnose(
     return verdict
 
 
-def _seed(random_state: Any) -> int:
+def _check_how(starts: Any, n_jobs: Any, executor: Any, policy: Any, progress: Any) -> None:
+    """Raises MisuseError where a diagnosis cannot be done like this."""
+    if not _is_whole(starts, 1):
+        raise MisuseError(f"starts is {starts!r}: give a whole number, 1 or more.")
+    if n_jobs is not None and not _is_whole(n_jobs, -1):
+        raise MisuseError(f"n_jobs is {n_jobs!r}: give a whole number, -1 for one per core.")
+    if executor is not None and not hasattr(executor, "submit"):
+        raise MisuseError(f"executor is {executor!r}, which cannot `submit`: give one of concurrent.futures.")
+    if not isinstance(policy, Policy):
+        raise MisuseError(f"policy is {policy!r}: give a lacuna.Policy.")
+    if not (progress in (None, True, False) or callable(progress)):
+        raise MisuseError(f"progress is {progress!r}: give a function, or False.")
+
+
+def _is_whole(given: Any, least: int) -> bool:
+    return hasattr(given, "__index__") and index(given) >= least
+
+
+def _seed(what: str, given: Any) -> int:
     """A number, or the next one that a generator draws. Raises MisuseError."""
-    if isinstance(random_state, np.random.RandomState):
-        return int(random_state.randint(2**32, dtype=np.int64))
-    if isinstance(random_state, np.random.Generator):
-        return int(random_state.integers(2**32))
-    try:
-        return index(random_state)
-    except TypeError:
-        raise MisuseError(f"random_state is {random_state!r}: give a whole number, or NumPy's generator.") from None
+    if isinstance(given, np.random.RandomState):
+        return int(given.randint(2**32, dtype=np.int64))
+    if isinstance(given, np.random.Generator):
+        return int(given.integers(2**32))
+    if not _is_whole(given, 0):
+        raise MisuseError(f"{what} is {given!r}: give a whole number that is not negative, or NumPy's generator.")
+    return index(given)
 
 
 def _in_steps(system: System) -> tuple[System, list[str]]:

@@ -11,7 +11,7 @@ name `<effect>.<parameter>` (`hysteresis.force_N`); `theta` is one flat mapping 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any, Protocol
@@ -43,7 +43,8 @@ class Parameter:
     changes a prediction, where a model counts (a delay in whole samples): derivatives step as far at least. `periodic`:
     of an effect's own parameter, `lower` and `upper` mean the same and are no bounds (a phase). `prior_from_trials`:
     what is known of it beforehand comes from the trials that are fitted, by a base model that knew of no effect; it
-    guides the search, and stands back where the parameters are finally told.
+    guides the search, and stands back where the parameters are finally told. Without a `scale` it is a tenth
+    of |value|, or of the range for a value of 0: of a nuisance, declare it.
     """
 
     name: str
@@ -70,6 +71,18 @@ class Parameter:
             raise DeclarationError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
         if not self.lower <= self.value <= self.upper:
             raise DeclarationError(f"{self.name}: value {self.value} is outside {self.lower} to {self.upper}")
+        if not _is_number(self.value):
+            raise DeclarationError(f"{self.name}: value is {self.value}: fits begin there, so give a finite number")
+        for what in ("scale", "prior_sd"):
+            given = getattr(self, what)
+            if given is not None and not (_is_number(given) and given > 0.0):
+                raise DeclarationError(f"{self.name}: {what} is {given!r}: give a number above 0, or leave it out")
+        if not (_is_number(self.grain) and self.grain >= 0.0):
+            raise DeclarationError(f"{self.name}: grain is {self.grain!r}: give a number that is not negative")
+        object.__setattr__(self, "elsewhere", several(self.elsewhere, Real))
+        for given in self.elsewhere:
+            if not self.lower <= given <= self.upper:
+                raise DeclarationError(f"{self.name}: elsewhere names {given}, outside {self.lower} to {self.upper}")
         if self.plausible is not None and not _is_range(self.plausible):
             raise DeclarationError(f"{self.name}: plausible is {self.plausible!r}: give two numbers, the lower first")
 
@@ -83,14 +96,21 @@ class Parameter:
 
 def _is_range(given: Any) -> bool:
     """Whether these are two finite numbers, the lower first."""
-    if np.shape(given) != (2,) or not all(isinstance(end, Real) for end in given):
-        return False
-    return bool(-np.inf < given[0] < given[1] < np.inf)
+    return np.shape(given) == (2,) and all(map(_is_number, given)) and bool(given[0] < given[1])
+
+
+def _is_number(given: Any) -> bool:
+    """Whether this is a finite one."""
+    return isinstance(given, Real) and bool(-np.inf < float(given) < np.inf)
 
 
 def several(given: Any, kind: type) -> tuple[Any, ...]:
-    """What was given as some of a kind, or as one of it without brackets."""
-    return (given,) if isinstance(given, kind) else tuple(given)
+    """What was given as some of a kind, or as one of it without brackets. Raises DeclarationError for anything else."""
+    found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, kind) else (given,)
+    for one in found:
+        if not isinstance(one, kind):
+            raise DeclarationError(f"{one!r:.60} is of type {type(one).__name__}, not {kind.__name__}")
+    return found
 
 
 @dataclass(frozen=True)
@@ -130,6 +150,13 @@ class Effect:
     def __post_init__(self) -> None:
         for each in ("parameters", "own"):
             object.__setattr__(self, each, several(getattr(self, each), Parameter))
+        for each in ("experiments", "confusable_with", "freed_at", "apart"):
+            object.__setattr__(self, each, several(getattr(self, each), str))
+        object.__setattr__(self, "start_factors", several(self.start_factors, Real))
+        if not self.start_factors or not all(map(_is_number, self.start_factors)):
+            raise DeclarationError(f"effect {self.name}: `start_factors` is {self.start_factors}: give numbers")
+        if not isinstance(self.absent, Real) or np.isnan(self.absent):
+            raise DeclarationError(f"effect {self.name}: `absent` is {self.absent!r}, not a number")
         if not 1 <= self.sizes <= len(self.parameters):
             raise DeclarationError(f"effect {self.name}: `sizes` is {self.sizes}, of {len(self.parameters)} parameters")
         names = [p.name for p in self.parameters]
@@ -234,6 +261,16 @@ class CorrectionSite:
     rows: tuple[str, ...] = ("",)
     experiments: tuple[str, ...] = ()
     knots: int = 9
+
+    def __post_init__(self) -> None:
+        for each in ("rows", "experiments"):
+            object.__setattr__(self, each, several(getattr(self, each), str))
+        if not _is_range((self.lower, self.upper)):
+            raise DeclarationError(f"curve {self.name}: {self.lower!r} to {self.upper!r} is no finite range")
+        if not (_is_number(self.scale) and self.scale > 0.0):
+            raise DeclarationError(f"curve {self.name}: scale is {self.scale!r}: give a number above 0")
+        if not self.rows or not isinstance(self.knots, int) or self.knots < 2:
+            raise DeclarationError(f"curve {self.name} has {len(self.rows)} rows of {self.knots!r} knots: too few")
 
 
 @dataclass(frozen=True)

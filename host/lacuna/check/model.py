@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lacuna.check.numbers import SAME, differ, spread
 from lacuna.errors import LacunaError, MisuseError, listed
+from lacuna.records import Stretch
 from lacuna.system import Channels, Record, System, Theta
 
 _NEUTRAL = 1e-3  # of a channel's spread, RMS: largest change by an effect at the size at which it is absent
@@ -33,6 +35,7 @@ def check_model(system: System, trials: Sequence[Record]) -> tuple[dict[str, Cha
         )
     good = [t for t in trials if t.name not in failed]
     _check_deterministic(system, start, good[0], predictions)
+    _check_free_run(system, start, good[0], predictions)
     for trial in good:
         system.regressors(trial, predictions[trial.name])
     _check_effects(system, start, good, predictions)
@@ -90,6 +93,28 @@ def _check_deterministic(system: System, start: Theta, trial: Record, prediction
                 f"trial {trial.name}, channel {name}: two predictions with the same parameters differ."
                 " The model must not draw random numbers or keep state between calls."
             )
+
+
+def _check_free_run(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
+    """What was measured late, where no initial state is taken from, changes no prediction."""
+    own = {p.name: p.value for p in system.nuisances(trial)}
+    (found,) = system.predict_trials([dict(start) | own], (), [_measured_otherwise(trial)])
+    for name, measured in trial.channels.items():
+        if differ(found[name], predictions[trial.name][name], SAME * spread(measured)):
+            raise MisuseError(
+                f"trial {trial.name}, channel {name}: the prediction follows what was measured, so that nothing would"
+                " seem to be missing. Let the model run freely, from its initial state and its inputs."
+            )
+
+
+def _measured_otherwise(trial: Record) -> Record:
+    """`trial` with other measured samples in its second half, and the run that it is a stretch of as well."""
+    late = np.arange(len(trial.time_s)) >= len(trial.time_s) // 2
+    channels = {name: column + late * (1.0 + spread(column)) for name, column in trial.channels.items()}
+    stretch = trial.payload
+    if isinstance(stretch, Stretch):
+        stretch = replace(stretch, run=_measured_otherwise(stretch.run))
+    return replace(trial, channels=channels, payload=stretch)
 
 
 def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:

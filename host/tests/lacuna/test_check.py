@@ -17,6 +17,7 @@ from lacuna.run import with_records
 from lacuna.system import CandidateExperiment, CorrectionSite, Effect, Parameter, Record, System
 
 T = np.linspace(0.0, 1.0, 101)
+LOSS = CorrectionSite("loss", "loss", "temperature (K)", "W", 0.0, 9.0, 0.1)
 DRAW = np.random.default_rng(0)
 
 
@@ -232,6 +233,58 @@ def test_refuses_bounds_that_are_no_numbers(given):
         Parameter("gain", "", *given)
 
 
+@pytest.mark.parametrize(
+    "told",
+    [
+        *({"scale": given} for given in (0.0, -1.0, math.nan, math.inf, "1")),
+        *({"prior_sd": given} for given in (0.0, -1.0, math.nan)),
+        *({"grain": given} for given in (-1.0, math.nan, None)),
+        *({"elsewhere": given} for given in (9.0, "1", None, (math.nan,))),
+        {"value": math.inf},
+    ],
+)
+def test_refuses_amounts_of_a_parameter_that_are_none(told):
+    """A negative spread of a nuisance would be taken, and end in another verdict."""
+    with pytest.raises(lacuna.LacunaError, match=f"gain: {next(iter(told))} |is of type"):
+        Parameter("gain", "", **{"value": 1.0, "lower": 0.1, "upper": math.inf if "value" in told else 5.0, **told})
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        *({"start_factors": given} for given in ((), (math.nan,), None)),
+        *({"absent": given} for given in (math.nan, None, "0")),
+        *({name: 3} for name in ("parameters", "own", "experiments", "freed_at", "apart", "confusable_with")),
+    ],
+)
+def test_refuses_an_effect_that_is_none(told):
+    with pytest.raises(DeclarationError, match=f"effect bend: `{next(iter(told))}` is|is of type (int|NoneType), not"):
+        Effect(**{"name": "bend", "parameters": BEND, **told})
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ({"lower": 9.0}, "9.0 to 9.0 is no finite range"),
+        ({"upper": math.inf}, "0.0 to inf is no"),
+        ({"lower": "0"}, "'0' to 9.0 is no"),
+        *(({"scale": given}, f"scale is {given}") for given in (0.0, -0.1, math.nan)),
+        *(({"knots": given}, f"1 rows of {given} knots: too few") for given in (0, 1, 2.5)),
+        ({"rows": ()}, "0 rows of 9 knots: too few"),
+    ],
+)
+def test_refuses_a_curve_that_is_none(told, said):
+    with pytest.raises(DeclarationError, match=f"curve loss.*{said}"):
+        CorrectionSite(**{**vars(LOSS), **told})
+
+
+@pytest.mark.parametrize("what", ["parameters", "effects", "nuisances", "curves", "experiments"])
+def test_refuses_what_is_of_another_kind(what):
+    told = {"simulate": heater.simulate, "parameters": heater.PARAMETERS, what: ["gain"]}
+    with pytest.raises(DeclarationError, match="'gain' is of type str, not "):
+        lacuna.System(**told)
+
+
 def test_a_factor_that_cannot_be_absent_is_pointed_out():
     factor = Effect("stretch", Parameter("factor", "", 1.1, 0.5, 2.0))
 
@@ -254,11 +307,22 @@ def test_a_factor_that_cannot_be_absent_is_pointed_out():
 def test_refuses_a_condition_where_conditions_belong():
     with pytest.raises(DeclarationError, match=r"\['sweep 4 W'\]"):
         heater.system(spare="sweep 4 W")
+    with pytest.raises(DeclarationError, match=r"\[4\]"):
+        heater.system(spare=4)
+
+
+def test_where_every_condition_is_spare_nothing_is_left_to_be_fitted():
+    records = heater.records(2)
+    system = heater.system(spare={one["condition"] for one in records.values()})
+    with pytest.raises(TooLittleDataError, match="Every condition is `spare`, and none is left to be fitted"):
+        lacuna.diagnose(system, records, progress=False)
 
 
 def test_refuses_an_infinite_size_that_may_be_of_either_sign():
     with pytest.raises(DeclarationError, match="absent at infinity"):
         heater.system(Effect("saturation", Parameter("limit_W", "W", 8.0, -1.0, np.inf), absent=np.inf))
+    with pytest.raises(DeclarationError, match="its value be a typical one, which is not 0"):
+        heater.system(Effect("saturation", Parameter("limit_W", "W", 0.0, 0.0, np.inf), absent=np.inf))
     below = heater.system(Effect("saturation", Parameter("limit_W", "W", -8.0, -20.0, 0.0), absent=-np.inf))
     size = below.effects["saturation"].parameters[0]
     assert (size.lower, size.upper) == (-np.inf, -0.05)
@@ -548,3 +612,41 @@ def test_a_function_that_fails_is_told_with_its_record(which):
 
 def test_unsigned_times_may_not_fall_either():
     assert falling(np.array([0, 1, 2, 1, 3], np.uint32)).startswith("time does not increase from sample 2 (2 s)")
+
+
+def test_refuses_a_model_that_follows_what_was_measured():
+    """One step ahead of it nothing seems to be missing; a start from the first samples is no such thing."""
+
+    def simulate(record, theta):
+        before = np.concatenate([[0.0], record["temperature_K"][:-1]])
+        return {"temperature_K": before + theta.gain_K_W * record["power_W"] / theta.tau_s}
+
+    system = lacuna.System(simulate, heater.PARAMETERS, outputs="temperature_K")
+    whole = {"time_s": heater.TIME_S, **next(iter(heater.records(1).values()))}
+    for records in (heater.records(2), lacuna.segments(whole, 5)):
+        with pytest.raises(MisuseError, match=r"channel temperature_K: the prediction follows what was measured"):
+            check(with_records(system, records))
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        *({"starts": given} for given in (0, -1, 1.5, None)),
+        *({"n_jobs": given} for given in (-2, 2.5, "2")),
+        *({"seed": given} for given in (-1, 1.5, None, "now")),
+        {"random_state": -1},
+        {"executor": 3},
+        {"policy": None},
+        {"policy": {}},
+        {"progress": "yes"},
+    ],
+)
+def test_refuses_a_diagnosis_that_cannot_be_done_like_this(how):
+    with pytest.raises(MisuseError, match=f"{next(iter(how))} is "):
+        lacuna.diagnose(heater.system(), heater.records(1), **{"progress": pytest.fail, **how})
+
+
+@pytest.mark.parametrize("records", [None, {}])
+def test_refuses_a_function_in_place_of_a_system(records):
+    with pytest.raises(MisuseError, match="the first is a System, not function"):
+        lacuna.diagnose(heater.simulate, records, progress=pytest.fail)

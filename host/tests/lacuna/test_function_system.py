@@ -17,6 +17,15 @@ from lacuna.records import Table, segments, stretched
 from lacuna.run import with_records
 from lacuna.system import CorrectionSite
 
+
+def test_what_a_loop_reads_of_an_effect_is_no_search_among_names():
+    found = heater.system().values({}).at_hand()
+    assert vars(found)["gain_K_W"] == found["gain_K_W"] == 0.8
+    assert vars(vars(found)["sensor_lag"])["lag_s"] == found.sensor_lag["lag_s"] == found["sensor_lag.lag_s"] == 0.0
+    with pytest.raises(AttributeError, match="wire: there are gain_K_W"):
+        _ = found.wire
+
+
 FAR = 1.3  # a gain from which the model fails
 
 
@@ -112,6 +121,15 @@ def test_one_alone_needs_no_brackets():
     assert list(system.effects) == ["sensor_lag"]
     assert system.nuisances(trial) == (tau,)
     assert list(system.correction_sites) == ["loss"]
+    effect = Effect("loss", tau, experiments="run", freed_at="loss", apart="gain_K_W", start_factors=1.0)
+    assert (effect.experiments, effect.freed_at, effect.apart) == (("run",), ("loss",), ("gain_K_W",))
+    assert effect.start_factors == (1.0,)
+
+
+@pytest.mark.parametrize("how", [{"test": "nope"}, {"suspected": "nope"}])
+def test_one_name_needs_no_brackets(how):
+    with pytest.raises(MisuseError, match="'nope'"):
+        lacuna.diagnose(heater.system(), heater.records(2), progress=pytest.fail, **how)
 
 
 @pytest.mark.parametrize(

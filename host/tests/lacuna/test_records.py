@@ -103,6 +103,23 @@ def test_a_place_in_the_day_is_a_whole_number(tmp_path):
         one.record(["y"])
 
 
+@pytest.mark.parametrize("order", [1.5, "1.5", np.inf])
+def test_half_a_place_in_the_day_is_none(order):
+    (one,) = read({"a": {"time_s": [0.0, 1.0], "y": [1.0, 2.0], "order": order}})
+    with pytest.raises(RecordError, match="record a: its order is"):
+        one.record(["y"])
+
+
+@pytest.mark.parametrize(
+    "how",
+    [{"seconds": "5"}, {"every": "5"}, {"period": "5"}, *({"skip": skip} for skip in ("5", -1.0, np.nan, None))],
+)
+def test_windows_are_of_seconds(how):
+    long = {"time_s": np.arange(100.0), "y": np.arange(100.0)}
+    with pytest.raises(RecordError, match=f"{next(iter(how))} is "):
+        lacuna.windows(long, **{"seconds": 10.0, **how})
+
+
 def test_parts_of_several_runs_go_together_by_the_runs_names():
     runs = [{"name": name, "time_s": np.arange(100.0), "y": np.arange(100.0)} for name in ("monday", "friday")]
     parts = [part for run in runs for part in segments(run, 3)]

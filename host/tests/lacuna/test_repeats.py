@@ -86,6 +86,16 @@ def test_a_column_with_fewer_values_than_there_are_times_is_refused():
         said_of(records)
 
 
+@pytest.mark.parametrize("other", [True, False])
+def test_a_model_that_counts_samples_is_pointed_out_where_repeats_have_other_times(other):
+    """The heater's does: half of the samples seem to take half of the time."""
+    records = heater.records(3)
+    for name in (name for name in records if other and name.endswith("_2")):
+        records[name] |= {column: records[name][column][::2] for column in ("time_s", "power_W", "temperature_K")}
+    verdict = lacuna.diagnose(heater.system(), records, progress=False)
+    assert any("does the model count samples where times differ" in said for said in verdict.warnings) == other
+
+
 @pytest.mark.parametrize(("bend", "verdict"), [(4e-4, "identified"), (0.0, "none")])
 @pytest.mark.parametrize("spread", [0.2, 5.0])
 def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spread, bend, verdict):
