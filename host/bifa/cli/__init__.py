@@ -17,15 +17,17 @@ import typer.core
 
 import bifa
 from bifa.errors import BifaError
+from bifa.live.output import writable
 from bifa.printable import printable
 
 
 class _Commands(typer.core.TyperGroup):
-    """Ctrl-C ends each command with a line that says what was kept."""
+    """Ctrl-C ends each command with a line that says what was kept, a full disk with one that says so."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with writable():
+                return super().invoke(ctx)
         except KeyboardInterrupt:
             typer.echo("\nInterrupted. Finished results are listed above; no partial files remain.", err=True)
             raise typer.Exit(130) from None

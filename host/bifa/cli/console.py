@@ -31,12 +31,11 @@ def console(port: Annotated[str | None, PORT] = None) -> None:
 
     from bifa.link import Uno
     from bifa.link.terminal import settle
-    from bifa.live.output import writable
     from bifa.rig import open_rig
     from bifa.screen import Console
 
     typed = sys.stdin.isatty()
-    with writable(), open_rig(port) as rig:
+    with open_rig(port) as rig:
         with Uno(rig.transport, rig.clock) as uno:
             with Console(stderr=True).status("waiting for the Uno"):
                 uno.connect()

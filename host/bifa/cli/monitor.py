@@ -48,7 +48,6 @@ def monitor(
 
     from bifa.link import Uno
     from bifa.live.monitor import watch
-    from bifa.live.output import writable
     from bifa.rig import SameBoard, open_rig
     from bifa.robot import load_model, nominal
     from bifa.robot.gait import read_gait_file
@@ -67,24 +66,23 @@ def monitor(
         if run:
             uno.run()
 
-    with writable():
-        try:
-            if not web:
-                with open_rig(port) as rig:
-                    watch(Uno(rig.transport, rig.clock), rig.clock, console, seconds, begin)
-                return
-            with console.status("starting the page"):
-                from bifa.live.web.flights import fly
-                from bifa.live.web.pilot import Pilot
-                from bifa.live.web.server import LivePage, served
-                from bifa.report.page import live_page
+    try:
+        if not web:
+            with open_rig(port) as rig:
+                watch(Uno(rig.transport, rig.clock), rig.clock, console, seconds, begin)
+            return
+        with console.status("starting the page"):
+            from bifa.live.web.flights import fly
+            from bifa.live.web.pilot import Pilot
+            from bifa.live.web.server import LivePage, served
+            from bifa.report.page import live_page
 
-                pilot = Pilot()
-                page = LivePage(pilot, live_page(), robot)
-            pilot.is_watched = page.is_watched
-            say = partial(console.print, soft_wrap=True)
-            with served(page, _WEB_PORT if web_port is None else web_port) as address:
-                say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
-                fly(pilot, SameBoard(port), page.tell, say, seconds, begin, adjust)
-        except KeyboardInterrupt:
-            typer.echo("valves off")
+            pilot = Pilot()
+            page = LivePage(pilot, live_page(), robot)
+        pilot.is_watched = page.is_watched
+        say = partial(console.print, soft_wrap=True)
+        with served(page, _WEB_PORT if web_port is None else web_port) as address:
+            say(f"page: {address.url}   (Ctrl-C closes it and stops the robot)")
+            fly(pilot, SameBoard(port), page.tell, say, seconds, begin, adjust)
+    except KeyboardInterrupt:
+        typer.echo("valves off")

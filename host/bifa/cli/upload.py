@@ -40,7 +40,6 @@ def upload(
     check_port(port)
 
     from bifa.link import Uno
-    from bifa.live.output import writable
     from bifa.live.walk import walk
     from bifa.rig import open_rig
     from bifa.robot.gait import read_gait_file
@@ -48,7 +47,7 @@ def upload(
 
     parameters = read_gait_file(gait).parameters
     console = Console()
-    with writable(), open_rig(port) as rig:
+    with open_rig(port) as rig:
         try:
             with console.status("waiting for the Uno") as shown, Uno(rig.transport, rig.clock) as uno:
                 hello = uno.connect()

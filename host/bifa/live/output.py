@@ -31,5 +31,6 @@ def writable() -> Iterator[None]:
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, sys.stdout.fileno())
             os.close(nowhere)
+        what = error.filename2 or error.filename or "the output"  # of a copy the second is where it goes
         reason = os.strerror(error.errno)
-        raise OutputError(f"the output cannot be written ({reason}); free some space, or redirect it") from None
+        raise OutputError(f"{what} cannot be written ({reason}); free some space, or redirect it") from None

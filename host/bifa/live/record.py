@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import shlex
 import sys
 import time
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from rich.status import Status
 from bifa.errors import BifaError
 from bifa.link import RefusedError, Sample, Uno
 from bifa.link.table import CHAMBERS, MARK_PAUSE
+from bifa.live.walk import look_for_a_reader
 from bifa.lock import locked
 from bifa.measure.desk import Desk
 from bifa.printable import counted
@@ -78,8 +80,9 @@ def record_walks(
             on_event=on_event,
         )
     console.print(
-        f"{out}: {counted(repeats, 'walk')} of {cycles} cycles, firmware {dataset.provenance['firmware']}; "
-        f"look at it with: bifa check {out}"
+        f"{out}: {counted(repeats, 'walk')} of {counted(cycles, 'cycle')}, firmware {dataset.provenance['firmware']}; "
+        f"look at it with: {shlex.join(['bifa', 'check', str(out)])}",
+        soft_wrap=True,
     )
 
 
@@ -175,6 +178,8 @@ class _TelemetryLog:
             while time.monotonic() < self._end_s:
                 writer.writerows(telemetry_row(uno, sample, marked) for sample in uno.samples(0.5))
                 file.flush()
+                if self._parameters:  # a robot that stands is recorded for nobody as well
+                    look_for_a_reader()
                 status.update(f"recording  {uno.counters.text()}")
                 self._walk_if_told(uno)
         finally:

@@ -26,7 +26,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
     pace, end_s = Pace(clock), math.inf if duration_s is None else began_s + duration_s
     while (left_s := end_s - clock.now()) > 0:
         uno.samples(min(left_s, LOOK_EVERY_S))
-        _look_for_a_reader()
+        look_for_a_reader()
         status = uno.status()
         if status.state != "running":
             raise LinkError(
@@ -38,7 +38,7 @@ def walk(uno: Uno, clock: Clock, duration_s: float | None, on_progress: Callable
         pace.wait()
 
 
-def _look_for_a_reader() -> None:
+def look_for_a_reader() -> None:
     """Walking prints nothing, so that a pipe or a terminal that has been closed would not show by itself."""
     if not hasattr(select, "poll"):
         return

@@ -1,10 +1,15 @@
 """Commands whose output goes nowhere: a full disk, a reader that has gone; the robot stands, and it is said."""
 
+import errno
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+
+from bifa.live.output import OutputError, writable
 
 pytestmark = pytest.mark.real_time
 
@@ -35,12 +40,30 @@ def test_output_onto_a_full_disk_ends_in_a_sentence_with_valves_off(uno, gait, c
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
-def test_who_walks_stops_once_nobody_can_read_it_any_more(uno, gait):
-    command = bifa("upload", gait, "--run", "--port", uno.device)
+@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("command", [["gaits"], ["record", "--out", "{out}", "--port", "virtual"]])
+def test_so_does_that_of_a_command_that_moves_nothing_or_has_not_yet(command, tmp_path):
+    arguments = [word.format(out=tmp_path / "walks") for word in command]
+    with FULL.open("w", encoding="utf-8") as full:
+        ended = subprocess.run(bifa(*arguments), stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("error: the output cannot be written (No space left on device)")
+    assert ended.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("names", [("out/walks.partial",), ("records/walk.csv", None, "out/walks.partial")])
+def test_a_file_that_a_full_disk_does_not_take_is_named(names):
+    with pytest.raises(OutputError, match=r"^out/walks\.partial cannot be written .*free some space"), writable():
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), *names)
+
+
+@pytest.mark.parametrize("command", [["upload", "{gait}", "--run"], ["record", "--gait", "{gait}", "--out", "{out}"]])
+def test_who_walks_stops_once_nobody_can_read_it_any_more(uno, gait, command, tmp_path):
+    command = bifa(*(word.format(gait=gait, out=tmp_path / "walk") for word in command), "--port", uno.device)
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as walking:
-        while "walking" not in walking.stdout.readline():
+        while uno.board.state != "running":
             assert walking.poll() is None
-        assert uno.board.state != "stopped"
+            time.sleep(0.05)
         walking.stdout.close()
         walking.stdout = None
         _, errors = walking.communicate(timeout=60)

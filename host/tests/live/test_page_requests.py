@@ -94,9 +94,10 @@ def test_what_is_no_gait_is_refused(page, gait):
     assert "a gait needs period_s" in one.answer(one.ask("draft", gait=gait))["error"]
 
 
-def test_what_is_not_known_is_refused_with_what_there_is(page):
+@pytest.mark.parametrize("do", ["dance", None, [], {}, ["stop"]])
+def test_what_is_not_known_is_refused_with_what_there_is(page, do):
     one = page()
-    assert "run, clear, apply" in one.answer(one.ask("dance"))["error"]
+    assert "run, clear, apply" in one.answer(one.ask(do))["error"]
 
 
 @pytest.mark.parametrize("body", ["", "{}", "[]", "{", "[" * 100_000])

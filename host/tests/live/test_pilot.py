@@ -1,5 +1,7 @@
 """Who talks to the robot: requests of other threads, and a stop that comes before all of them."""
 
+import json
+import math
 import threading
 from contextlib import nullcontext
 
@@ -10,7 +12,7 @@ from bifa.live.web.pilot import BusyError, NobodyThereError, Pilot
 from harness.board import Board
 
 
-def flown(during, seconds=0.5, begin=lambda uno: None, board=None):
+def flown(during, seconds=0.5, begin=lambda uno: None, board=None, position_mm=None):
     """A flight of the Uno's own code; `during(pilot, report)` is called with every report. Reports, and the board."""
     board, reports = board or Board(), []
     pilot = Pilot()
@@ -19,7 +21,7 @@ def flown(during, seconds=0.5, begin=lambda uno: None, board=None):
         reports.append(report | {"samples": samples})
         during(pilot, report)
 
-    pilot.fly(Uno(board, board), board, tell, seconds, begin)
+    pilot.fly(Uno(board, board), board, tell, seconds, begin, position_mm)
     return pilot, reports, board
 
 
@@ -42,6 +44,22 @@ def test_reports_show_pressures_valves_and_phases():
     assert any(chamber["valves"] != "off" for chamber in last["chambers"].values())
     assert sum(len(report["samples"]) for report in reports) >= 5
     assert "lost 0" in last["link"]
+
+
+def test_a_head_that_is_not_seen_has_no_place_and_every_page_can_still_read_the_report():
+    places = iter([1.0, math.nan])
+    _, reports, _ = flown(
+        lambda pilot, report: None,
+        begin=lambda uno: uno.run(),
+        position_mm=lambda: {"head": next(places, math.inf), "tail": 0.0},
+    )
+    assert [report["position_mm"] for report in reports if "position_mm" in report][:3] == [
+        {"head": 1.0, "tail": 0.0},
+        None,
+        None,
+    ]
+    assert reports[-1]["speed_mm_s"] is None
+    json.dumps(reports, allow_nan=False)
 
 
 def test_a_stop_comes_before_what_was_asked_and_is_confirmed():

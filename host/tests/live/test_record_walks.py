@@ -45,10 +45,12 @@ def test_a_recording_says_the_speed_of_the_settled_cycles(tmp_path, capsys):
 
 
 def test_a_recording_is_a_data_set(tmp_path):
-    command = ["record", "--out", str(tmp_path / "walks"), "--port", "virtual", "--cycles", "2", "--repeats", "2"]
+    out = tmp_path / "my walks"
+    command = ["record", "--out", str(out), "--port", "virtual", "--cycles", "2", "--repeats", "2"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
-    trials = read_dataset(tmp_path / "walks").trials
+    assert f"look at it with: bifa check '{out}'\n" in done.output  # in one line, to be copied
+    trials = read_dataset(out).trials
     assert [trial.experiment for trial in trials] == ["locomotion"] * 2
     told = [int(samples) for samples in re.findall(r"walk \d: samples (\d+)  lost 0", done.output)]
     # each walk's own, and some before and after it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from collections import deque
@@ -291,12 +292,14 @@ class _Flight:
         if newest := self._latest.sample:
             report |= {"robot": newest.state, "uno_s": newest.time_us / 1e6, "chambers": _chambers(newest)}
             if self._position_mm is not None:
-                position_mm = self._position_mm()
-                is_walking = newest.state == "running"
-                self._speed.take(is_walking, newest.time_us / 1e6, newest.phase_rad[0], position_mm["head"])
+                ends_mm = self._position_mm()
+                is_seen = all(map(math.isfinite, ends_mm.values()))  # a marker may be lost; JSON has no NaN
+                is_walking = newest.state == "running" and is_seen
+                self._speed.take(is_walking, newest.time_us / 1e6, newest.phase_rad[0], ends_mm["head"])
+                position_mm = ends_mm if is_seen else None
                 report |= {"position_mm": position_mm, "speed_mm_s": self._speed.mm_s, "settled": self._speed.settled}
-                if shown:
-                    shown[-1]["mm"] = position_mm["head"]
+                if shown and is_seen:
+                    shown[-1]["mm"] = ends_mm["head"]
         return report, shown
 
 

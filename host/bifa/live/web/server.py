@@ -224,7 +224,7 @@ class LivePage:
         """One request of a page: {"id": 1, "do": "apply", ...}; the answer has the same id."""
         try:
             asked = json.loads(text)
-            number, name = asked["id"], asked["do"]
+            number, name = asked["id"], str(asked["do"])
         except (ValueError, KeyError, TypeError, RecursionError):
             raise AskedWrongError('not a valid request: send {"id": 1, "do": "stop"}') from None
         if name == "stop":

@@ -156,7 +156,7 @@
       const fast = live.robot !== "running" ? "not walking" : live.speed_mm_s === null ? "not for a cycle yet" : live.settled || `${live.speed_mm_s.toFixed(1)} mm/s over the last cycle`;
       tell(speedBox, `${fast}, at ${live.position_mm.head.toFixed(0)} mm`);
       document.getElementById("path-key").hidden = false;
-    }
+    } else if (live.position_mm === null) tell(speedBox, "the head is not seen");
     showControls(showGait());
   };
 
