@@ -172,9 +172,9 @@ def _commanded_pressure(trial: Trial) -> Iterator[Finding]:
 
 def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
     for group in dataset.repeats():
-        numbers = sorted(trial.repeat for trial in group)
-        absent = sorted(set(range(1, max(*numbers, REPEATS_WANTED) + 1)) - set(numbers))
-        if absent:
+        numbers, lacking = {trial.repeat for trial in group}, REPEATS_WANTED - len(group)
+        if lacking > 0:
+            absent = [number for number in range(1, REPEATS_WANTED + 1) if number not in numbers][:lacking]
             why = "no noise floor can be estimated from it" if len(group) == 1 else "the noise floor is less certain"
             which = f"repeat {absent[0]} is" if len(absent) == 1 else f"repeats {', '.join(map(str, absent))} are"
             text = f"{which} missing; {why}"

@@ -46,11 +46,12 @@ def check(
     if not findings:
         console.print("Nothing looks wrong.")
     if pictures is not None:
+        from bifa.printable import counted
         from bifa.report.datasets import plot_dataset
 
         with console.status("drawing"), written_into(pictures) as aside:
             written = plot_dataset(content, aside)
-        console.print(f"{len(written)} pictures in {pictures}")
+        console.print(f"{counted(len(written), 'picture')} in {pictures}")
     if strict and findings:
         raise typer.Exit(1)
 

@@ -114,6 +114,15 @@ def test_missing_repeats_and_experiments():
     assert "no static loading of the large actuator at 0 psi" in texts[3]
 
 
+@pytest.mark.parametrize(
+    ("numbers", "said"), [((101, 102, 20261127), []), ((1, 2, 4, 5), []), ((101, 7), ["repeat 1 is missing"])]
+)
+def test_repeats_are_counted_whatever_their_numbers_are(numbers, said):
+    trials = tuple(replace(make_trial(), repeat=number, file=f"{number}.csv") for number in numbers)
+    findings = check_recordings(Dataset(None, "takes", {}, trials))
+    assert [found.text.partition(";")[0] for found in findings if found.kind == "missing repeats"] == said
+
+
 def test_session_order_given_in_part_or_twice():
     dataset = sound()
     trials = [replace(t, session_order=[None, 4, 4][i % 3]) for i, t in enumerate(dataset.trials)]
@@ -133,8 +142,9 @@ def test_the_command_lists_plots_and_warns(tmp_path):
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
     lonely = write_dataset(tmp_path / "lonely", Dataset(None, "one", {}, (make_trial(),)))
-    result = CliRunner().invoke(app, ["check", str(lonely), "--strict"])
+    result = CliRunner().invoke(app, ["check", str(lonely), "--strict", "--pictures", str(tmp_path / "one")])
     assert result.exit_code == 1
+    assert "1 picture in" in result.output
     assert "[missing repeats]" in result.output
 
 
