@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bifa.data import Dataset, Trial, read_dataset
+from bifa.errors import BifaError
 from bifa.robot import BASELINE, Gait, Model, load_model, nominal, read_gait_file, save_model
 
 if TYPE_CHECKING:  # imported when first used: a notebook waits only for what it uses
@@ -38,7 +39,7 @@ class Robot:
         from bifa.simulate import walk
 
         chosen = _gait(gait)
-        walked = walk(self.model, chosen, cycles)
+        walked = walk(self.model, chosen, _at_least_one(cycles))
         columns = {name: np.asarray(column) for name, column in walked.columns.items()}
         return Trial(f"{self.model.name}_simulated.csv", "locomotion", columns, gait=chosen.as_dict())
 
@@ -46,7 +47,7 @@ class Robot:
         """Speed of the last cycle."""
         from bifa.simulate import gait_rows, speeds
 
-        return float(speeds(self.model, gait_rows([_gait(gait)]), cycles, 1e-6).speed_mm_s[0])
+        return float(speeds(self.model, gait_rows([_gait(gait)]), _at_least_one(cycles), 1e-6).speed_mm_s[0])
 
     def diagnose(self, dataset: Dataset, *, seed: int = 0, matters: Mapping[str, float] | None = None) -> Verdict:
         """What this robot's base model lacks, by a data set: a `lacuna.Verdict`. `matters`: RMS error by column up to
@@ -88,6 +89,12 @@ def connect(port: str | None = None) -> Iterator[Uno]:
     with open_rig(port) as rig, Uno(rig.transport, rig.clock) as uno:
         uno.connect()
         yield uno
+
+
+def _at_least_one(cycles: int) -> int:
+    if cycles < 1:
+        raise BifaError(f"a walk has at least one cycle, not {cycles}")
+    return cycles
 
 
 def _gait(gait: Gait | str | Path) -> Gait:

@@ -55,3 +55,6 @@ def test_a_trial_is_drawn_one_quantity_below_the_other(walk, monkeypatch):
 def test_a_robot_has_the_speed_of_its_gait():
     assert bifa.Robot().speed_mm_s() == pytest.approx(10.83, abs=0.01)
     assert "nominal" in repr(bifa.Robot())
+    for walked in (bifa.Robot().speed_mm_s, bifa.Robot().simulate):
+        with pytest.raises(bifa.BifaError, match="at least one cycle, not 0"):
+            walked(cycles=0)

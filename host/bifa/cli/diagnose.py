@@ -142,6 +142,7 @@ def _report(
     """Print the diagnosis, and write what was asked for."""
     from datetime import date
     from json import dumps
+    from shlex import quote
 
     from bifa.data.dataset import labels_of
     from bifa.files import write_text
@@ -155,7 +156,8 @@ def _report(
     print_diagnosis(console, record, labels)
     if model is not None:
         save_model(model, completed_model(found.final, date.today().isoformat()))
-        console.print(f"model: {model}. Next: bifa optimize --model {model} --out gait.toml")
+        command = f"bifa optimize --model {quote(str(model))} --out gait.toml"
+        console.print(f"model: {model}. Next: {command}", soft_wrap=True)
     if json is not None:
         write_text(json, dumps(record, indent=2) + "\n")
     if page is not None:

@@ -1,6 +1,7 @@
 """`bifa experiment`: the paper's characterisation experiments on a rig, written as a data set."""
 
 import math
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -233,7 +234,8 @@ def _run(
         console.print(
             f"Instruments and Uno synchronised to {1e3 * max(errors):.2f} ms (RMS of the edges, worst trial)."
         )
-    console.print(f"Next: bifa check {out}, then bifa fit {out} --out model.toml")
+    quoted = shlex.quote(str(out))
+    console.print(f"Next: bifa check {quoted}, then bifa fit {quoted} --out model.toml", soft_wrap=True)
 
 
 def _only(trials: "Sequence[PlannedTrial]") -> "PlannedTrial":

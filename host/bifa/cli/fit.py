@@ -1,5 +1,6 @@
 """`bifa fit`: the model's parameters from a data set, with their uncertainty."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -70,7 +71,9 @@ def fit(
         with written_into(pictures) as aside:
             draw_curves(found, aside)
         console.print(f"pictures: {pictures}")
+    quoted = shlex.quote(str(out))
     console.print(
         f"{out}: fitted to {counted(len(measured.trials), 'trial')} in {time.perf_counter() - begun:.1f} s. "
-        f"Next: bifa simulate --model {out} --gait GAIT.toml, or bifa optimize --model {out} --out gait.toml"
+        f"Next: bifa simulate --model {quoted} --gait GAIT.toml, or bifa optimize --model {quoted} --out gait.toml",
+        soft_wrap=True,
     )

@@ -15,7 +15,7 @@ from bifa.data.export import Export
 from bifa.data.layout import RAW
 from bifa.errors import BifaError
 from bifa.link import LinkError, PortGoneError, Uno
-from bifa.measure.desk import Desk
+from bifa.measure.desk import Desk, NobodyError
 from bifa.measure.experiments import Progress, record_trial
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
@@ -72,7 +72,7 @@ class ByHand:
             self._desk.say(f"\nTrial {turn.number} of {turn.total}: {turn.planned.title}")
             try:
                 trial = record_trial(bench, uno, turn.planned, on_progress, attempts=1)
-            except (LinkError, PortGoneError):
+            except (LinkError, PortGoneError, NobodyError):
                 raise
             except BifaError as error:
                 uno.halt()

@@ -124,7 +124,7 @@ class Desk:
         """What was typed ahead must not start anything; lines from a pipe were meant for what is to come."""
         early = [_from_file(self._watch / ANSWER)] if self._watch is not None else []
         with contextlib.suppress(queue.Empty):
-            while sys.stdin.isatty():
+            while sys.stdin is not None and sys.stdin.isatty():
                 if (line := self._lines.get_nowait()) is _END:
                     self._lines.put(_END)
                     break

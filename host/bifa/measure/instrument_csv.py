@@ -41,6 +41,7 @@ Columns = Mapping[str, np.ndarray]
 
 _MARGIN_S = 0.25
 _MOVED_MM = 0.05
+_BEYOND = 500.0  # mm or N, of any actuator: 999 of a small unit may well have been measured
 _HEAD, _TAIL = "displacement_head_mm", "displacement_tail_mm"
 _REPAIR = "(a lost marker?); fill the gap by the instrument's own means, or record again"
 _LOST = f"no value {_REPAIR}"
@@ -128,9 +129,11 @@ def read_instrument(
     _refuse_gaps(columns, sheet, rows, columns, _LOST)
     _refuse_falling(columns, sheet, rows, "time_s")
     for name in columns.keys() - {"time_s"}:
-        if (coded := codes(columns[name])).any():
+        called = (export or OWN_NAMES).columns.get(name, name)
+        written = sheet.numbers(sheet.find(called), called)[rows]  # -999 m is none of the codes once it is in mm
+        if (coded := codes(written) & (np.abs(columns[name]) > _BEYOND)).any():
             row = int(np.argmax(coded))
-            raise sheet.error(f"{columns[name][row]:g} is a code for a missing value {_REPAIR}", rows[row], name)
+            raise sheet.error(f"{written[row]:g} is a code for a missing value {_REPAIR}", rows[row], name)
     if export is None or (export.needs_sync_file and export.units.get("time_s") != DATE):
         return columns, _read_edges(sync_file(path))
     if export.needs_sync_file:
@@ -148,6 +151,11 @@ def _read(
 
 
 def _read_edges(path: Path) -> np.ndarray:
+    if not path.exists():
+        raise InstrumentFileError(
+            f"{path} is missing: it says when the strobe (D10) rose, in one column, sync_time_s; save it there, or "
+            "declare where else that stands (sync; bifa instrument)"
+        )
     edges, sheet, rows = _read(path, ("sync_time_s",))
     _refuse_gaps(edges, sheet, rows, edges, _LOST)
     _refuse_falling(edges, sheet, rows, "sync_time_s")
@@ -256,8 +264,9 @@ def _camera(measured: Columns, uno: Columns, planned: PlannedTrial, instrument: 
     step = planned.experiment == "step_response"
     chambers = _commanded(planned)
     commands = np.array([uno[f"command_{chamber}"] for chamber in chambers])
-    keep = np.isfinite(commands).all(axis=0)
-    keep &= (uno["time_s"] >= instrument_s[0]) & (uno["time_s"] <= instrument_s[-1])
+    keep = np.isfinite(commands).all(axis=0) & (uno["time_s"] <= instrument_s[-1])
+    if step:  # which rests under vacuum first; a walk that was filmed from its middle on does not begin at rest
+        keep &= uno["time_s"] >= instrument_s[0]
     if not keep.any():
         raise InstrumentFileError(f"{instrument} does not cover the time in which the valves were commanded")
     time_s = uno["time_s"][keep]

@@ -8,6 +8,7 @@ appears in the watched folder or below it, or its path is typed. Files that cann
 from __future__ import annotations
 
 import contextlib
+import shlex
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -253,7 +254,7 @@ class OwnInstruments:
         kinds = ", ".join(self._suffixes)
         return (
             f"{path} is there, but a record of the {role} ends with {kinds}: save it as such, or declare with "
-            f"`bifa instrument {path.name}` how the {role} writes its files."
+            f"`{shlex.join(['bifa', 'instrument', str(path)])}` how the {role} writes its files."
         )
 
     def _take_new(self) -> bool:

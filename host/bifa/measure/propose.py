@@ -5,6 +5,7 @@ What is found here is proposed to a person, who decides; nothing is read by it u
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections.abc import Mapping, Sequence
@@ -23,6 +24,7 @@ from lacuna.decimals import number
 
 ROWS_SHOWN = 3
 _LOOKED_AT = 400  # lines
+_MOST_BYTES = 1 << 18
 _MOST_HEADS = 6
 _MAY_HAVE = ("time_s", "displacement_mm", "displacement_head_mm", "force_N")
 _MEANS = {  # what a column may be called, in the languages of the presets
@@ -102,13 +104,15 @@ def _workbook(path: Path) -> dict[str, Any]:
 
 def _text(path: Path) -> dict[str, Any]:
     encoding, lines = _decoded(path)
-    best: tuple[int, int, str, str] = (0, 0, "comma", ".")
+    best: tuple[int, float, int, str, str] = (0, 0.0, 0, "comma", ".")
     for name, mark in SEPARATORS.items():
+        rows = [_split(line, mark) for line in lines]
         for decimal in (".", ","):
-            if decimal != mark:
-                run, first = _numbers([_split(line, mark) for line in lines], decimal)
-                best = max(best, (run, -first, name, decimal), key=lambda one: one[:2])
-    run, first, separator, decimal = best[0], -best[1], best[2], best[3]
+            if decimal != mark and (found := _numbers(rows, decimal))[0]:
+                run, first = found
+                share = _share_of_numbers(rows[first], decimal)  # "0,5;1,5" at its commas: two of three
+                best = max(best, (run, share, -first, name, decimal), key=lambda one: one[:3])
+    run, first, separator, decimal = best[0], -best[2], *best[3:]
     _refuse_short(path, run)
     cells = [_split(line, SEPARATORS[separator]) for line in lines[:first]]
     how: dict[str, Any] = {"separator": separator, "decimal": decimal, "encoding": encoding}
@@ -124,7 +128,7 @@ def _refuse_short(path: Path, run: int) -> None:
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
     try:
-        raw = path.read_bytes()[: 1 << 18]
+        raw = path.read_bytes()[:_MOST_BYTES]
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=str(path)) from None
     marked = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
@@ -133,10 +137,11 @@ def _decoded(path: Path) -> tuple[str, list[str]]:
 
 
 def _is_utf8(raw: bytes) -> bool:
+    is_whole = len(raw) < _MOST_BYTES  # else it may be cut within a character
     try:
-        raw.decode("utf-8")
-    except UnicodeDecodeError as error:
-        return error.start > len(raw) - 4  # cut within a character
+        codecs.getincrementaldecoder("utf-8")().decode(raw, final=is_whole)
+    except UnicodeDecodeError:
+        return False
     return True
 
 
@@ -153,7 +158,7 @@ def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
     """Length and first line of the longest run of rows with as many cells, numbers most of them."""
     longest, first, run, width = 0, 0, 0, 0
     for place, cells in enumerate(rows):
-        here = len(cells) if len(cells) > 1 and _most_are_numbers(cells, decimal) else 0
+        here = len(cells) if len(cells) > 1 and _share_of_numbers(cells, decimal) > 0.5 else 0
         run = run + 1 if here and here == width else int(bool(here))
         width = here
         if run > longest:
@@ -161,10 +166,11 @@ def _numbers(rows: Sequence[Sequence[str]], decimal: str) -> tuple[int, int]:
     return longest, first
 
 
-def _most_are_numbers(cells: Sequence[str], decimal: str) -> bool:
+def _share_of_numbers(cells: Sequence[str], decimal: str) -> float:
+    """Of the cells that are not empty; 0 where there are not two."""
     written = [cell for cell in cells if cell.strip()]
     found = [number(cell if decimal == "." else cell.replace(".", " ").replace(",", ".")) for cell in written]
-    return len(written) > 1 and sum(value is not None for value in found) > len(written) / 2
+    return sum(value is not None for value in found) / len(written) if len(written) > 1 else 0.0
 
 
 def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
@@ -191,8 +197,9 @@ def _heads(above: Sequence[Sequence[str]], width: int) -> dict[str, Any]:
 
 
 def _is_of_units(row: Sequence[str]) -> bool:
-    written = [cell for cell in row if cell.strip()]
-    return sum(unit_in(cell) is not None for cell in written) > len(written) / 2
+    written = [cell.strip() for cell in row if cell.strip()]
+    alone = [cell.strip("()[] ") for cell in written]  # "Time [s]" is a name
+    return sum(unit_in(unit) is not None for unit in alone) > len(written) / 2
 
 
 def _preset(path: Path, role: str) -> str | None:

@@ -85,6 +85,15 @@ def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp
     assert not (tmp_path / "answer").exists()
 
 
+def test_a_program_without_an_input_is_answered_by_the_folder_alone(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "stdin", None)  # as under <&-, or with pythonw
+    watching = mounting(watch=tmp_path)
+    (tmp_path / "answer").write_text("r\n")
+    assert watching.answer() == "r"
+    with pytest.raises(NobodyError, match="no one can answer"):
+        waited(mounting().answer)
+
+
 def test_an_answer_to_an_earlier_question_does_not_count(typed, tmp_path):
     desk = mounting(watch=tmp_path)
     (tmp_path / "answer").write_text("")

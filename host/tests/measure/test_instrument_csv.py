@@ -14,10 +14,11 @@ from bifa.data.export import parse_exports
 from bifa.data.fields import Fields, Source
 from bifa.errors import BifaError
 from bifa.link import Uno
-from bifa.link.table import MARK_PAUSE
+from bifa.link.table import CHAMBERS, MARK_PAUSE
 from bifa.measure.instrument_csv import import_trial, read_instrument
 from bifa.measure.plan import PlannedTrial
 from bifa.rig import open_rig
+from bifa.robot import BASELINE
 from bifa.toml import parse_toml
 from harness.exports import EXPORTS, MACHINES, preset_of
 
@@ -137,6 +138,26 @@ def test_a_step_takes_its_commands_from_the_telemetry(files):
     assert moved - switched == pytest.approx(0.5, abs=0.011)
 
 
+@pytest.mark.parametrize("files", ["marked"], indirect=True)
+def test_a_walk_that_was_filmed_from_its_middle_on_is_refused(files):
+    telemetry = files / "telemetry_1.csv"
+    header, *rows = telemetry.read_text().splitlines()
+    commands = [",0,1,1" if float(row.split(",")[0]) >= 2.0 else ",,," for row in rows]
+    named = ",".join([header, *(f"command_{chamber}" for chamber in CHAMBERS)])
+    telemetry.write_text("\n".join([named, *map(str.__add__, rows, commands)]))
+    (files / "pull.sync.csv").rename(files / "cam.sync.csv")
+    walk = PlannedTrial("locomotion", gait=BASELINE, cycles=1)
+
+    def filmed_from(begins_s):
+        camera_s = np.arange(begins_s, 7.5, 0.01)
+        write(files / "cam.csv", {"time_s": own(camera_s), "displacement_head_mm": 8.0 * np.maximum(camera_s - 2.0, 0)})
+        return import_trial(files / "cam.csv", telemetry, walk, files / f"from_{begins_s:g}")[0]
+
+    assert filmed_from(1.5).trials[0].columns["displacement_head_mm"][0] == pytest.approx(0.0, abs=0.1)
+    with pytest.raises(DatasetError, match=r"cam\.csv.*begins 1\.50 s too late: it has to cover the whole"):
+        filmed_from(3.5)
+
+
 def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
     return f"{header}\n" + "".join(f"{t},1,2{end}\n" for t in times)
 
@@ -173,7 +194,7 @@ def test_a_file_that_cannot_be_used_is_named_with_what_to_do(files, file, text, 
 
 def test_missing_files_are_named(files):
     (files / "pull.sync.csv").unlink()
-    with pytest.raises(DatasetError, match=r"pull\.sync\.csv"):
+    with pytest.raises(DatasetError, match=r"pull\.sync\.csv is missing: it says when the strobe .* declare where"):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
@@ -314,6 +335,23 @@ FORM = """[instrument.machine]
 columns = { time_s = "t", displacement_mm = "x", force_N = "F" }
 units = { time_s = "s", displacement_mm = "mm", force_N = "N" }
 """
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("m", 1e3), ("in", 25.4), ("um", 1e-3)])
+def test_a_code_for_a_missing_value_is_seen_in_the_files_own_unit(files, unit, mm):
+    time_s, place_mm, force_N = pulled(files)[0].values()
+    written = place_mm / mm
+    written[40] = 999.0
+    columns = {"t": time_s, "x": written, "F": force_N}
+    write(files / "odd.csv", columns)
+    (files / "pull.sync.csv").rename(files / "odd.sync.csv")
+    more = "offset = { displacement_mm = 3.0 }\n"
+    export = declared(FORM.replace('displacement_mm = "mm"', f'displacement_mm = "{unit}"') + more)
+    if unit == "um":  # 0.999 mm
+        import_trial(files / "odd.csv", files, PULL, files / "out", export=export)
+        return
+    with pytest.raises(DatasetError, match="line 42, column displacement_mm: 999 is a code for a missing value"):
+        import_trial(files / "odd.csv", files, PULL, files / "out", export=export)
 
 
 def test_a_clock_of_dates_has_its_edges_as_dates(files):

@@ -119,7 +119,7 @@ def test_a_workbook_is_seen(watching, said):
     [
         ("pull.csv", r"pull\.csv is there; pull\.sync\.csv .* is not, yet"),
         ("pull.sync.csv", r"pull\.sync\.csv is there; the record that it belongs to is not, yet"),
-        ("pull.xlsx", r"pull\.xlsx is there, but a record of the machine ends with \.csv.*bifa instrument"),
+        ("pull.xlsx", r"pull\.xlsx is there, but a record .* ends with \.csv.*`bifa instrument \S*/pull\.xlsx`"),
         ("pull.c3d", r"pull\.c3d is there, but"),
         ("below/pull.CSV", r"pull\.CSV is there; pull\.sync\.csv"),
     ],

@@ -108,6 +108,31 @@ def test_where_a_declaration_cannot_be_written_is_said_before_anything_is_asked(
         assert "Whose file" not in said.output
 
 
+@pytest.mark.parametrize("above", ["", "sep=;\n", "Specimen;silicone 3\n", "\nBench;Monday;2\n"])
+def test_names_with_their_units_are_names_whatever_stands_above_them(tmp_path, above):
+    path = tmp_path / "a.csv"
+    path.write_text(above + "Zeit [s];Weg [mm];Kraft [N]\n" + "".join(f"{t},5;{t},1;{t},25\n" for t in range(5)))
+    seen = look(path)
+    assert seen.guess("displacement_mm") == "Weg [mm]"
+    assert (seen.guess("force_N"), seen.unit("force_N", "Kraft [N]")) == ("Kraft [N]", "N")
+    assert len(seen.sheet) == 5
+
+
+@pytest.mark.parametrize("columns", [2, 3, 4])
+def test_decimal_commas_are_no_separators_however_few_columns_there_are(tmp_path, columns):
+    row = ";".join(["0,25"] * columns)
+    (tmp_path / "a.csv").write_text(";".join("abcd"[:columns]) + f"\n{row}" * 5)
+    seen = look(tmp_path / "a.csv")
+    assert seen.how == {"separator": "semicolon", "decimal": ","}
+    np.testing.assert_array_equal(seen.sheet.numbers(columns - 1, ""), [0.25] * 5)
+
+
+def test_a_letter_of_an_old_code_page_is_seen_at_the_very_end_of_a_file_as_well(tmp_path):
+    rows = "".join(f"{t};{t}\n" for t in range(5))
+    (tmp_path / "a.csv").write_bytes(f"Zeit [s];Kraft [N]\n{rows}Ende;3 µ".encode("cp1252"))
+    assert look(tmp_path / "a.csv").how["encoding"] == "cp1252"
+
+
 def test_what_is_no_table_is_refused(tmp_path):
     for content in (b"", b"dear diary\n", bytes(range(256))):
         (tmp_path / "a.csv").write_bytes(content)
