@@ -136,7 +136,6 @@ class Effect:
     parameters: tuple[Parameter, ...]  # one alone needs no brackets
     enters: str = ""
     experiments: tuple[str, ...] = ()
-    confusable_with: tuple[str, ...] = ()
     equation: str = ""
     source: str = ""
     sizes: int = 1
@@ -150,7 +149,7 @@ class Effect:
     def __post_init__(self) -> None:
         for each in ("parameters", "own"):
             object.__setattr__(self, each, several(getattr(self, each), Parameter))
-        for each in ("experiments", "confusable_with", "freed_at", "apart"):
+        for each in ("experiments", "freed_at", "apart"):
             object.__setattr__(self, each, several(getattr(self, each), str))
         object.__setattr__(self, "start_factors", several(self.start_factors, Real))
         if not self.start_factors or not all(map(_is_number, self.start_factors)):

@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     " makes no difference that eq. (2) is one of the force F, not of p",
     enters="eq. (2), the area a, in every actuator",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
-    confusable_with=("sensor_calibration",),
     parameters=(
         EffectParameter("slope", "", -0.6, 0.6, 0.1, "relative change over the stroke", size=True),
         EffectParameter(

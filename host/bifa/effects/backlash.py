@@ -9,7 +9,6 @@ EFFECT = PhysicalEffect(
     source="play operator, e.g. M. Brokate and J. Sprekels, Hysteresis and Phase Transitions, ch. 2",
     enters="eq. (1), the argument of K; the load train of the anchor pull",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
-    confusable_with=("hysteresis",),
     parameters=(EffectParameter("gap_m", "m", 0.0, 0.01, 0.001, "width of the play", size=True),),
     states=1,
 )

@@ -16,7 +16,6 @@ EFFECT = PhysicalEffect(
     " 1 / the volume",
     enters="eq. (2), the rate of filling",
     experiments=("step_response", "locomotion"),
-    confusable_with=("valve_asymmetry", "line_lag"),
     parameters=(
         EffectParameter(
             "saturation_s_per_psi", "s/psi", 0.0, 0.4, 0.045, "1 / the greatest rate, from 1 atm upstream", size=True

@@ -40,10 +40,10 @@ class EffectParameter:
 class PhysicalEffect:
     """A physical cause that the paper's model lacks.
 
-    `enters`: the equation and the place in it; `experiments`: where it can be seen at all;
-    `confusable_with`: effects whose signature is alike; `states`: numbers remembered for each actuator; `freed_at`:
-    where its form may differ from the formula, by the names in `bifa.problem.sites`; `apart`: parameters that it
-    needs to be above those that they cannot be below; `unlike_cycles`: no cycle of a gait is like the one before.
+    `enters`: the equation and the place in it; `experiments`: where it can be seen at all; `states`: numbers remembered
+    for each actuator; `freed_at`: where its form may differ from the formula, by the names in `bifa.problem.sites`;
+    `apart`: parameters that it needs to be above those that they cannot be below; `unlike_cycles`: no cycle of a gait
+    is like the one before.
     """
 
     name: str
@@ -52,7 +52,6 @@ class PhysicalEffect:
     source: str
     enters: str
     experiments: tuple[str, ...]
-    confusable_with: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
     states: int = 0
     freed_at: tuple[str, ...] = ()

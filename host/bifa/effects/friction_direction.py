@@ -9,7 +9,6 @@ EFFECT = PhysicalEffect(
     source="direction-dependent Coulomb friction, e.g. A. Janot et al., the EMPS benchmark (2019)",
     enters="eq. (5), mu_s and mu_k",
     experiments=("anchor_pull", "locomotion"),
-    confusable_with=("inclination", "tether_drag"),
     parameters=(EffectParameter("asymmetry", "", -0.8, 0.8, 0.15, "half the relative difference", size=True),),
     freed_at=("friction_speed", "grip_speed"),
 )

@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     source="P. R. Dahl, A Solid Friction Model (1968); the 2 mm offset of the paper's Fig. 5",
     enters="eq. (1), beside K(x), in every actuator",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
-    confusable_with=("viscoelasticity", "backlash"),
     parameters=(
         EffectParameter("force_N", "N", 0.0, 20.0, 4.0, "half width of the loop, body", size=True),
         EffectParameter("displacement_m", "m", 0.0002, 0.02, 0.002, "travel over which the loop changes side"),

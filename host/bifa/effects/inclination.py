@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     source="the term m g of eq. (1), which (4) leaves out",
     enters="eq. (4) and (7)",
     experiments=("locomotion",),
-    confusable_with=("friction_direction", "tether_drag"),
     parameters=(EffectParameter("angle_deg", "deg", -60.0, 60.0, 10.0, "uphill positive", size=True),),
 )
 

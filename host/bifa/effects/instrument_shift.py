@@ -10,7 +10,6 @@ EFFECT = PhysicalEffect(
     "transfer time",
     enters="the displacement channels only",
     experiments=("step_response", "locomotion"),
-    confusable_with=("sensor_lag", "valve_latency"),
     parameters=(
         EffectParameter("late_s", "s", -0.04, 0.04, 0.01, "time by which displacements are late", size=True),
         EffectParameter("share", "", 0.0, 1.0, 1.0, "of that time, in this trial", own=True),

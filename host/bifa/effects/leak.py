@@ -10,7 +10,6 @@ EFFECT = PhysicalEffect(
     " 1960); a lip that only opens outwards, and at some pressure: inward 0, exponent above 1",
     enters="eq. (2), beside the filling",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
-    confusable_with=("sensor_calibration",),
     parameters=(
         EffectParameter("rate_per_s", "1/s", 0.0, 2.0, 0.05, "share of 8 psi lost in a second", size=True),
         EffectParameter("exponent", "", 0.3, 1.7, 1.0, "power of the pressure: 1 laminar, 0.5 an orifice"),

@@ -12,7 +12,6 @@ EFFECT = PhysicalEffect(
     " Control 122 (2000); a delay with a lag stands for a line of any order",
     enters="eq. (2), between p_d and the chamber",
     experiments=("step_response", "locomotion"),
-    confusable_with=("valve_latency",),
     parameters=(
         EffectParameter("time_s", "s", 0.0, 0.5, 0.06, "time constant of the tube", size=True),
         EffectParameter("delay_share", "", 0.0, 1.0, 0.3, "delay before it, over the time constant", omitted=0.0),

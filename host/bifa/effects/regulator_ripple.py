@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     source="the paper's Fig. 4: oscillations caused by the regulator",
     enters="eq. (2), p_d of chambers on the positive supply",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
-    confusable_with=(),
     parameters=(
         EffectParameter("amplitude_psi", "psi", 0.0, 3.0, 0.3, "amplitude", size=True),
         EffectParameter("frequency_Hz", "Hz", 0.02, 5.0, 0.5, "frequency", frequency=True),

@@ -9,7 +9,6 @@ EFFECT = PhysicalEffect(
     source="total error band of low-cost pressure sensors (data sheets)",
     enters="the pressure channels only",
     experiments=("static_loading", "step_response", "anchor_pull", "locomotion"),
-    confusable_with=("leak", "area_variation"),
     parameters=(
         EffectParameter("gain", "", -0.4, 0.4, 0.03, "relative error of the gain", size=True),
         EffectParameter("offset_psi", "psi", -3.0, 3.0, 0.2, "reading at 0 psi", size=True),

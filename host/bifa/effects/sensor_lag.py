@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     source="thin tube to the sensor (paper, section II.C: 1/16 in) and the sensor's own filter",
     enters="the pressure channels only",
     experiments=("step_response", "locomotion"),
-    confusable_with=("instrument_shift",),
     parameters=(EffectParameter("time_s", "s", 0.0, 0.5, 0.05, "time constant", size=True),),
     states=1,
     freed_at=("pressure_sensor_memory",),

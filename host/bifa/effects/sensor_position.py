@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     " 1944)",
     enters="the pressure channels only",
     experiments=("step_response", "locomotion"),
-    confusable_with=(),
     parameters=(
         EffectParameter("share", "", 0.0, 1.0, 0.05, "share that is seen of a drop of 12 psi", size=True),
         EffectParameter("power", "", 0.4, 2.6, 1.0, "of the drop: 1 laminar, 1.75 to 2 turbulent"),

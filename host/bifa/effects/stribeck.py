@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     source="B. Armstrong-Helouvry et al., Automatica 30 (1994), eq. (4)",
     enters="eq. (5), mu_k",
     experiments=("anchor_pull", "locomotion"),
-    confusable_with=(),
     parameters=(
         EffectParameter("speed_m_s", "m/s", 0.0, 0.2, 0.01, "speed at which most of it has fallen", size=True),
     ),

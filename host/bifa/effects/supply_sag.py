@@ -10,7 +10,6 @@ EFFECT = PhysicalEffect(
     source="a source with inner resistance; the paper's vacuum pump has no regulator (section II.C)",
     enters="eq. (2), p_d of all chambers together",
     experiments=("step_response", "locomotion"),
-    confusable_with=("choked_flow",),
     parameters=(
         EffectParameter("resistance_s", "s", 0.0, 1.0, 0.03, "drop per psi/s of filling, positive supply", size=True),
         EffectParameter("vacuum_share", "", 0.0, 4.0, 1.0, "the vacuum's resistance over the positive supply's"),

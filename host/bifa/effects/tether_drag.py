@@ -9,7 +9,6 @@ EFFECT = PhysicalEffect(
     source="Coulomb friction of the length of tube already in the pipe",
     enters="eq. (5) of the tail",
     experiments=("locomotion",),
-    confusable_with=("friction_direction", "inclination"),
     parameters=(EffectParameter("drag_N_m", "N/m", 0.0, 30.0, 2.0, "growth with distance", size=True),),
     freed_at=("friction_place", "grip_place"),
     unlike_cycles=True,

@@ -9,7 +9,6 @@ EFFECT = PhysicalEffect(
     source="opening and closing times of solenoid valves differ with their return spring (data sheets)",
     enters="eq. (2), the time of p_d",
     experiments=("step_response", "locomotion"),
-    confusable_with=("valve_latency", "choked_flow"),
     parameters=(
         EffectParameter("difference_s", "s", -0.3, 0.3, 0.03, "edge to positive minus edge to vacuum", size=True),
     ),

@@ -9,7 +9,6 @@ EFFECT = PhysicalEffect(
     source="switching time of solenoid valves, data sheets of 3/2 fast-switching valves",
     enters="eq. (2), the time of p_d",
     experiments=("step_response", "locomotion"),
-    confusable_with=("line_lag", "valve_asymmetry"),
     parameters=(EffectParameter("delay_s", "s", 0.0, 0.3, 0.03, "delay", size=True),),
 )
 

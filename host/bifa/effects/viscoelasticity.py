@@ -11,7 +11,6 @@ EFFECT = PhysicalEffect(
     source="standard linear solid, e.g. W. N. Findley, Creep and Relaxation of Nonlinear Viscoelastic Materials",
     enters="eq. (1), beside K(x), in every actuator",
     experiments=("static_loading", "step_response", "locomotion"),
-    confusable_with=("hysteresis",),
     parameters=(
         EffectParameter("stiffness_N_m", "N/m", 0.0, 3000.0, 150.0, "of the relaxing branch, body", size=True),
         EffectParameter("time_s", "s", 0.02, 60.0, 4.0, "relaxation time"),

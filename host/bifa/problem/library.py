@@ -18,7 +18,6 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
         parameters=tuple(_engine_parameter(p) for p in ordered),
         enters=effect.enters,
         experiments=effect.experiments,
-        confusable_with=effect.confusable_with,
         equation=effect.equation,
         source=effect.source,
         sizes=len(effect.sizes),

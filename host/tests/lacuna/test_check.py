@@ -254,7 +254,7 @@ def test_refuses_amounts_of_a_parameter_that_are_none(told):
     [
         *({"start_factors": given} for given in ((), (math.nan,), None)),
         *({"absent": given} for given in (math.nan, None, "0")),
-        *({name: 3} for name in ("parameters", "own", "experiments", "freed_at", "apart", "confusable_with")),
+        *({name: 3} for name in ("parameters", "own", "experiments", "freed_at", "apart")),
     ],
 )
 def test_refuses_an_effect_that_is_none(told):

@@ -147,7 +147,6 @@ def test_every_effect_of_the_contract_is_there_and_declared():
         assert effect.source
         assert effect.sizes
         assert set(effect.experiments) <= set(EXPERIMENTS)
-        assert set(effect.confusable_with) <= set(effects.library())
         for parameter in effect.parameters:
             assert parameter.lower <= parameter.typical <= parameter.upper
             assert not parameter.size or parameter.lower <= 0.0 <= parameter.upper
@@ -177,7 +176,7 @@ def test_a_wrong_effect_is_refused_by_name_and_range(chosen, told):
 def _new_effect(**functions):
     module = types.ModuleType("bifa.effects.swelling")
     parameter = EffectParameter("share", "", 0.0, 1.0, 0.1, "size", size=True)
-    module.EFFECT = PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", (), (), (parameter,))
+    module.EFFECT = PhysicalEffect("swelling", "", "F (1 + share)", "a test", "eq. (2)", (), (parameter,))
     module.__dict__.update(functions)
     return module
 
