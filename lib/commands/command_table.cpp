@@ -6,60 +6,60 @@ namespace bifa {
 
 const char kCommandTexts[] BIFA_FLASH =
     "help [NAME]\0"
-    "lis\205ev\214y\245\211g\213\216expla\211 \224e\0"  // list everything, or explain one
+    "lis\205ev\214y\247\210g\212\216expla\210 \224e\0"  // list everything, or explain one
     "version\0"
-    "v\214\257\224s\213ca\246\206\221\201l\226\205\217\247t\0"  // versions, cause of the last start
+    "v\214\246\224s\212ca\250\206\221\201l\227\205\217\251t\0"  // versions, cause of the last start
     "status\0"
-    "\217\227e\213\243\213\203\260\231s\213v\223v\251\213l\211k\0"  // state, fault, pressures, valves, link
+    "\217\230e\212\244\212\203\260\232s\212v\223v\243\212l\210k\0"  // state, fault, pressures, valves, link
     "show [NAME]\0"
-    "v\223u\251\213r\225g\251\234* diff\214\212a\205\256w\214-up\0"  // values, ranges; * differs at power-up
+    "v\223u\243\212r\226g\243\235* diff\214\213a\205\257w\214-up\0"  // values, ranges; * differs at power-up
     "set NAME VALUE\0"
-    "ch\225g\206a \204\213\223s\252whil\206runn\211g\0"  // change a parameter, also while running
+    "ch\226g\206a \204\212\223s\253whil\206runn\210g\0"  // change a parameter, also while running
     "run\0"
     "w\223k\0"  // walk
     "stop\0"
-    "\217\244\213\225d v\230\205\223l chamb\214s\0"  // stop, and vent all chambers
+    "\217\245\212\226d v\231\205\223l chamb\214s\0"  // stop, and vent all chambers
     "hold CHAMBER positive|vacuum|off\0"
-    "\211fl\227e\213ev\236u\227\206\216v\230\205\250\213\207\216\232\0"  // inflate, evacuate or vent body, head or tail
+    "\210fl\230e\212ev\237u\230\206\216v\231\205\252\212\207\216\233\0"  // inflate, evacuate or vent body, head or tail
     "clear\0"
-    "\231\215\226\206a \217\244 \216\243\0"  // release a stop or fault
+    "\232\215\227\206a \217\245 \216\244\0"  // release a stop or fault
     "stream on|off\0"
-    "te\215m\222ry: \224\206l\211\206(>) p\214\233amp\215\0"  // telemetry: one line (>) per sample
+    "te\215m\222ry: \224\206l\210\206(>) p\214\225amp\215\0"  // telemetry: one line (>) per sample
     "plot on|off\0"
-    "te\215m\222ry f\253\201S\214i\223 Plott\214\0"  // telemetry for the Serial Plotter
+    "te\215m\222ry f\254\201S\214i\223 Plott\214\0"  // telemetry for the Serial Plotter
     "save [NAME]\0"
-    "save\201\204s\234wi\245\254\205NAME: f\216\256w\214-up\0"  // save the parameters; without NAME: for power-up
+    "save\201\204s\235wi\247\255\205NAME: f\216\257w\214-up\0"  // save the parameters; without NAME: for power-up
     "load PRESET\0"
-    "load\240 \203\222\0"  // load a preset
+    "load\234 \203\222\0"  // load a preset
     "presets\0"
     "li\217\201\203\222s\0"  // list the presets
     "forget PRESET\0"
-    "de\215t\206a \203e\205from \235\0"  // delete a preset from EEPROM
+    "de\215t\206a \203e\205from \236\0"  // delete a preset from EEPROM
     "defaults confirm\0"
-    "\214\226\206\223l \203\222\212\225d\233\222t\211gs\0"  // erase all presets and settings
+    "\214\227\206\223l \203\222\213\226d\225\222t\210gs\0"  // erase all presets and settings
     "zero confirm|factory\0"
-    "z\214o\201\203\260r\206s\230s\253s\234\216und\252\245\227\0"  // zero the pressure sensors; or undo that
+    "z\214o\201\203\260r\206s\231s\254s\235\216und\253\247\230\0"  // zero the pressure sensors; or undo that
     "echo on|off\0"
-    "\231pea\205wha\205y\254\202(b\247\206t\214m\211\223)\0";  // repeat what you type (bare terminal)
+    "\232pea\205wha\205y\255\202(b\251\206t\214m\210\223)\0";  // repeat what you type (bare terminal)
 const char kResultTexts[] BIFA_FLASH =
     "ok\0"
-    "\210comm\225d;\202help\0"  // no such command; type help
-    "wr\224g\240rgum\230ts\0"  // wrong arguments
-    "\210\204;\202show\0"  // no such parameter; type show
-    "\254\205\221 r\225ge\0"  // out of range
-    "\217\244ped:\202c\215\247\241r\217\0"  // stopped: type clear first
-    "\237\205\211 \245i\212\217\227e;\202\217\244\241r\217\0"  // not in this state; type stop first
-    "\210\203\222;\202\203\222s\0"  // no such preset; type presets
-    "nam\251: 1 t\25212 \221\240-z 0-9 _ -\213\237\205f\236t\253y\0"  // names: 1 to 12 of a-z 0-9 _ -, not factory
-    "\237\233p\236\206\215ft\0"  // no space left
-    "\235 writ\206fai\215d\0"  // EEPROM write failed
-    "b\246y\233av\211g\234try\240ga\211\0"  // busy saving; try again
-    "\237 tr\225s\236\261\224 \244\230\213\216a\241eld wa\212\231jected\0"  // no transaction open, or a field was rejected
-    "\204\233e\205fai\215d it\212CRC\0"  // parameter set failed its CRC
-    "ca\246\206\217ill \203\230t;\202\217\227\246\0"  // cause still present; type status
-    "\261me\212m\246\205\237\205g\252b\236kw\247ds\0"  // times must not go backwards
-    "\203\260\231\212\237\205s\222t\215d\234wai\2054\233\0"  // pressures not settled; wait 4 s
-    "\221fse\205exceed\2120.9 p\257\0";  // offset exceeds 0.9 psi
+    "\211comm\226d;\202help\0"  // no such command; type help
+    "wr\224g\234rgum\231ts\0"  // wrong arguments
+    "\211\204;\202show\0"  // no such parameter; type show
+    "\255\205\221 r\226ge\0"  // out of range
+    "\217\245ped:\202c\215\251\241r\217\0"  // stopped: type clear first
+    "\240\205\210 \247i\213\217\230e;\202\217\245\241r\217\0"  // not in this state; type stop first
+    "\211\203\222;\202\203\222s\0"  // no such preset; type presets
+    "nam\243: 1 t\25312 \221\234-z 0-9 _ -\212\240\205f\237t\254y\0"  // names: 1 to 12 of a-z 0-9 _ -, not factory
+    "\240\225p\237\206\215ft\0"  // no space left
+    "\236 writ\206fai\215d\0"  // EEPROM write failed
+    "b\250y\225av\210g\235try\234ga\210\0"  // busy saving; try again
+    "\240 tr\226s\237\261\224 \245\231\212\216a\241eld wa\213\232jected\0"  // no transaction open, or a field was rejected
+    "\204\225e\205fai\215d it\213CRC\0"  // parameter set failed its CRC
+    "ca\250\206\217ill \203\231t;\202\217\230\250\0"  // cause still present; type status
+    "\261me\213m\250\205\240\205g\253b\237kw\251ds\0"  // times must not go backwards
+    "\203\260\232\213\240\205s\222t\215d\235wai\2054\225\0"  // pressures not settled; wait 4 s
+    "\221fse\205exceed\2130.9 p\246\0";  // offset exceeds 0.9 psi
 const char kChamberWords[] BIFA_FLASH =
     "body\0"
     "head\0"

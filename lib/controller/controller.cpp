@@ -156,6 +156,11 @@ void Controller::host_heard() {
   host_silence_ms_ = 0;
 }
 
+void Controller::in_session(bool yes) {
+  const Critical guard;
+  in_session_ = yes;
+}
+
 SupplyCode Controller::supply() const {
   const Critical guard;
   return supervisor_.state() == State::kFault ? SupplyCode() : wanted_code_;
@@ -259,11 +264,12 @@ void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
 }
 
 void Controller::watch_host() {
-  if (host_timeout_ms_ == 0) return;
+  const uint16_t timeout_ms = host_timeout_ms_ == 0 && in_session_ ? kSessionTimeout_ms : host_timeout_ms_;
+  if (timeout_ms == 0) return;
   ++host_silence_ms_;  // all that moves air begins with 0, so that a wrap means nothing
-  if (host_silence_ms_ < host_timeout_ms_ || !(supervisor_.moves_air() || schedule_.running())) return;
+  if (host_silence_ms_ < timeout_ms || !(supervisor_.moves_air() || schedule_.running())) return;
   trip(Fault::kHostSilent, kNoChannel, static_cast<int16_t>(host_silence_ms_ / kSilenceUnit_ms),
-       static_cast<int16_t>(host_timeout_ms_ / kSilenceUnit_ms));
+       static_cast<int16_t>(timeout_ms / kSilenceUnit_ms));
 }
 
 void Controller::trip(Fault fault, uint8_t channel, int16_t value, int16_t limit) {

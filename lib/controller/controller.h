@@ -93,6 +93,9 @@ class Controller {
   /// Call it whenever the host has said something that makes sense.
   void host_heard();
 
+  /// Whether a host has a session. It may be killed, so where `host_timeout_s` is 0 kSessionTimeout_ms stands for it.
+  void in_session(bool yes);
+
   /// What the DAC has to be told now. Whoever tells it reports how that ended.
   SupplyCode supply() const;
   void supply_told(bool answered);
@@ -135,6 +138,7 @@ class Controller {
   SupplyCode wanted_code_;
   uint16_t host_timeout_ms_ = 0;
   uint16_t host_silence_ms_ = 0;
+  bool in_session_ = false;
 
   RawRound round_ = {};
   volatile bool round_complete_ = false;

@@ -8,11 +8,11 @@
 namespace bifa {
 
 const uint8_t kFirmwareVersion[3] BIFA_FLASH = {0, 1, 0};
-const uint8_t kProtocolVersion = 1;
+const uint8_t kProtocolVersion = 2;
 /// Changes whenever anything changes that host and Uno must agree on.
 const uint32_t kTableHash = 0x6908B694UL;
 /// The same three for people, as the host writes them.
-#define BIFA_VERSIONS "0.1.0, protocol 1, table 6908b694"
+#define BIFA_VERSIONS "0.1.0, protocol 2, table 6908b694"
 
 enum class MessageId : uint8_t {
   kVersion = 0x01,

@@ -59,6 +59,7 @@ void Session::connect(const Frame& frame) {
   const ConnectMessage wanted = fields_as<ConnectMessage>(frame.fields);
   if (wanted.boot_nonce == boot_nonce_) {
     key_ = wanted.session_key;
+    commands_.controller().in_session(key_ != 0);
     expected_ = 0;
     waiting_ = false;
     streaming_ = false;

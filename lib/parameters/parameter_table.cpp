@@ -10,28 +10,28 @@ const char kParameterTexts[] BIFA_FLASH =
     "\261m\206\221 \224\206cycl\206(1/f)\0"  // time of one cycle (1/f)
     "psi12_deg\0"
     "deg\0"
-    "\255\226\206\221\201\207a\207\221\201\2202)\0"  // phase of the head ahead of the body (psi_12)
+    "\256\227\206\221\201\207a\207\221\201\2202)\0"  // phase of the head ahead of the body (psi_12)
     "psi13_deg\0"
     "deg\0"
-    "\255\226\206\221\201\232\240\207\221\201\2203)\0"  // phase of the tail ahead of the body (psi_13)
+    "\256\227\206\221\201\233\234\207\221\201\2203)\0"  // phase of the tail ahead of the body (psi_13)
     "duty_body\0"
     "\0"
-    "\200\250 c\224tr\236t\212\2421)\0"  // fraction of the cycle under vacuum; the body contracts (d_1)
+    "\200\252 c\224tr\237t\213\2421)\0"  // fraction of the cycle under vacuum; the body contracts (d_1)
     "duty_head\0"
     "\0"
-    "\200\207\231\215\226e\212\2422)\0"  // fraction of the cycle under vacuum; the head releases (d_2)
+    "\200\207\232\215\227e\213\2422)\0"  // fraction of the cycle under vacuum; the head releases (d_2)
     "duty_tail\0"
     "\0"
-    "\200\232 \231\215\226e\212\2423)\0"  // fraction of the cycle under vacuum; the tail releases (d_3)
+    "\200\233 \232\215\227e\213\2423)\0"  // fraction of the cycle under vacuum; the tail releases (d_3)
     "coupling_per_s\0"
     "1/s\0"
-    "c\254pl\211g ga\211 \221\201oscill\227\253\212(\223\255a_\255i)\0"  // coupling gain of the oscillators (alpha_phi)
+    "c\255pl\210g ga\210 \221\201oscill\230\254\213(\223\256a_\256i)\0"  // coupling gain of the oscillators (alpha_phi)
     "pressure_psi\0"
     "psi\0"
-    "s\222-\256\211\205\221\201\256\257\261v\206\260pply\0"  // set-point of the positive supply
+    "s\222-\257\210\205\221\201\257\246\261v\206\260pply\0"  // set-point of the positive supply
     "host_timeout_s\0"
     "s\0"
-    "v\230\205if\201hos\205i\212\257\215n\205\245i\212l\224g\2340 = nev\214\0";  // vent if the host is silent this long; 0 = never
+    "v\231\205if\201hos\205i\213\246\215n\205\247i\213l\224g\2350 = nev\214\212\210\234\225\243\246\224 2\225\0";  // vent if the host is silent this long; 0 = never, in a session 2 s
 
 const ParameterDescriptor kParameterDescriptors[kParameterCount] BIFA_FLASH = {
     {500000UL, 60000000UL, 6, offsetof(ParameterSet, period_us), 4, 1},  // period_s

@@ -20,7 +20,7 @@ struct ParameterSet {
   uint16_t duty_tail_e4;  ///< duty_tail: fraction of the cycle under vacuum; the tail releases (d_3)
   uint16_t coupling_milli_per_s;  ///< coupling_per_s: coupling gain of the oscillators (alpha_phi)
   uint16_t pressure_mpsi;  ///< pressure_psi: set-point of the positive supply
-  uint16_t host_timeout_ms;  ///< host_timeout_s: vent if the host is silent this long; 0 = never
+  uint16_t host_timeout_ms;  ///< host_timeout_s: vent if the host is silent this long; 0 = never, in a session 2 s
 };
 static_assert(sizeof(ParameterSet) == 24, "a set has no holes");
 

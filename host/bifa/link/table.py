@@ -26,7 +26,7 @@ class Message(NamedTuple):
     fields: tuple[tuple[str, int], ...]
 
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 TABLE_HASH = 0x6908B694
 NAME_BYTES = 12
 
@@ -35,6 +35,7 @@ DEAD_TIME_MS = 3  # for how long both valves of a chamber stay off when one foll
 SAMPLE_PERIOD_MS = 10  # from one strobe and sample of the pressures to the next
 MARK_PAUSE = 10  # strobes that a mark leaves out
 SCHEDULE_ENTRIES = 16  # timed holds that fit
+SESSION_TIMEOUT_MS = 2000  # of silence in a session, after which air is vented where host_timeout_s is 0: the host may have been killed
 CONVERTER_COUNTS = 4096  # of the MCP4725, 12 bits
 REGULATOR_SPAN_MPSI = 130000  # full scale of the SMC ITV1050 (0.9 MPa at 5 V): on the converter it would burst pouches and sensors
 
@@ -56,7 +57,7 @@ PARAMETERS = (
     UnoParameter('pressure_psi', 'psi', 3, 0, 14000, 8500,
               'set-point of the positive supply'),
     UnoParameter('host_timeout_s', 's', 3, 0, 60000, 0,
-              'vent if the host is silent this long; 0 = never'),
+              'vent if the host is silent this long; 0 = never, in a session 2 s'),
 )
 
 # struct format of a parameter set, on the wire and in EEPROM

@@ -1,7 +1,5 @@
 """Console lines over the port of a session: text out, text back, telemetry and clock beside them."""
 
-from contextlib import nullcontext
-
 from bifa.link.errors import NoAnswerError
 from bifa.link.transport import Clock
 from bifa.link.uno import Uno
@@ -9,7 +7,7 @@ from bifa.link.uno import Uno
 SETTLE_S = 0.05
 LONGEST_ANSWER_S = 10.0  # erasing the EEPROM takes a while
 MOVING = ("run", "hold")
-REPLACING = ("load", "defaults", "set host_timeout_s")  # what the guard stands for
+REPLACING = ("set", "load", "defaults")  # `host_timeout_s`, maybe
 
 
 def is_answer(line: str) -> bool:
@@ -43,12 +41,10 @@ def type_line(uno: Uno, line: str, clock: Clock) -> list[str]:
         return [f"error {line!r} contains characters that are not text; not sent"]
     word = (line.split() or [""])[0]
     if word in MOVING:
-        uno.guard()
         uno.may_move = True
-    with uno.unguarded() if word == "save" else nullcontext():
-        lines = _answered(uno, line, clock)
-    if " ".join(line.split()).startswith(REPLACING) and lines[-1].startswith("ok"):
-        uno.guard_again()
+    lines = _answered(uno, line, clock)
+    if word in REPLACING:
+        uno.parameters()  # which tells how often the Uno wants to be talked to
     return lines
 
 

@@ -3,8 +3,7 @@
 import binascii
 import math
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from bifa.link import frames, leaving
@@ -12,12 +11,20 @@ from bifa.link.clock_relation import ClockRelation
 from bifa.link.errors import LinkError, NoAnswerError, StillMovingError
 from bifa.link.leaving import CONFIRMED_WITHIN_S
 from bifa.link.session import Counters, Hello, Session, word
-from bifa.link.table import CHAMBER_STATES, CHAMBERS, DEAD_TIME_MS, FAULTS, SAMPLE_PERIOD_MS, SCHEDULE_ENTRIES, STATES
+from bifa.link.table import (
+    CHAMBER_STATES,
+    CHAMBERS,
+    DEAD_TIME_MS,
+    FAULTS,
+    SAMPLE_PERIOD_MS,
+    SCHEDULE_ENTRIES,
+    SESSION_TIMEOUT_MS,
+    STATES,
+)
 from bifa.link.transport import Clock, Transport
 from bifa.link.units import UnoParameterError, from_wire, index_of, pack_set, to_wire, unpack_set
 
 EEPROM_TIMEOUT_S = 10.0
-GUARD_S = 2.0  # of silence, after which the Uno vents what this host has moved: it may have been killed
 CLOCK_EVERY_S = 1.0
 CLOCK_TICK_S = 1e-3  # the Uno reads its clock in whole milliseconds: it may be later by that much
 EXCHANGES_AT_START = 5
@@ -85,8 +92,6 @@ class Uno:
         self.session.on_sample = self._take_sample
         self.session.on_renewed = self._stream_again
         self.may_move = False
-        # Once guarded: `host_timeout_s` (wire units) as it was chosen; GUARD_S stands for 0.
-        self._own_timeout: int | None = None
         self.clock_relation = ClockRelation()
         self._clock = clock
         self._samples: deque[Sample] = deque(maxlen=100_000)
@@ -129,7 +134,6 @@ class Uno:
         self._time_us = None
         self._last_sample = None
         self._streaming = False
-        self._own_timeout = None
         for _ in range(EXCHANGES_AT_START):
             self.exchange_clocks()
         self._read_set()
@@ -155,8 +159,8 @@ class Uno:
             self.exchange_clocks()
 
     def _plan_exchanges(self, host_timeout_wire: int) -> None:
-        timeout_s = from_wire("host_timeout_s", host_timeout_wire)
-        self._exchange_every_s = min(CLOCK_EVERY_S, timeout_s / 4) if timeout_s > 0 else CLOCK_EVERY_S
+        timeout_s = from_wire("host_timeout_s", host_timeout_wire or SESSION_TIMEOUT_MS)
+        self._exchange_every_s = min(CLOCK_EVERY_S, timeout_s / 4)
         self._next_exchange_s = min(self._next_exchange_s, self._clock.now() + self._exchange_every_s)
 
     # -- parameters -------------------------------------------------------------------------------------------
@@ -187,13 +191,8 @@ class Uno:
         the Uno ends up with anything but what was meant.
         """
         wanted = {name: to_wire(name, value) for name, value in parameters.items()}
-        own_timeout = wanted.get("host_timeout_s", self._own_timeout)
         wanted = {**self._read_set()[0], **wanted}
-        if self._own_timeout is not None and own_timeout == 0:
-            wanted["host_timeout_s"] = to_wire("host_timeout_s", GUARD_S)
         self._replace(wanted)
-        if self._own_timeout is not None:
-            self._own_timeout = own_timeout
         if wait:
             self._wait_for_boundary(from_wire("period_s", wanted["period_s"]))
         if save is not None:
@@ -206,35 +205,6 @@ class Uno:
         self.session.call_all([("begin", ()), *fields, ("commit", (check,))])
         if self._read_set()[0] != wanted:
             raise LinkError("the parameters read back are not those sent; upload again")
-
-    def guard(self) -> None:
-        """From now on, until it restarts, the Uno vents by itself GUARD_S after this host has fallen silent (killed,
-        or hanging), unless it has a `host_timeout_s` already. Whatever moves air calls this."""
-        if self._own_timeout is None:
-            own_timeout = self._read_set()[0]["host_timeout_s"]
-            if own_timeout == 0:
-                self.upload({"host_timeout_s": GUARD_S})
-            self._own_timeout = own_timeout
-
-    @contextmanager
-    def unguarded(self) -> Iterator[None]:
-        """Inside, the Uno holds the parameters as they were meant, without the guard: to be saved for another day
-        and a bare terminal."""
-        if self._own_timeout != 0:
-            yield
-            return
-        self._own_timeout = None
-        self.upload({"host_timeout_s": 0.0})
-        try:
-            yield
-        finally:
-            self.guard()
-
-    def guard_again(self) -> None:
-        """After `host_timeout_s` has been replaced, by itself or with its set."""
-        if self._own_timeout is not None:
-            self._own_timeout = None
-            self.guard()
 
     def _wait_for_boundary(self, period_s: float) -> None:
         deadline = self._clock.now() + 2 * max(period_s, 60.0)
@@ -254,14 +224,12 @@ class Uno:
     def save(self, preset: str) -> None:
         """Keep the parameters in EEPROM; returns after they were read back."""
         field = _name_field(preset)
-        with self.unguarded():
-            self.session.call("save", field, timeout_s=EEPROM_TIMEOUT_S)
+        self.session.call("save", field, timeout_s=EEPROM_TIMEOUT_S)
 
     def load(self, preset: str) -> None:
         """Take the parameters of a preset."""
         self.session.call("load", _name_field(preset))
         self._read_set()
-        self.guard_again()
 
     def forget(self, preset: str) -> None:
         """Delete a preset from EEPROM."""
@@ -281,7 +249,7 @@ class Uno:
     def defaults(self) -> None:
         """Erase presets and settings and load the baseline."""
         self.session.call("defaults", timeout_s=EEPROM_TIMEOUT_S)
-        self.guard_again()
+        self._read_set()
 
     def zero(self, factory: bool = False) -> None:
         """Take the present pressures (vented, at rest) as zero and keep that in EEPROM; or undo it (`factory`)."""
@@ -291,7 +259,6 @@ class Uno:
 
     def run(self) -> None:
         """Walk."""
-        self.guard()
         self.may_move = True
         self.session.call("run")
 
@@ -326,7 +293,6 @@ class Uno:
         """Inflate ("positive"), evacuate ("vacuum") or vent ("off") the body, head or tail."""
         fields = _hold_fields(chamber, state)
         if state != "off":
-            self.guard()
             self.may_move = True
         self.session.call("hold", *fields)
 
@@ -339,7 +305,6 @@ class Uno:
         additions = [("schedule_add", (_milliseconds(time_s), *_hold_fields(c, s))) for time_s, c, s in holds]
         if len(additions) > SCHEDULE_ENTRIES:
             raise UnoParameterError(f"{len(additions)} timed holds; the Uno has room for {SCHEDULE_ENTRIES}")
-        self.guard()
         self.session.call_all([("schedule_clear", ()), *additions])
         self.may_move = True
         self.session.call("schedule_start")

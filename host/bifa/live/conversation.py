@@ -117,6 +117,6 @@ class Conversation:
         self.uno.stream(True)
 
     def _learn(self) -> None:
-        """What completion offers; reading it also tells how often `host_timeout_s` wants the Uno to be talked to."""
+        """What completion offers."""
         self.known.parameters = self.uno.parameters()
         self.known.presets = self.uno.presets()

@@ -8,9 +8,11 @@ import sys
 import pytest
 
 from bifa.link import Uno
+from bifa.link.table import SESSION_TIMEOUT_MS
 from bifa.link.terminal import type_line
-from bifa.link.uno import GUARD_S
 from harness.board import Board
+
+GUARD_S = 1e-3 * SESSION_TIMEOUT_MS
 
 
 @pytest.fixture
@@ -51,71 +53,34 @@ def test_a_host_that_is_there_is_not_taken_for_dead(board, connected):
     assert board.state == "running"
 
 
-def test_a_timeout_that_is_chosen_is_kept(board, connected):
-    connected.set("host_timeout_s", 0.5)
+@pytest.mark.parametrize("timeout_s", [0.5, 5.0])
+@pytest.mark.parametrize("typed", [False, True])
+def test_a_timeout_that_is_chosen_counts_and_is_kept_alive(board, connected, timeout_s, typed):
     connected.run()
-    assert connected.get("host_timeout_s") == 0.5
-
-
-CHOICES = {
-    "set": lambda uno, board, timeout_s: uno.set("host_timeout_s", timeout_s),
-    "typed": lambda uno, board, timeout_s: type_line(uno, f"set  host_timeout_s {timeout_s:g}", board),
-}
-
-
-@pytest.mark.parametrize("choose", CHOICES)
-@pytest.mark.parametrize("timeout_s", [5.0, GUARD_S])
-def test_a_timeout_that_is_chosen_while_guarded_is_kept_and_saved(board, connected, choose, timeout_s):
-    connected.run()
-    CHOICES[choose](connected, board, timeout_s)
-    connected.save("fast")
-    assert connected.get("host_timeout_s") == timeout_s
-    board.type("load fast")  # past the host
-    assert f"[host_timeout_s {timeout_s:g} s" in "".join(board.type("show host_timeout_s"))
-
-
-@pytest.mark.parametrize("choose", CHOICES)
-def test_no_timeout_is_no_choice_once_something_has_moved(board, connected, choose):
-    connected.set("host_timeout_s", 5.0)
-    connected.run()
-    CHOICES[choose](connected, board, 0.0)
-    assert connected.get("host_timeout_s") == GUARD_S
-    connected.halt()
-    connected.run()
-    board.sleep(GUARD_S + 0.1)
+    if typed:
+        type_line(connected, f"set  host_timeout_s {timeout_s:g}", board)
+    else:
+        connected.set("host_timeout_s", timeout_s)
+    connected.upload({}, wait=True)
+    connected.samples(8.0)
+    assert board.state == "running"
+    connected.exchange_clocks()
+    board.sleep(timeout_s - 0.1)
+    assert board.state == "running"
+    board.sleep(0.2)
     assert (board.valves, board.state) == (0, "fault")
 
 
-def test_a_refused_line_does_not_make_the_guard_a_choice(board, connected):
-    connected.run()
-    assert type_line(connected, "load nobody", board)[-1].startswith("error no such preset")
-    assert type_line(connected, "set host_timeout_s 61", board)[-1].startswith("error out of range")
-    connected.save("fast")
-    board.type("load fast")  # past the host
-    assert "[host_timeout_s 0 s" in "".join(board.type("show host_timeout_s"))
-
-
-def test_what_is_kept_on_the_uno_knows_no_guard(board, connected):
-    """A preset is for a bare terminal as well, where nobody feeds it."""
-    connected.run()
-    assert connected.get("host_timeout_s") == GUARD_S
-    connected.halt()
-    connected.save("fast")
-    assert type_line(connected, "save slow", board)[-1] == "ok"
-    connected.upload({"period_s": 3.0}, save="third")
-    assert connected.get("host_timeout_s") == GUARD_S, "meanwhile it goes on"
-    for name in ("fast", "slow", "third"):
-        board.type(f"load {name}")  # past the host
-        assert "[host_timeout_s 0 s" in "".join(board.type("show host_timeout_s"))
-
-
-def test_a_set_that_is_loaded_is_guarded_at_once(board, connected):
-    connected.run()
-    connected.load("obstacle")
-    connected.upload({"host_timeout_s": 0.0})
-    assert connected.get("host_timeout_s") == GUARD_S
-    type_line(connected, "load baseline", board)
-    assert connected.get("host_timeout_s") == GUARD_S
+@pytest.mark.parametrize("replace", ["set host_timeout_s 0", "load obstacle", "save fast"])
+def test_nothing_ends_the_guard(board, connected, replace):
+    """Neither no time-out, nor a preset that has none, nor a save, within which the host may be killed."""
+    connected.hold("body", "positive")
+    assert type_line(connected, replace, board)[-1] == "ok"
+    assert connected.get("host_timeout_s") == 0.0, "what is saved is what was chosen"
+    board.sleep(GUARD_S - 0.1)
+    assert board.valves != 0
+    board.sleep(0.2)
+    assert (board.valves, board.state) == (0, "fault")
 
 
 def test_a_bare_terminal_walks_without_a_host(board):
