@@ -44,8 +44,7 @@ class Held:
         """Raises DeclarationError where one of these may not be held, or not in this way."""
         sizing = {name for effect in library for name in effect.size_names}
         shaping = [(name, p) for e in library for p in e.parameters if (name := e.full_name(p)) not in sizing]
-        bounds = {name: (p.lower, p.upper) for name, p in [*((p.name, p) for p in parameters), *shaping]}
-        able = list(bounds)
+        able = dict([*((p.name, p) for p in parameters), *shaping])
         for name in (*self.fixed, *self.tied):
             if name in sizing:
                 raise DeclarationError(f"{name} sizes an effect, so it can be neither fixed nor tied.")
@@ -56,10 +55,9 @@ class Held:
                 raise DeclarationError(f"{name} is both fixed and tied: choose one of the two.")
             if not isinstance(value, Real) or not isfinite(value):
                 raise DeclarationError(f"{name} is fixed at {value!r}, which is no number.")
-            if not bounds[name][0] <= value <= bounds[name][1]:
-                raise DeclarationError(
-                    f"{name} is fixed at {value:g}, outside its bounds {bounds[name][0]:g} to {bounds[name][1]:g}."
-                )
+            lower, upper = able[name].lower, able[name].upper
+            if not (lower <= value <= upper or able[name].periodic):
+                raise DeclarationError(f"{name} is fixed at {value:g}, outside its bounds {lower:g} to {upper:g}.")
         for name, other in self.tied.items():
             if other not in able or other in self.tied:
                 free = ", ".join(n for n in able if n not in self.tied)

@@ -244,7 +244,7 @@ def _single(column: Any, record: str, label: str) -> Any:
 def _whole(order: Any, record: str) -> int | None:
     if order is None:
         return None
-    whole = number(order) if isinstance(order, str) else order
+    whole = number(order) if isinstance(order, str) else plain(order)
     if not isinstance(whole, Real) or not float(whole).is_integer():
         raise RecordError(f"record {record}: its order is {order!r}: give its place in the day, a whole number.")
     return int(float(whole))

@@ -113,12 +113,15 @@ def _check_how(starts: Any, n_jobs: Any, executor: Any, policy: Any, progress: A
         raise MisuseError(f"executor is {executor!r}, which cannot `submit`: give one of concurrent.futures.")
     if not isinstance(policy, Policy):
         raise MisuseError(f"policy is {policy!r}: give a lacuna.Policy.")
-    if not (progress in (None, True, False) or callable(progress)):
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
         raise MisuseError(f"progress is {progress!r}: give a function, or False.")
 
 
 def _is_whole(given: Any, least: int) -> bool:
-    return hasattr(given, "__index__") and index(given) >= least
+    try:
+        return index(given) >= least
+    except TypeError:
+        return False
 
 
 def _seed(what: str, given: Any) -> int:

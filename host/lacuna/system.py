@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, Protocol
 
 import numpy as np
@@ -152,6 +152,9 @@ class Effect:
         for each in ("experiments", "freed_at", "apart"):
             object.__setattr__(self, each, several(getattr(self, each), str))
         object.__setattr__(self, "start_factors", several(self.start_factors, Real))
+        for one in self.own:
+            if one.scale is None and not _is_range((one.lower, one.upper)):
+                raise DeclarationError(f"effect {self.name}: own {one.name} needs finite bounds, or a scale")
         if not self.start_factors or not all(map(_is_number, self.start_factors)):
             raise DeclarationError(f"effect {self.name}: `start_factors` is {self.start_factors}: give numbers")
         if not isinstance(self.absent, Real) or np.isnan(self.absent):
@@ -268,7 +271,7 @@ class CorrectionSite:
             raise DeclarationError(f"curve {self.name}: {self.lower!r} to {self.upper!r} is no finite range")
         if not (_is_number(self.scale) and self.scale > 0.0):
             raise DeclarationError(f"curve {self.name}: scale is {self.scale!r}: give a number above 0")
-        if not self.rows or not isinstance(self.knots, int) or self.knots < 2:
+        if not self.rows or not isinstance(self.knots, Integral) or self.knots < 2:
             raise DeclarationError(f"curve {self.name} has {len(self.rows)} rows of {self.knots!r} knots: too few")
 
 

@@ -96,10 +96,10 @@ def _check_deterministic(system: System, start: Theta, trial: Record, prediction
 
 
 def _check_free_run(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
-    """What was measured late, where no initial state is taken from, changes no prediction."""
-    own = {p.name: p.value for p in system.nuisances(trial)}
-    (found,) = system.predict_trials([dict(start) | own], (), [_measured_otherwise(trial)])
+    """What was measured of a channel late, where no initial state is taken from, changes no prediction of it."""
+    theta = dict(start) | {p.name: p.value for p in system.nuisances(trial)}
     for name, measured in trial.channels.items():
+        (found,) = system.predict_trials([theta], (), [_measured_otherwise(trial, name)])
         if differ(found[name], predictions[trial.name][name], SAME * spread(measured)):
             raise MisuseError(
                 f"trial {trial.name}, channel {name}: the prediction follows what was measured, so that nothing would"
@@ -107,14 +107,14 @@ def _check_free_run(system: System, start: Theta, trial: Record, predictions: Ma
             )
 
 
-def _measured_otherwise(trial: Record) -> Record:
-    """`trial` with other measured samples in its second half, and the run that it is a stretch of as well."""
-    late = np.arange(len(trial.time_s)) >= len(trial.time_s) // 2
-    channels = {name: column + late * (1.0 + spread(column)) for name, column in trial.channels.items()}
+def _measured_otherwise(trial: Record, name: str) -> Record:
+    """`trial` with other measured samples of a channel in its second half, and the run that it is a stretch of too."""
+    measured, late = trial.channels[name], np.arange(len(trial.time_s)) >= len(trial.time_s) // 2
+    otherwise = (measured + late * (1.0 + spread(measured))).astype(measured.dtype)
     stretch = trial.payload
     if isinstance(stretch, Stretch):
-        stretch = replace(stretch, run=_measured_otherwise(stretch.run))
-    return replace(trial, channels=channels, payload=stretch)
+        stretch = replace(stretch, run=_measured_otherwise(stretch.run, name))
+    return replace(trial, channels={**trial.channels, name: otherwise}, payload=stretch)
 
 
 def _check_effects(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> None:

@@ -353,9 +353,9 @@ def _verdict(
         return "unexplained"
     # of what passes for noise, or nuisances take up, there is no gap to close half of
     hidden = unshared or _taken_up(case, choice, found)
-    closed = [case.closed(choice.explanation, found.base), *([] if tested is None else [tested])]
-    explains = min(closed) >= case.policy.half
-    return "identified" if explains or (hidden and case.suffices(choice.explanation)) else "unexplained"
+    half = case.policy.half
+    explains = case.closed(choice.explanation, found.base) >= half or (hidden and case.suffices(choice.explanation))
+    return "identified" if explains and (tested is None or tested >= half) else "unexplained"
 
 
 def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, workers: Workers | None) -> Fit:

@@ -262,6 +262,16 @@ def test_refuses_an_effect_that_is_none(told):
         Effect(**{"name": "bend", "parameters": BEND, **told})
 
 
+def test_what_each_trial_has_of_its_own_begins_somewhere():
+    with pytest.raises(DeclarationError, match="effect bend: own phase needs finite bounds, or a scale"):
+        Effect("bend", BEND, own=Parameter("phase", "rad", 0.0, -math.inf, math.inf))
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert replace(LOSS, knots=np.int64(5)).knots == 5
+    assert Parameter("gain", "", np.float64(1.0), 0.1, 5.0, scale=np.float32(0.5)).scale == 0.5
+
+
 @pytest.mark.parametrize(
     ("told", "said"),
     [
@@ -628,10 +638,26 @@ def test_refuses_a_model_that_follows_what_was_measured():
             check(with_records(system, records))
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.int32])
+def test_a_model_may_have_what_was_measured_give_its_kind_and_drive_another_part(kind):
+    """Rounded otherwise it would seem to follow what was measured; and one output may be an input of the next."""
+
+    def simulate(record, theta):
+        free = np.zeros_like(record["temperature_K"])
+        free += (theta.gain_K_W * record["power_W"] / theta.tau_s).astype(kind)
+        return {"temperature_K": free, "double_K": 2.0 * theta.gain_K_W * record["temperature_K"]}
+
+    records = heater.records(2)
+    for one in records.values():
+        one["temperature_K"] = (100.0 * one["temperature_K"]).astype(kind)
+        one["double_K"] = 2.0 * one["temperature_K"]
+    check(with_records(lacuna.System(simulate, heater.PARAMETERS, outputs=("temperature_K", "double_K")), records))
+
+
 @pytest.mark.parametrize(
     "how",
     [
-        *({"starts": given} for given in (0, -1, 1.5, None)),
+        *({"starts": given} for given in (0, -1, 1.5, None, T)),
         *({"n_jobs": given} for given in (-2, 2.5, "2")),
         *({"seed": given} for given in (-1, 1.5, None, "now")),
         {"random_state": -1},
@@ -639,6 +665,7 @@ def test_refuses_a_model_that_follows_what_was_measured():
         {"policy": None},
         {"policy": {}},
         {"progress": "yes"},
+        {"progress": 1},
     ],
 )
 def test_refuses_a_diagnosis_that_cannot_be_done_like_this(how):
