@@ -58,7 +58,7 @@ def told(seed: int, out: Path) -> Story:
 
 def story(seed: int, summary: dict) -> Story:
     """From a demo's `summary.json`."""
-    robust, *_, edge = summary["rounds"]
+    robust, edge = summary["rounds"][0], summary["rounds"][-1]
     error = {name: summary["error"][name]["held_out"] for name in ("before", "after", "noise_floor")}
     return Story(
         seed,

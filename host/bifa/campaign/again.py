@@ -164,13 +164,17 @@ def again(inputs: Path, outputs: Path, dataset: Dataset, effects: tuple[str, ...
         # Where nothing is named any more fits have lost their way: what explained the bench is not given up for that.
         if effects and not named:
             completed, named = model, effects
-        if (gait := trades.optimize(completed, (*began, *found))) is None:
+        folder = outputs / "rounds" / f"walks-{number}"
+        if folder.exists():
+            walks = read_dataset(folder)
+            found.append(Gait(**walks.trials[0].walked))
+        elif (gait := trades.optimize(completed, (*began, *found))) is not None:
+            walks = trades.walk(number, completed, gait, folder)
+            found.append(gait)
+        else:
             ended = Ending.FALLS
             break
         model, effects = completed, named
-        found.append(gait)
-        folder = outputs / "rounds" / f"walks-{number}"
-        walks = read_dataset(folder) if folder.exists() else trades.walk(number, model, found[-1], folder)
         rounds.append(judged(model, effects, walks, at_edge=True))
     rounds[-1] = replace(rounds[-1], ended=ended)
     save_model(outputs / "model-last.toml", model)

@@ -232,7 +232,7 @@ def _gaits(summary: Mapping[str, Any], walks: Mapping[str, Walk]) -> ChartedSect
 _ENDED = {
     Ending.PREDICTED: "the speed of its gait is predicted to within the scatter of repeats, or to half a per cent",
     Ending.UNCHANGED: "it names the same effects as the round before; its gait is as fast and predicted no better",
-    Ending.FALLS: "with its walks among the data, the model expects the gait found next to fall, so it was not walked",
+    Ending.FALLS: "with its walks among the data, the model finds no further gait that it expects to walk",
     Ending.MOST: f"there are at most {ROUNDS} rounds, and the speed of its gait is still not predicted",
 }
 

@@ -180,6 +180,14 @@ def test_a_gait_that_its_own_model_expects_to_fall_is_not_walked(folders):
     assert not (folders[1] / "rounds" / "walks-3").exists()
 
 
+def test_rounds_that_an_interrupted_run_has_walked_are_neither_sought_nor_walked_again(folders):
+    rounds = folders[1] / "rounds"
+    rounds.mkdir()
+    write_dataset(rounds / "walks-2", walked({"round-2": FASTER}, 2))
+    trades = Trades(lambda dataset, suspected: (ROBOT, ()), lambda model, walked: None, fall)
+    assert [Gait(**one["gait"]) for one in rounds_of(folders, ROBOT, trades)] == [FAST, FASTER]
+
+
 @pytest.mark.parametrize(("probability", "gait"), [(0.97, FASTER), (0.16, None), (None, None)])
 def test_at_the_edge_there_may_be_no_gait(monkeypatch, probability, gait):
     """None walks, or the best of them probably would not."""

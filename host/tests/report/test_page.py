@@ -94,7 +94,7 @@ def test_each_round_has_its_gait_its_speeds_and_the_last_its_end(html):
 
 @pytest.mark.parametrize(
     ("ended", "why"),
-    [("unchanged", "predicted no better"), ("falls", "so it was not walked"), ("most", "at most 3 rounds")],
+    [("unchanged", "predicted no better"), ("falls", "no further gait"), ("most", "at most 3 rounds")],
 )
 def test_rounds_that_end_without_a_prediction_say_so(ended, why):
     section = rounds_section([*sample.ROUNDS[:1], sample.ROUNDS[1] | {"ended": ended}])
