@@ -14,7 +14,7 @@ void tearDown() {}
 
 namespace {
 
-char printed[64];
+char printed[80];
 uint8_t length;
 
 /// From here on `printed` holds what is printed.
@@ -87,7 +87,7 @@ static void test_phrases_are_put_in_where_their_codes_stand() {
   TEST_ASSERT_EQUAL_STRING("phase of the head ahead of the body (psi_12)", printed);
   begin_line();
   print(text_of(ParameterId::kHostTimeoutS, ParameterText::kHelp));
-  TEST_ASSERT_EQUAL_STRING("vent if the host is silent this long; 0 = never", printed);
+  TEST_ASSERT_EQUAL_STRING("vent if the host is silent this long; 0 = never, in a session 2 s", printed);
 }
 
 static void test_texts_in_flash() {

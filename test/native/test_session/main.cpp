@@ -448,10 +448,26 @@ void test_timed_holds_are_added_started_and_cleared() {
   equal(Result::kOk, bench.call(MessageId::kScheduleClear));
   equal(Result::kOk, bench.call(MessageId::kScheduleAdd, ScheduleAddMessage{70000, 1, 1}));
   equal(Result::kOk, bench.call(MessageId::kScheduleStart));
-  bench.wait(69999);
+  for (uint8_t second = 0; second < 69; ++second) {
+    bench.wait(1000);
+    bench.controller.host_heard();
+  }
+  bench.wait(999);
   TEST_ASSERT_EQUAL_HEX8(0, pins);
   bench.wait(5);
   TEST_ASSERT_EQUAL_HEX8(0x08, pins);
+}
+
+void test_a_session_is_guarded_and_a_bare_terminal_is_not() {
+  for (const bool session : {false, true}) {
+    Bench bench;
+    if (session) bench.connect();
+    bench.controller.hold(Chamber::kBody, ChamberState::kPositive);
+    bench.wait(kSessionTimeout_ms - 10);
+    TEST_ASSERT_TRUE(pins != 0);
+    bench.wait(20);
+    TEST_ASSERT_EQUAL(!session, pins != 0);
+  }
 }
 
 void test_clock_is_the_time_and_the_marked_sample() {
@@ -617,6 +633,7 @@ void run() {
   RUN_TEST(test_presets_are_saved_loaded_listed_and_forgotten_by_names_of_full_length);
   RUN_TEST(test_defaults_and_zero_write_the_eeprom);
   RUN_TEST(test_timed_holds_are_added_started_and_cleared);
+  RUN_TEST(test_a_session_is_guarded_and_a_bare_terminal_is_not);
   RUN_TEST(test_clock_is_the_time_and_the_marked_sample);
   RUN_TEST(test_status_reports_every_field);
   RUN_TEST(test_status_flags_a_set_that_waits_timed_holds_and_the_emergency_stop);
