@@ -73,7 +73,8 @@ def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, mon
     monkeypatch.setattr(loop, "prepare", lambda dataset: dataset)
     monkeypatch.setattr(loop, "diagnose", diagnosed)
     monkeypatch.setattr(loop, "completed_model", lambda final: final)
-    monkeypatch.setattr(loop, "found_gait", lambda *_: SimpleNamespace(gait=FASTER))
+    found = SimpleNamespace(gait=FASTER, prediction=SimpleNamespace(walks_probability=1.0))
+    monkeypatch.setattr(loop, "found_gait", lambda *_: found)
     monkeypatch.setattr(loop, "provenance", lambda *_: {})
 
     first = []
