@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,7 +63,8 @@ def _read(name: str, folder: Path) -> Campaign:
         summary = json.loads((folder / "summary.json").read_text())
     except FileNotFoundError:
         raise CompareError(
-            f"{folder} holds no finished campaign (no summary.json); finish it with: bifa campaign --out {folder}"
+            f"{folder} holds no finished campaign (no summary.json); finish it with: "
+            f"bifa campaign --out {shlex.quote(str(folder))}"
         ) from None
     except ValueError as error:
         raise CompareError(f"{folder / 'summary.json'} is damaged ({error}); rebuild it with --rerun compare") from None
