@@ -1,18 +1,20 @@
-"""Files that people ask for: their places checked before long work, and written whole or not at all."""
+"""Files that people ask for: their places checked before long work, and written whole or not at all; a full disk."""
 
 import errno
 import os
 import secrets
 import shutil
 import stat
+import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from bifa.errors import BifaError
 
 _STRAYS = ("Thumbs.db", "desktop.ini", "Icon\r")
+_FULL = tuple(getattr(errno, name) for name in ("ENOSPC", "EFBIG", "EDQUOT") if hasattr(errno, name))
 
 
 def is_stray(name: str) -> bool:
@@ -138,3 +140,27 @@ def written_into(folder: Path) -> Iterator[Path]:
         raise TargetError(f"cannot write into {folder} ({error.strerror or error})") from None
     finally:
         shutil.rmtree(aside, ignore_errors=True)
+
+
+class OutputError(BifaError):
+    """What a command prints cannot be written; the text says why."""
+
+
+@contextmanager
+def writable() -> Iterator[None]:
+    """Wraps a whole command: an error of a full disk becomes an OutputError. A robot inside has been stopped by
+    then."""
+    try:
+        yield
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        if error.errno is None or error.errno not in _FULL:
+            raise
+        with suppress(OSError, ValueError):  # what is not written yet would fail once more as Python exits
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+        what = error.filename2 or error.filename or "the output"  # of a copy the second is where it goes
+        reason = os.strerror(error.errno)
+        raise OutputError(f"{what} cannot be written ({reason}); free some space, or redirect it") from None

@@ -17,7 +17,7 @@ import typer.core
 
 import bifa
 from bifa.errors import BifaError
-from bifa.live.output import writable
+from bifa.files import writable
 from bifa.printable import printable
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bifa.live.output import OutputError, writable
+from bifa.files import OutputError, writable
 
 pytestmark = pytest.mark.real_time
 
