@@ -77,7 +77,6 @@ PARAMETERS = (
 
 # struct format of a parameter set, on the wire and in EEPROM
 SET_FORMAT = "<{"".join(_FORMAT[p.wire] for p in parameters.parameters)}"
-SET_SIZE = {set_size}
 
 # factory presets: one value in wire units for every parameter
 PRESETS = {{

@@ -7,8 +7,9 @@ import numpy as np
 
 from benchmarks import regret
 from bifa.gait import Settings, optimize, simulations
+from bifa.gait.objectives import NominalSpeed
 from bifa.robot import nominal
-from bifa.simulate import cores
+from bifa.simulate import cores, plant
 
 NOMINAL_REQUIRED_MM_S, ROBUST_REQUIRED_MM_S = 23.4, 21.8
 REQUIRED_S = 10.0  # on two idle cores; half as long again with AVX2
@@ -58,7 +59,4 @@ def run() -> dict[str, float]:
 
 def _warm_up(model, runs) -> None:
     """Compile, outside the clock."""
-    from bifa.gait.objectives import NominalSpeed
-    from bifa.simulate import plant
-
     NominalSpeed(runs, plant(model), Settings().space, Settings().metric)(np.full((1, 5), 0.5))

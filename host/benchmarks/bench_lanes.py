@@ -5,14 +5,17 @@ from __future__ import annotations
 
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.cost import processor_s
 from bifa import robot, simulate
 from bifa.robot import Model
 from bifa.simulate import lanes, rigs
 from bifa.simulate.lanes import build, kernel
+from bifa.simulate.timeline import NO_COMMANDS
 
 TOLERANCE_M = 1e-6
 _NEAR, _FAR = 1e-4, 0.02  # relative, of each parameter: as for derivatives, and robots of a robust search
@@ -33,7 +36,8 @@ def run() -> dict[str, float]:
     for name in ("walk", "step", "pull"):
         what = _experiment(name, near)
         numba = _best(lambda what=what: lanes.in_numba(what, 0, near[0]))
-        single = _best(lambda what=what: one.march(near[:1], _first(what, 1), False))
+        first = replace(what, rigs=what.rigs[:1], switches=what.switches[:1], sample_s=what.sample_s[:1])
+        single = _best(lambda first=first: one.march(near[:1], first, False))
         together = _best(lambda what=what: lanes.march(near, what, True)) / len(near)
         own = _best(lambda name=name: many.march(far, _experiment(name, far), False)) / len(far)
         numba_far = _mean_in_numba(_experiment(name, far), far)
@@ -51,19 +55,10 @@ def run() -> dict[str, float]:
 def _compiled() -> float:
     """Seconds that both compilations take a processor, the compiler's own included."""
     with tempfile.TemporaryDirectory() as scratch:
-        before = _used()
+        before_s = processor_s()
         for chosen in (build.target(), build.single()):
             build.compile_to(Path(scratch) / f"{chosen.lanes}.so", chosen)
-        return _used() - before
-
-
-def _used() -> float:
-    import resource
-
-    return sum(
-        usage.ru_utime + usage.ru_stime
-        for usage in (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    )
+        return processor_s() - before_s
 
 
 def _robots(spread: float, count: int) -> list[simulate.Plant]:
@@ -88,23 +83,12 @@ def _experiment(name: str, plants: list[simulate.Plant]) -> lanes.Experiment:
         times = np.arange(0.0, 12.0, 0.01)
         kind, mounted = lanes.STEP, [rigs.stand(p, "large", 8.5) for p in plants]
     else:
-        what = [kernel.NO_SWITCHES] * n
+        what = [NO_COMMANDS] * n
         times, mounted = np.arange(0.0, 3.0, 0.02), [rigs.anchor(p, 8.5) for p in plants]
-        return lanes.Experiment(lanes.ANCHOR, mounted, what, [times] * n, TOLERANCE_M, 0.02, 5000.0)
-    switches = (commands.time_s, commands.chamber, commands.command)
-    return lanes.Experiment(kind, mounted, [switches] * n, [times] * n, TOLERANCE_M)
-
-
-def _first(what: lanes.Experiment, count: int) -> lanes.Experiment:
-    return lanes.Experiment(
-        what.kind,
-        what.rigs[:count],
-        what.switches[:count],
-        what.sample_s[:count],
-        what.tolerance_m,
-        what.rate_m_s,
-        what.load_cell_N_m,
-    )
+        return lanes.Experiment(
+            lanes.ANCHOR, mounted, what, [times] * n, TOLERANCE_M, rate_m_s=0.02, load_cell_N_m=5000.0
+        )
+    return lanes.Experiment(kind, mounted, [commands] * n, [times] * n, TOLERANCE_M)
 
 
 def _mean_in_numba(what: lanes.Experiment, plants: list[simulate.Plant]) -> float:

@@ -5,6 +5,9 @@ import random
 import bifa.link.session
 from bifa.link import Uno
 from bifa.link.frames import STOP_FRAME
+from harness.board import Board
+from harness.chip import Chip
+from harness.faulty_line import FaultyLine
 
 BYTE_S = 10 / 250_000
 EEPROM_BYTE_S = 3.4e-3
@@ -13,15 +16,13 @@ STOP_ALLOWED_S = 100e-6
 
 def run() -> dict[str, float]:
     """Print each figure beside its peer or limit; return them flat."""
-    from harness.chip import Chip
-
-    upload_s, sent = _upload(Chip)
+    upload_s, sent = _upload()
     window = bifa.link.session.WINDOW
     bifa.link.session.WINDOW = 1
-    one_at_a_time_s, _ = _upload(Chip)
+    one_at_a_time_s, _ = _upload()
     bifa.link.session.WINDOW = window
-    save_s, cells = _save(Chip)
-    byte_s, frame_s = _stop(Chip, b"!"), _stop(Chip, STOP_FRAME[:-1])
+    save_s, cells = _save()
+    byte_s, frame_s = _stop(b"!"), _stop(STOP_FRAME[:-1])
     print(f"upload of a whole set, read back: {upload_s * 1e3:.1f} ms")
     print(f"  one message at a time {one_at_a_time_s * 1e3:.1f} ms; its bytes on the line {sent * BYTE_S * 1e3:.1f} ms")
     print(f"save of a preset, two copies, read back: {save_s:.3f} s; its cells alone {cells * EEPROM_BYTE_S:.3f} s")
@@ -40,8 +41,8 @@ def run() -> dict[str, float]:
     return results | _faulty()
 
 
-def _upload(make) -> tuple[float, int]:
-    chip = make()
+def _upload() -> tuple[float, int]:
+    chip = Chip()
     uno = Uno(chip, chip, seed=1)
     uno.connect()
     write, sent = chip.write, []
@@ -51,8 +52,8 @@ def _upload(make) -> tuple[float, int]:
     return chip.now() - started_s, sum(sent)
 
 
-def _save(make) -> tuple[float, int]:
-    chip = make()
+def _save() -> tuple[float, int]:
+    chip = Chip()
     uno = Uno(chip, chip, seed=1)
     uno.connect()
     uno.save("one")
@@ -61,8 +62,8 @@ def _save(make) -> tuple[float, int]:
     return chip.now() - started_s, chip.uno.eeprom_writes - before
 
 
-def _stop(make, stop: bytes) -> float:
-    chip = make(keep_events=True)
+def _stop(stop: bytes) -> float:
+    chip = Chip(keep_events=True)
     uno = Uno(chip, chip, seed=1)
     uno.connect()
     rng, worst_s = random.Random(1), 0.0
@@ -78,9 +79,6 @@ def _stop(make, stop: bytes) -> float:
 
 
 def _faulty() -> dict[str, float]:
-    from harness.board import Board
-    from harness.faulty_line import FaultyLine
-
     results = {}
     for rate in (0.0, 1e-3, 1e-2):
         board = Board()

@@ -6,7 +6,6 @@ Processor seconds are of all processes; the clock says something on an idle mach
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from benchmarks.bench_diagnosis import CASES, SEED
+from benchmarks.cost import processor_s
 
 _CASES = {"diagnosis": "one effect", "diagnosis_unexplained": "nothing explains them"}
 _LIBRARY_WORDS = {"+", "nothing"}
@@ -29,7 +31,7 @@ class _Stages:
     _now: tuple[str, float, float] | None = None
 
     def begin(self, stage: str) -> None:
-        now, used = time.perf_counter(), _used()
+        now, used = time.perf_counter(), processor_s()
         if self._now:
             before, since, used_before = self._now
             self.clock[before] = self.clock.get(before, 0.0) + now - since
@@ -39,8 +41,6 @@ class _Stages:
 
 def run() -> dict[str, float]:
     """Print the stages of each diagnosis and the kernel's share of a fit; returns the figures flat."""
-    from benchmarks.bench_diagnosis import CASES, SEED
-
     drawn = {case.key: case.drawn for case in CASES}
     figures: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as scratch:
@@ -123,12 +123,6 @@ def _kernel_share(folder: Path) -> float:
     finally:
         Kernel.call = staticmethod(call)
         use_threads(None)
-
-
-def _used() -> float:
-    """Processor seconds of this process and of its children that have ended."""
-    spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 if __name__ == "__main__":

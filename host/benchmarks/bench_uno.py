@@ -145,8 +145,7 @@ def stack_free() -> int:
 
 def image_sizes() -> tuple[int, int]:
     """Flash and static RAM of the image with Adafruit's own library, bytes."""
-    listing = subprocess.run(["avr-size", FIRMWARE], check=True, capture_output=True, text=True).stdout
-    text, data, bss = (int(word) for word in listing.splitlines()[1].split()[:3])
+    text, data, bss = parts.sections(FIRMWARE)
     return text + data + REAL_DAC_LIBRARY_BYTES, data + bss + REAL_DAC_LIBRARY_RAM_BYTES
 
 

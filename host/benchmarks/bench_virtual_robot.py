@@ -48,8 +48,9 @@ def _plant() -> dict[str, float]:
     figures = {}
     for name, gait, cycles in (("baseline", BASELINE, 8), ("robust", ROBUST, 12)):
         rows, seconds = _walk(gait, cycles, None)
+        time_s = rows["time_s"]
         fine, _ = _walk(gait, cycles, 2e-5)
-        speed = 1e3 * (rows["head_m"][-1] - np.interp(rows["time_s"][-1] - 3 * gait.period_s, *_track(rows)))
+        speed = 1e3 * (rows["head_m"][-1] - np.interp(time_s[-1] - 3 * gait.period_s, time_s, rows["head_m"]))
         speed /= 3 * gait.period_s
         error_um = 1e6 * float(np.abs(rows["head_m"] - fine["head_m"]).max())
         ratio = cycles * gait.period_s / seconds
@@ -63,10 +64,6 @@ def _plant() -> dict[str, float]:
             f"virtual_plant_{name}_step_error_um": error_um,
         }
     return figures
-
-
-def _track(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return rows["time_s"], rows["head_m"]
 
 
 def _sealed() -> dict[str, float]:

@@ -29,10 +29,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks import blind_records, small_systems
-from benchmarks.blind_figures import BASELINES, CLOSE, name_of, report, said_of, table
-from benchmarks.search_record import searched
-from benchmarks.simulations import SimulationCount
+from benchmarks import records as lines
+from benchmarks import small_systems
+from benchmarks.blind_figures import BASELINES, CLOSE, brief, name_of, report, said_of, table
+from benchmarks.cost import SimulationCount, processor_s
+from benchmarks.search_record import searched, write_losses
 from virtual_robot import effects as own
 from virtual_robot.truths.foreign import effects as foreign
 
@@ -116,10 +117,8 @@ def diagnose_one(folder: Path, verdict: Path, without: str | None, threads: int)
     simulations.of_trials(system)
     began = time.monotonic()
     found = diagnose(system, on_progress=lambda what: print(f"{time.monotonic() - began:6.0f} s  {what}", flush=True))
-    spent = os.times()
-    processor = spent.user + spent.system + spent.children_user + spent.children_system
-    tried = searched(found, simulations.count)
-    record = as_record(found) | {"processor_seconds": processor, "baselines": baselines(found.search), "search": tried}
+    spent_s, tried = processor_s(), searched(found, simulations.count)
+    record = as_record(found) | {"processor_seconds": spent_s, "baselines": baselines(found.search), "search": tried}
     record |= {name: tried[name] for name in ("version", "simulations")}
     verdict.write_text(json.dumps(record), encoding="utf-8")
 
@@ -169,14 +168,15 @@ def main() -> None:
     parser.add_argument("--table", type=Path, metavar="FOLDER", help="the rates of all truths with records there")
     options = parser.parse_args()
     if options.table:
-        print(table({truth: list(blind_records.read(options.table / f"{truth}.jsonl").values()) for truth in CLOSE}))
+        found = {truth: lines.read(options.table / f"{truth}.jsonl", "kind", "seed") for truth in CLOSE}
+        print(table({truth: list(records.values()) for truth, records in found.items()}))
         return
     if options.one:
         diagnose_one(options.one, options.json, options.without, options.threads)
         return
     if options.print and not options.records:
         parser.error("--print says what is in a file of records: add --records FILE")
-    known = blind_records.read(options.records) if options.records else {}
+    known = lines.read(options.records, "kind", "seed")
     if options.print:
         report(list(known.values()), options.truth)
         return
@@ -190,9 +190,9 @@ def main() -> None:
             ):
                 records.append(record)
                 if options.records:
-                    known[blind_records.place(record)] = record
-                    blind_records.write(options.records, known.values())
-                    blind_records.write_losses(options.records, record)
+                    known[record["kind"], record["seed"]] = record
+                    lines.write(options.records, map(brief, known.values()))
+                    write_losses(options.records, record)
                 sizes = ", ".join(f"{size:.2f}" for size in record["sizes"].values())
                 print(
                     f"{record['kind']:8}{record['seed']}  {name_of(record['truth'])} ({sizes}) -> {said_of(record)}"

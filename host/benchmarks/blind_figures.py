@@ -10,6 +10,7 @@ from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.residual_error import share_of_gap
 
 CLOSE = {"own": 1.2, "realistic": 1.2, "foreign": 1.3}  # floors that the error after may be, by truth
+_ERRORS = ("held_out", "held_out_conditions")
 BASELINES = ("best single", "BIC", "greedy", "sparse regression")
 KINDS = ("single", "none", "outside", "pair")
 
@@ -40,6 +41,20 @@ _REQUIRED: dict[str, dict[str, str]] = {
 }
 
 
+def brief(record: dict) -> dict:
+    """What a report needs of a record."""
+    kept = ("kind", "seed", "truth", "sizes", "values", "base_values", "verdict", "processor_seconds", "baselines")
+    kept += tuple(name for name in ("version", "simulations") if name in record)  # of trials since they are counted
+    estimated = record["base_parameters"]
+    known = {
+        name: {"interval_90": estimated[name]["interval_90"]} for name in record["base_values"] if name in estimated
+    }
+    effects = [{k: e[k] for k in ("name", "interval_90", "confusable_with")} for e in record["effects"]]
+    error = {of: {e: record["error"][of][e] for e in _ERRORS} for of in ("before", "after", "noise_floor")}
+    rest = {"effects": effects, "base_parameters": known, "error": error}
+    return {k: record[k] for k in kept} | rest | {"remainder": {"matters": record["remainder"]["matters"]}}
+
+
 def wilson(hits: int, of: int) -> tuple[float, float]:
     """95 % interval of a share."""
     if of == 0:
@@ -57,11 +72,11 @@ def rates(records: Sequence[dict], truth: str) -> dict[str, list[bool]]:
     of_conditions = [r for r in named if r["error"]["noise_floor"]["held_out_conditions"]]
     found = {
         _FIRST: [_first(r) in r["truth"] for r in single],
-        _IN_SET: [bool(set(r["truth"]) & _reported(r)) for r in single],
+        _IN_SET: [bool(set(r["truth"]) & reported(r)) for r in single],
         _NONE: [r["verdict"] == "none" for r in none],
-        _NOT_PLAIN: [not _plain(r) for r in outside],
+        _NOT_PLAIN: [not plain(r) for r in outside],
         _CLOSED: [_closed(r) >= 0.5 for r in outside],
-        _NOT_PLAIN_GAP: [not _plain(r) for r in gaps],
+        _NOT_PLAIN_GAP: [not plain(r) for r in gaps],
         _CLOSED_GAP: [_closed(r) >= 0.5 for r in gaps],
         _BOTH: [set(r["truth"]) <= {e["name"] for e in r["effects"]} for r in pair],
         _HELD_OUT: [_ratio(r) <= CLOSE[truth] for r in named],
@@ -126,7 +141,7 @@ def _median(rising: Sequence[float]) -> float:
 
 def _mean_size(records: Sequence[dict]) -> float:
     """Effects reported, of robots with one effect of which something is named."""
-    sizes = [len(_reported(r)) for r in records if r["kind"] == "single" and r["effects"]]
+    sizes = [len(reported(r)) for r in records if r["kind"] == "single" and r["effects"]]
     return sum(sizes) / max(len(sizes), 1)
 
 
@@ -147,7 +162,8 @@ def _first(record: dict) -> str | None:
     return record["effects"][0]["name"] if record["effects"] else None
 
 
-def _reported(record: dict) -> set[str]:
+def reported(record: dict) -> set[str]:
+    """What is named, and what the data cannot tell from it."""
     return {name for e in record["effects"] for name in (e["name"], *e["confusable_with"])}
 
 
@@ -159,7 +175,7 @@ def said_of(record: dict) -> str:
     return name_of([e["name"] for e in record["effects"]]) if record["effects"] else record["verdict"]
 
 
-def _plain(record: dict) -> bool:
+def plain(record: dict) -> bool:
     """Whether a verdict says that the library explains all that matters."""
     return record["verdict"] == "none" or (record["verdict"] == "identified" and not record["remainder"]["matters"])
 
@@ -168,7 +184,7 @@ def _gap(record: dict) -> bool:
     """Whether the base model misses the trials that informed nothing, or conditions that were never fitted, by more
     than a tenth of the floor: what it misses by less is `none` by contract."""
     error = record["error"]
-    sides = [(error["before"][side], error["noise_floor"][side]) for side in ("held_out", "held_out_conditions")]
+    sides = [(error["before"][side], error["noise_floor"][side]) for side in _ERRORS]
     return any(before**2 - floor**2 > POLICY.relevance * floor**2 for before, floor in sides if before and floor)
 
 

@@ -128,7 +128,7 @@ def _walking(steps: Sequence[Step]) -> list[tuple[float, float, float]]:
 
 def run(out: Path, kept: Path | None = None, only_print: bool = False) -> dict[str, float]:
     """Print the table, a line a robot; returns the figures flat."""
-    known = lines.read(kept, lambda record: record["robot"]) if kept else {}
+    known = lines.read(kept, "robot")
     if not only_print:
         for rounds in sorted(out.glob("*/rounds.json")):
             name = rounds.parent.name

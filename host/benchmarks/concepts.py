@@ -116,10 +116,7 @@ def gap(palette: Palette) -> tuple[Any, str]:
     """The mean square error before, what each effect takes away, and the floor."""
     import matplotlib.pyplot as plt
 
-    verdict = diagnosed(
-        {"coulomb.force_N": 0.03, "delay.delay_s": 0.006},
-        [(s, size) for s in ("steps", "sweep") for size in (1.0, 2.0)],
-    )
+    verdict = diagnosed({"coulomb.force_N": 0.03, "delay.delay_s": 0.006}, GENTLE)
     before, after, least = (verdict.error[k] ** 2 for k in ("before", "after", "floor"))
     figure, axis = plt.subplots(figsize=(WIDE[0], 2.2), layout="constrained")
     rows = len(verdict.effects) + 2

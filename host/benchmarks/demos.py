@@ -95,7 +95,7 @@ def summed_up(stories: Sequence[Story]) -> dict[str, float]:
 
 def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) -> dict[str, float]:
     """Print the table, a line as each demo ends; returns the figures flat."""
-    known = _known(kept) if kept else {}
+    known = lines.read(kept, "seed")
     print(HEADING)
     stories = []
     with ThreadPoolExecutor(jobs) as pool:
@@ -106,10 +106,6 @@ def run(seeds: Sequence[int], out: Path, jobs: int, kept: Path | None = None) ->
                 known[one.seed] = one._asdict()
                 lines.write(kept, known.values())
     return summed_up(stories)
-
-
-def _known(kept: Path) -> dict[int, dict]:
-    return lines.read(kept, lambda record: record["seed"])
 
 
 def _story_of(record: dict) -> Story:
@@ -130,7 +126,7 @@ def main() -> None:
     if options.print and not options.records:
         parser.error("--print says what is in a file of records: add --records FILE")
     if options.print:
-        run(sorted(_known(options.records)), options.out, 1, options.records)
+        run(sorted(lines.read(options.records, "seed")), options.out, 1, options.records)
     else:
         seeds = range(options.first_seed, options.first_seed + options.seeds)
         run(seeds, options.out, options.jobs, options.records)

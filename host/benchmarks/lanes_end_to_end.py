@@ -17,12 +17,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.cost import processor_s
 from bifa.__main__ import main as bifa
 from bifa.simulate import lanes
 
@@ -85,23 +85,13 @@ def _print(task: str, with_lanes: float, simulating: str, alone: float, simulati
 def _measured(words: Sequence[str]) -> tuple[float, float, float]:
     """Processor seconds of a command, all its simulations made twice; and of these in lanes and in numba."""
     times = _FORK.Array("d", 2)
-    with _used() as used:
-        process = _FORK.Process(target=_command, args=(words, times))
-        process.start()
-        process.join()
+    before_s = processor_s()
+    process = _FORK.Process(target=_command, args=(words, times))
+    process.start()
+    process.join()
     if process.exitcode:
         raise RuntimeError(f"bifa {' '.join(words)} ended with status {process.exitcode}")
-    return used[0], times[0], times[1]
-
-
-@contextmanager
-def _used() -> Iterator[list[float]]:
-    """Processor seconds of the processes that end within."""
-    spent: list[float] = []
-    before = os.times()
-    yield spent
-    after = os.times()
-    spent.append(after.children_user + after.children_system - before.children_user - before.children_system)
+    return processor_s() - before_s, times[0], times[1]
 
 
 def _command(words: Sequence[str], times: Any) -> None:
@@ -132,10 +122,10 @@ def _command(words: Sequence[str], times: Any) -> None:
 
 def _compiling(switch: str) -> float:
     """Processor seconds that a first simulation of each kind takes with an empty cache."""
-    with tempfile.TemporaryDirectory() as empty, _used() as used:
-        environment = os.environ | {"BIFA_LANES": switch, "BIFA_CACHE_DIR": empty}
+    with tempfile.TemporaryDirectory() as empty:
+        environment, before_s = os.environ | {"BIFA_LANES": switch, "BIFA_CACHE_DIR": empty}, processor_s()
         subprocess.run([sys.executable, "-c", _COMPILE], env=environment, check=True, stderr=subprocess.DEVNULL)
-    return used[0]
+        return processor_s() - before_s
 
 
 if __name__ == "__main__":

@@ -32,9 +32,8 @@ from bifa.campaign.stages import Stage, run_stages
 from bifa.campaign.walks import measure_walks, planned_cycles, prediction_of, speed_of, walks_of
 from bifa.data import read_dataset
 from bifa.gait import SearchError
-from bifa.gait.measured import complete_cycles
 from bifa.gait.prediction import FELL
-from bifa.gait.settling import STANDING_MM_S
+from bifa.gait.settling import STANDING_MM_S, complete_cycles
 from bifa.robot import load_model
 from bifa.robot.gait import BASELINE, save_gait
 from virtual_robot.effects import EFFECTS, LIBRARY
@@ -230,7 +229,7 @@ def plot(gains: Sequence[Gain], file: Path) -> None:
 def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | None = None) -> dict[str, float]:
     """Print the table, a line as each campaign ends; returns the figures flat. Ctrl-C sums up what there is. `kept`:
     the file of records."""
-    known = lines.read(kept, _place) if kept else {}
+    known = lines.read(kept, "effect", "seed")
     print(HEADING)
     gains = []
     try:
@@ -245,10 +244,6 @@ def run(effects: Sequence[str], seeds: Sequence[int], out: Path, kept: Path | No
     except KeyboardInterrupt:
         print(f"\ninterrupted after {len(gains)} of {len(effects) * len(seeds)} robots; the same command goes on")
     return summed_up(gains) if gains else {}
-
-
-def _place(record: dict) -> tuple[str, int]:
-    return record["effect"], record["seed"]
 
 
 def _gain_of(record: dict[str, Any]) -> Gain:
@@ -277,7 +272,7 @@ def main() -> None:
         seeds = range(options.first_seed, options.first_seed + options.seeds)
         run(effects, seeds, options.out, options.records)
     if options.print or options.plot:
-        gains = [_gain_of(record) for record in lines.read(options.records, _place).values()]
+        gains = [_gain_of(record) for record in lines.read(options.records, "effect", "seed").values()]
         if options.print:
             print("\n".join([HEADING, *map(row, gains)]))
             summed_up(gains)

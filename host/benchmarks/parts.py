@@ -71,7 +71,7 @@ def costs(firmware: Path = FIRMWARE) -> dict[str, tuple[int, int]]:
             ram[part] += size
         if address < DATA_SPACE or kind in "dD":  # data that is not zero lies in flash, too
             flash[part] += size
-    text, data, bss = _sections(firmware)
+    text, data, bss = sections(firmware)
     flash[REST] += text + data - flash.total()
     ram[REST] += data + bss - ram.total()
     return {part: (flash[part], ram[part]) for part in sorted(flash | ram, key=lambda part: -flash[part])}
@@ -82,15 +82,16 @@ def _part_of(name: str) -> str:
     return next((part for part, pattern in PARTS if re.search(pattern, function)), REST)
 
 
-def _sections(firmware: Path) -> tuple[int, int, int]:
+def sections(firmware: Path = FIRMWARE) -> tuple[int, int, int]:
+    """Bytes of text, data and bss."""
     listing = subprocess.run(["avr-size", firmware], check=True, capture_output=True, text=True).stdout
     text, data, bss = (int(word) for word in listing.splitlines()[1].split()[:3])
     return text, data, bss
 
 
-def lines(firmware: Path = FIRMWARE) -> list[str]:
+def lines() -> list[str]:
     """The table."""
-    return [f"  {part:<58} {flash:>6} {ram:>6}" for part, (flash, ram) in costs(firmware).items()]
+    return [f"  {part:<58} {flash:>6} {ram:>6}" for part, (flash, ram) in costs().items()]
 
 
 if __name__ == "__main__":

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import gzip
 import json
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Iterable
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 
-def read(path: Path, place: Callable[[dict], Hashable]) -> dict[Any, dict]:
-    """Records by their `place` in the trial; none where there is no file."""
-    if not path.exists():
+def read(path: Path | None, *names: str) -> dict[Any, dict]:
+    """Records by what they have under these names, as a tuple where there are several; none where there is no file."""
+    if path is None or not path.exists():
         return {}
     with _opened(path, path, "rt") as lines:
-        return {place(record): record for record in map(json.loads, lines)}
+        return {itemgetter(*names)(record): record for record in map(json.loads, lines)}
 
 
 def write(path: Path, records: Iterable[dict]) -> None:

@@ -182,7 +182,7 @@ def run(
 ) -> dict[str, float]:
     """Print the table, a line as each robot ends; returns the figures flat. Ctrl-C sums up what there is. `every`: how
     many of them are searched fully; None: all."""
-    known = lines.read(kept, lambda record: record["robot"]) if kept else {}
+    known = lines.read(kept, "robot")
     print(HEADING)
     found: list[dict] = []
     asked = list(robots(count, models))
@@ -228,6 +228,8 @@ def main() -> None:
     parser.add_argument("--records", type=Path, help="a line of JSON a robot; read first, and kept up to date")
     parser.add_argument("--print", action="store_true", help="what the records say, and nothing more")
     options = parser.parse_args()
+    if options.print and options.records is None:
+        parser.error("--print says what is in a file of records: add --records FILE")
     run(options.robots, options.seeds, options.long, options.models, options.records, options.print, options.fully)
 
 

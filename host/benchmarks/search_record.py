@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import lacuna
+from benchmarks import records as lines
 
 _DIGITS = 5
 
@@ -48,6 +49,21 @@ def _tried(candidate: Any, trials: Any) -> dict[str, Any]:
 
 def _short(value: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
+
+
+def losses_beside(path: Path) -> Path:
+    """Where what was tried is kept: packed, beside the records of a trial."""
+    return path.with_suffix(".losses.jsonl.gz")
+
+
+def write_losses(path: Path, record: dict) -> None:
+    """Add what was tried of one data set to what lies beside `path`; records read from a file have none."""
+    if "search" not in record:
+        return
+    known = lines.read(losses_beside(path), "kind", "seed")
+    of = {name: record[name] for name in ("kind", "seed", "truth")}
+    known[record["kind"], record["seed"]] = of | record["search"]
+    lines.write(losses_beside(path), known.values())
 
 
 @cache

@@ -18,13 +18,11 @@ from dataclasses import Field, fields, replace
 from benchmarks.small.draw import UntellableError, drawn
 from benchmarks.small.offered import Offered
 from benchmarks.small_systems import COUNTS, compiled, jobs
-from lacuna import System
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.diagnose import decided, explanations
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.split import split_trials
-from lacuna.diagnosis.stopped import Stoppable
-from lacuna.diagnosis.workers import Workers
+from lacuna.diagnosis.workers import Stoppable, Workers
 from lacuna.run import with_records
 
 SEARCH = ("implausible", "promising", "rival", "reach", "lost", "curve")  # rules that the search or a curve obeys
@@ -53,16 +51,7 @@ def variants() -> dict[tuple[str, float], Policy]:
 
 def names_under(offered: Offered, policies: dict[tuple[str, float], Policy]) -> Said:
     """By policy, what the verdict names; `("", 1.0)` by the rules as they are."""
-    system = System(
-        offered.model,
-        offered.parameters,
-        offered.effects,
-        outputs=offered.kind.output,
-        name=offered.kind.name,
-        nuisances=offered.nuisances,
-        **offered.options,
-    )
-    system = with_records(system, offered.tables)
+    system = with_records(offered.system(), offered.tables)
     case = Case(system, split_trials(system.trials, system.spare(), system.test()), POLICY, 0)
     hand = Stoppable(Workers(lambda _: None))
     found = explanations(case, case.fit_base(1), hand)

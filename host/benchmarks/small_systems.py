@@ -23,8 +23,7 @@ from pathlib import Path
 
 from benchmarks import records as lines
 from benchmarks.blind_figures import name_of, said_of
-from benchmarks.blind_records import losses_beside, place
-from benchmarks.search_record import version
+from benchmarks.search_record import losses_beside, version
 from benchmarks.small.draw import Sealed, UntellableError, drawn
 from benchmarks.small.figures import report
 from benchmarks.small.offered import Offered
@@ -57,7 +56,7 @@ def one(truth: str, seed: int, with_peers: bool) -> tuple[dict, dict]:
 
 def run(todo: list[tuple[str, int]], path: Path, with_peers: bool) -> list[dict]:
     """What is not in the file yet; Ctrl-C leaves the file whole."""
-    known, losses = lines.read(path, place), lines.read(losses_beside(path), place)
+    known, losses = lines.read(path, "kind", "seed"), lines.read(losses_beside(path), "kind", "seed")
     compiled()
     began = time.monotonic()
     for count, (truth, seed) in enumerate(todo, 1):
@@ -104,7 +103,7 @@ def show(offered: Offered, sealed: Sealed) -> None:
 
 def against(these: Path, others: Path) -> None:
     """Print the sets of both files on which they differ."""
-    mine, theirs = lines.read(these, place), lines.read(others, place)
+    mine, theirs = lines.read(these, "kind", "seed"), lines.read(others, "kind", "seed")
     both = [key for key in mine if key in theirs]
     print(f"{len(both)} sets in both; said differently of:")
     for key in both:
@@ -135,17 +134,19 @@ def main(given: list[str] | None = None) -> int:
     if (options.print or options.against) and not options.records.exists():
         parser.error(f"{options.records}: no such file; run without --print first")
     if options.against:
+        if not options.against.exists():
+            parser.error(f"{options.against}: no such file; --against takes the records of another run")
         against(options.records, options.against)
         return 0
     if options.print:
-        report(list(lines.read(options.records, place).values()))
+        report(list(lines.read(options.records, "kind", "seed").values()))
         return 0
     options.records.parent.mkdir(parents=True, exist_ok=True)
     todo = jobs({truth: getattr(options, name) for name, (truth, _) in COUNTS.items()}, options.first_seed)
     try:
         found = run(todo, options.records, not options.without_peers)
     except KeyboardInterrupt:
-        found = list(lines.read(options.records, place).values())
+        found = list(lines.read(options.records, "kind", "seed").values())
         print(f"interrupted: what {len(found)} sets say; the same command goes on\n")
     report(found)
     return 0

@@ -13,7 +13,8 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-FIRMWARE = Path(__file__).resolve().parents[2] / ".pio/build/uno/firmware.elf"
+from benchmarks.parts import FIRMWARE, sections
+
 RAM_BYTES = 2048
 RETURN_ADDRESS = 2
 SAVED_BY_PROLOGUE = 18  # r2 to r17, r28, r29 by libgcc's common prologue, entered the later the fewer are saved
@@ -137,10 +138,9 @@ def bound(firmware: Path = FIRMWARE) -> tuple[int, list[str]]:
     ]
 
 
-def room(firmware: Path = FIRMWARE) -> int:
+def room() -> int:
     """Bytes that static data leaves to the stack."""
-    listing = subprocess.run(["avr-size", firmware], check=True, capture_output=True, text=True).stdout
-    _, data, bss = (int(word) for word in listing.splitlines()[1].split()[:3])
+    _, data, bss = sections()
     return RAM_BYTES - data - bss
 
 

@@ -50,6 +50,7 @@ class Workshop:
                 PROJECT / part, self.folder / part, ignore=shutil.ignore_patterns("__pycache__", "conftest.py")
             )
         (self.folder / "objects").mkdir()
+        self._program = self.folder / "suite"
         self.includes = [f"-I{_unity()}", *(f"-I{folder}" for folder in sorted((self.folder / "lib").iterdir()))]
         self.suites: list[Suite] = []
         self.kills: Counter[tuple[Path, str]] = Counter()
@@ -104,31 +105,19 @@ class Workshop:
         return "survived"
 
     def _passes_on_the_chip(self) -> bool:
-        command = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "-x",
-            "-p",
-            "no:cacheprovider",
-            "-c",
-            os.devnull,
-            "--rootdir",
-            ".",
-        ]
-        return subprocess.run([*command, ON_THE_CHIP], cwd=self.folder, capture_output=True).returncode == 0
+        options = ["-q", "-x", "-p", "no:cacheprovider", "-c", os.devnull, "--rootdir", "."]
+        command = [sys.executable, "-m", "pytest", *options, ON_THE_CHIP]
+        return subprocess.run(command, cwd=self.folder, capture_output=True).returncode == 0
 
     def _passes(self, suite: Suite, limit_s: float, changed: dict[Path, Path] | None = None) -> str:
         """What is wrong with a suite, empty if nothing."""
-        program = self.folder / "suite"
         objects = [(changed or {}).get(unit, self._object(unit)) for unit in suite.sources]
-        linked = subprocess.run([COMPILER, *FLAGS, *objects, self._object("unity"), "-o", program], capture_output=True)
+        linked = subprocess.run(self._linking(*objects, self._object("unity")), capture_output=True)
         if linked.returncode:
             return f"does not link: {linked.stderr.decode(errors='replace')[-500:]}"
         try:
             # Processor time, since a busy machine makes any suite slow.
-            limited = ["prlimit", f"--cpu={math.ceil(limit_s)}", program]
+            limited = ["prlimit", f"--cpu={math.ceil(limit_s)}", self._program]
             done = subprocess.run(limited, capture_output=True, timeout=600)
         except subprocess.TimeoutExpired:
             return "hangs"
@@ -140,20 +129,13 @@ class Workshop:
         archive = self.folder / "all.a"
         if not archive.exists():
             self._run(["ar", "rcs", archive, *map(self._object, units)])
-        said = self._run(
-            [
-                COMPILER,
-                *FLAGS,
-                self._object(main),
-                self._object("unity"),
-                archive,
-                "-Wl,-t,-t",
-                "-o",
-                self.folder / "suite",
-            ]
-        )
+        said = self._run(self._linking(self._object(main), self._object("unity"), archive, "-Wl,-t,-t"))
         members = {line.rpartition(")")[2] for line in said.splitlines() if line.startswith("(")}
         return [unit for unit in units if self._object(unit).name in members]
+
+    def _linking(self, *parts: Path | str) -> list:
+        """The command that makes the suite's program of these."""
+        return [COMPILER, *FLAGS, *parts, "-o", self._program]
 
     def _compile(self, unit: Path) -> frozenset[Path]:
         """Compile; return the files that it is made of, itself included."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.small.offered import Offered
+from benchmarks.systems.problem import absent
 from lacuna import Effect
 from lacuna.values import Values
 
@@ -54,7 +55,7 @@ def closest(offered: Offered, clean: Sequence[np.ndarray], effects: Sequence[Eff
     lower, upper = (np.array([getattr(p, end) for _, p in named]) for end in ("lower", "upper"))
     scale = np.array([abs(p.value) for _, p in named])
     sizes = {name for e in effects for name in e.size_names}
-    off, runs = absent(offered), _one_a_condition(offered)
+    off, runs = absent(offered.effects), _one_a_condition(offered)
     unit = max(float(np.std(np.concatenate(clean))), 1e-12)
 
     def residual(x: np.ndarray) -> np.ndarray:
@@ -72,12 +73,6 @@ def closest(offered: Offered, clean: Sequence[np.ndarray], effects: Sequence[Eff
         tried.append(least_squares(residual, start / scale, bounds=bounds, max_nfev=20, xtol=1e-5, ftol=1e-5))
     best = min(tried, key=lambda one: one.cost)
     return dict(zip((n for n, _ in named), best.x * scale, strict=True)), unit * float(np.sqrt(np.mean(best.fun**2)))
-
-
-def absent(offered: Offered) -> dict[str, float]:
-    """Values of all that is on offer, off."""
-    typical: Mapping[str, float] = {e.full_name(p): p.value for e in offered.effects for p in e.parameters}
-    return {**typical, **{name: e.absent for e in offered.effects for name in e.size_names}}
 
 
 def _one_a_condition(offered: Offered):

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.small.decoys import DECOYS, effect_of
 from benchmarks.small.distinct import left_by, tellable
-from benchmarks.small.excitation import shaped
+from benchmarks.small.excitation import SHAPES, shaped
 from benchmarks.small.instrument import Instrument
 from benchmarks.small.kind import Form, Kind
 from benchmarks.small.kinds import KINDS
@@ -159,7 +159,7 @@ def _instrument(draw: np.random.Generator) -> Instrument:
 
 def _conditions(kind: Kind, repeats: int, instrument: Instrument, draw: np.random.Generator):
     """(name, times, input) of each: four where they are repeated, else eight."""
-    shapes = kind.shapes if repeats == 1 else tuple(draw.choice(kind.shapes, 2, replace=False))
+    shapes = tuple(SHAPES) if repeats == 1 else tuple(draw.choice(tuple(SHAPES), 2, replace=False))
     found = []
     for shape in shapes:
         for size in kind.sizes:

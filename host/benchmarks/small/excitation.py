@@ -7,7 +7,7 @@ import numpy as np
 
 def shaped(shape: str, time_s: np.ndarray, duration_s: float, draw: np.random.Generator) -> np.ndarray:
     """One of "steps", "sweep", "multisine", "ramps"; steps and phases are drawn."""
-    return _SHAPES[shape](time_s / duration_s, draw)
+    return SHAPES[shape](time_s / duration_s, draw)
 
 
 def _steps(share: np.ndarray, draw: np.random.Generator) -> np.ndarray:
@@ -32,4 +32,4 @@ def _ramps(share: np.ndarray, draw: np.random.Generator) -> np.ndarray:
     return (2.0 * np.abs(2.0 * ((turns + 0.25) % 1.0 - 0.5)) - 1.0) * -(1.0 - 0.25 * np.floor(turns))
 
 
-_SHAPES = {"steps": _steps, "sweep": _sweep, "multisine": _multisine, "ramps": _ramps}
+SHAPES = {"steps": _steps, "sweep": _sweep, "multisine": _multisine, "ramps": _ramps}

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.blind_figures import name_of, said_of, share_text
+from benchmarks.blind_figures import name_of, plain, reported, said_of, share_text
 from benchmarks.small.kinds.terms import TERMS
 
 _KINDS = ("single", "none", "outside", "pair", "decoys")
@@ -29,21 +29,12 @@ def named(record: dict) -> list[str]:
     return [effect["name"] for effect in record["effects"]]
 
 
-def _reported(record: dict) -> set[str]:
-    return {name for e in record["effects"] for name in (e["name"], *e["confusable_with"])}
-
-
-def plain(record: dict) -> bool:
-    """Whether a verdict says that what is on offer explains all that matters."""
-    return record["verdict"] == "none" or (record["verdict"] == "identified" and not record["remainder"]["matters"])
-
-
 def rates(records: Sequence[dict]) -> dict[str, list[bool]]:
     """Hits and misses by what they are of; a crash is a miss."""
     single, none, outside, pair, decoys = ([r for r in records if r["kind"] == kind] for kind in _KINDS)
     found = (
         [named(r)[:1] == r["truth"] for r in single],
-        [bool(set(r["truth"]) & _reported(r)) for r in single],
+        [bool(set(r["truth"]) & reported(r)) for r in single],
         [named(r) == r["truth"] for r in single],
         [r["verdict"] == "none" for r in none],
         [r["verdict"] != "crash" and not plain(r) for r in outside],

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.small.integrate import modeled, true
+from benchmarks.systems.problem import absent
 from lacuna import Effect, Parameter
 
 
@@ -56,7 +57,6 @@ class Kind:
     least: float = -np.inf
     start: tuple[float, ...] = ()
     delay: str = ""
-    shapes: tuple[str, ...] = ("steps", "sweep", "multisine", "ramps")
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -66,16 +66,11 @@ class Kind:
     @cached_property
     def off(self) -> dict[str, float]:
         """The model's values with nothing but the base, at its declared values."""
-        typical = {e.full_name(p): p.value for e in self.effects for p in e.parameters}
-        absent = {name: e.absent for e in self.effects for name in e.size_names}
-        return {p.name: p.value for p in self.parameters} | typical | absent
+        return {p.name: p.value for p in self.parameters} | absent(self.effects)
 
     @property
     def step_s(self) -> float:
         return self.duration_s / self.samples / self.steps
-
-    def forms_of(self, effect: str) -> tuple[Form, ...]:
-        return tuple(form for form in self.forms if form.effect == effect)
 
     def model(self, time_s: np.ndarray, applied: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
         """The owner's model; candidates without values are off."""

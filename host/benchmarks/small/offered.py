@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.small.decoys import DECOYS, changed
 from benchmarks.small.kind import Kind
 from benchmarks.small.kinds import KINDS
-from lacuna import Effect, Parameter, Record
+from lacuna import Effect, Parameter, Record, System
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,18 @@ class Offered:
     @property
     def kind(self) -> Kind:
         return KINDS[self.model.kind]
+
+    def system(self, simulate: Callable[..., Any] | None = None) -> System:
+        """The system as a stranger declares it; `simulate` in the place of the model, if given."""
+        return System(
+            simulate or self.model,
+            self.parameters,
+            self.effects,
+            outputs=self.kind.output,
+            name=self.kind.name,
+            nuisances=self.nuisances,
+            **self.options,
+        )
 
     @cached_property
     def tables(self) -> list[dict[str, Any]]:

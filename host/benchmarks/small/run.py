@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 import lacuna
+from benchmarks.cost import SimulationCount
 from benchmarks.search_record import searched
-from benchmarks.simulations import SimulationCount
 from benchmarks.small.draw import Sealed
 from benchmarks.small.offered import Offered
 from benchmarks.small.peers import PEERS, problem
@@ -23,15 +23,7 @@ def diagnosed(offered: Offered) -> tuple[dict[str, Any], dict[str, Any], Predict
     """What the engine says of a set, what it tried, and the model that it completes. An engine that raises has said
     "crash"."""
     simulations = SimulationCount()
-    system = lacuna.System(
-        simulations.of(offered.model),
-        offered.parameters,
-        offered.effects,
-        outputs=offered.kind.output,
-        name=offered.kind.name,
-        nuisances=offered.nuisances,
-        **offered.options,
-    )
+    system = offered.system(simulations.of(offered.model))
     began = time.process_time()
     try:
         verdict = lacuna.diagnose(system, offered.tables, progress=False)
@@ -39,18 +31,15 @@ def diagnosed(offered: Offered) -> tuple[dict[str, Any], dict[str, Any], Predict
         said = {"verdict": "crash", "effects": [], "crash": f"{type(error).__name__}: {error}"[:300]}
         return said | _cost(began, simulations), {}, None
     spent = _cost(began, simulations)
-    kept = ("verdict", "effects", "error", "warnings")
-    said = {name: verdict.record[name] for name in kept} | {"remainder": _remainder(verdict.record["remainder"])}
+    said = {name: verdict.record[name] for name in ("verdict", "effects", "error", "warnings")}
+    remainder = verdict.record["remainder"]
+    said["remainder"] = {name: remainder[name] for name in ("matters", "share_of_gap", "times_floor")}
     found = searched(verdict.diagnosis, spent["simulations"])
     return said | spent, found, lambda record: np.asarray(verdict.model(record)[offered.kind.output])
 
 
 def _cost(began: float, simulations: SimulationCount) -> dict[str, Any]:
     return {"processor_seconds": time.process_time() - began, "simulations": simulations.count}
-
-
-def _remainder(remainder: dict[str, Any]) -> dict[str, Any]:
-    return {name: remainder[name] for name in ("matters", "share_of_gap", "times_floor")}
 
 
 def asked(offered: Offered, sealed: Sealed) -> dict[str, dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -31,6 +31,14 @@ class Terms:
     def only(self, names: Collection[str]) -> Terms:
         """Those of `names`."""
         return replace(self, of={name: term for name, term in self.of.items() if name in names})
+
+
+def absent(effects: Iterable[Effect]) -> dict[str, float]:
+    """Values of `effects`, by full name, with which none of them is there."""
+    off: dict[str, float] = {}
+    for effect in effects:
+        off |= effect.typical | dict.fromkeys(effect.size_names, effect.absent)
+    return off
 
 
 @dataclass(frozen=True)
@@ -74,10 +82,8 @@ class KnownProblem:
 
     def theta(self, record: Record, found: Mapping[str, float]) -> Values:
         """What `simulate` gets: `found` by full name, effects without one at the value at which they are absent."""
-        sizes = {name: e.absent for e in self.effects for name in e.size_names}
-        typical = {e.full_name(p): p.value for e in self.effects for p in e.parameters}
         own = {p.name: p.value for p in (self.nuisances(record) if callable(self.nuisances) else self.nuisances)}
-        return Values({p.name: p.value for p in self.parameters} | typical | sizes | own | dict(found))
+        return Values({p.name: p.value for p in self.parameters} | absent(self.effects) | own | dict(found))
 
     def predict(self, record: Record, found: Mapping[str, float]) -> np.ndarray:
         """The output of one record, simulated freely, shape (n,)."""

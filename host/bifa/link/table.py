@@ -62,7 +62,6 @@ PARAMETERS = (
 
 # struct format of a parameter set, on the wire and in EEPROM
 SET_FORMAT = "<IIIHHHHHH"
-SET_SIZE = 24
 
 # factory presets: one value in wire units for every parameter
 PRESETS = {

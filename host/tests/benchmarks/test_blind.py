@@ -1,10 +1,11 @@
 """The report of a blind trial, and the records that it is printed from."""
 
 import json
+from unittest.mock import Mock
 
 import pytest
 
-from benchmarks import blind, blind_figures, blind_records
+from benchmarks import blind, blind_figures, records
 
 
 def record(seed: int, *named: str, kind: str = "single", truth: str = "leak", matters: bool = False) -> dict:
@@ -80,37 +81,29 @@ def test_a_table_has_the_rates_of_all_truths_beside_what_is_required():
     assert len({len(cells) for cells in rows.values()}) == 1
 
 
-def test_records_print_the_report_that_they_were_kept_from(tmp_path, capsys):
+def test_records_print_the_report_that_they_were_kept_from_and_written_again_are_the_same(tmp_path, capsys):
     blind_figures.report(RECORDS, "own")
     whole = capsys.readouterr().out
-    kept = tmp_path / "own.jsonl"
-    blind_records.write(kept, RECORDS)
-    assert len(kept.read_text().splitlines()) == len(RECORDS)
-    blind_figures.report(list(blind_records.read(kept).values()), "own")
-    assert capsys.readouterr().out == whole
-
-
-def test_records_written_again_are_the_same(tmp_path):
     first, second = tmp_path / "first.jsonl", tmp_path / "second.jsonl"
-    blind_records.write(first, RECORDS)
-    blind_records.write(second, blind_records.read(first).values())
+    records.write(first, map(blind_figures.brief, RECORDS))
+    assert len(first.read_text().splitlines()) == len(RECORDS)
+    kept = records.read(first, "kind", "seed")
+    assert [seed for _, seed in kept] == [1, 2, 3, 4, 5]
+    blind_figures.report(list(kept.values()), "own")
+    assert capsys.readouterr().out == whole
+    records.write(second, map(blind_figures.brief, kept.values()))
     assert first.read_bytes() == second.read_bytes()
-    assert {place[1] for place in blind_records.read(first)} == {1, 2, 3, 4, 5}
 
 
 def test_a_trial_goes_on_from_its_records(tmp_path, monkeypatch, capsys):
-    kept, asked = tmp_path / "own.jsonl", []
-    blind_records.write(kept, [record(10, "leak")])
-
-    def diagnosed(job, out, threads):
-        asked.append(job.seed)
-        return record(job.seed, job.effect, truth=job.effect)
-
+    kept = tmp_path / "own.jsonl"
+    records.write(kept, [blind_figures.brief(record(10, "leak"))])
+    diagnosed = Mock(side_effect=lambda job, out, threads: record(job.seed, job.effect, truth=job.effect))
     monkeypatch.setattr(blind, "diagnose_sealed", diagnosed)
     wanted = ["--singles", "3", "--none", "0", "--outside", "0", "--pairs", "0", "--first-seed", "10", "--jobs", "1"]
     monkeypatch.setattr("sys.argv", ["blind", *wanted, "--records", str(kept), "--out", str(tmp_path)])
     blind.main()
-    assert asked == [11, 12]
+    assert [call.args[0].seed for call in diagnosed.call_args_list] == [11, 12]
     assert [json.loads(line)["seed"] for line in kept.read_text().splitlines()] == [10, 11, 12]
     assert "3/3" in capsys.readouterr().out
     monkeypatch.setattr("sys.argv", ["blind", "--records", str(kept), "--print"])

@@ -10,11 +10,6 @@ from bifa.gait import library
 from bifa.robot import BASELINE, nominal
 
 
-def step(probability, *speeds):
-    runs = tuple(speed >= 16.0 for speed in speeds)
-    return Step(0.002, probability, (20.0, 21.0), speeds, runs)
-
-
 def test_gaits_are_found_with_which_nearly_all_to_few_of_the_robots_walk():
     robust = library.load("robust").gait
     found = cliff.at_the_cliff(nominal(), replace(robust, period_s=1.05 * robust.period_s))
@@ -26,7 +21,10 @@ def test_gaits_are_found_with_which_nearly_all_to_few_of_the_robots_walk():
 
 def test_what_was_predicted_is_compared_with_what_walked(capsys):
     speeds = [(20.5, 20.5)] * 3 + [(20.5, 0.5), (22.0, 0.5)]
-    steps = [step(probability, *runs) for probability, runs in zip(cliff.WANTED, speeds, strict=True)]
+    steps = [
+        Step(0.002, probability, (20.0, 21.0), runs, tuple(speed >= 16.0 for speed in runs))
+        for probability, runs in zip(cliff.WANTED, speeds, strict=True)
+    ]
     figures = cliff.summed_up([steps, []])
     assert figures["cliff_robots"] == 1
     squares = [0.05**2] * 2 + [0.2**2] * 2 + [0.5**2] * 2 + [0.8**2, 0.2**2] + [0.95**2, 0.05**2]

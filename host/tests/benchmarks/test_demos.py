@@ -1,6 +1,7 @@
 """Whether what a demo's seal held was named, from the summaries of campaigns."""
 
 import json
+from unittest.mock import Mock
 
 import pytest
 
@@ -38,12 +39,8 @@ def test_a_row_stands_under_its_heading():
 
 
 def test_demos_go_on_from_their_records(monkeypatch, tmp_path, capsys):
-    asked, kept = [], tmp_path / "demos.jsonl"
-
-    def told(seed, out):
-        asked.append(seed)
-        return demos.story(seed, summary("leak" if seed % 2 else "backlash"))
-
+    kept = tmp_path / "demos.jsonl"
+    told = Mock(side_effect=lambda seed, out: demos.story(seed, summary("leak" if seed % 2 else "backlash")))
     monkeypatch.setattr(demos, "told", told)
     figures = demos.run(range(4), tmp_path, 2, kept)
     assert figures == {"demos": 4, "demos_right": 2, "demos_edge_gain": pytest.approx(0.1)}
@@ -51,5 +48,5 @@ def test_demos_go_on_from_their_records(monkeypatch, tmp_path, capsys):
     assert "2 of 4 [0.15, 0.85]" in printed
     assert "+10.0 % on average" in printed
     assert demos.run(range(4), tmp_path, 2, kept) == figures
-    assert sorted(asked) == [0, 1, 2, 3]
+    assert sorted(call.args[0] for call in told.call_args_list) == [0, 1, 2, 3]
     assert [json.loads(line)["seed"] for line in kept.read_text().splitlines()] == [0, 1, 2, 3]

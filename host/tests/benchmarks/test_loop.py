@@ -1,5 +1,7 @@
 """What the loop buys: its table, its coverage and its records."""
 
+from unittest.mock import Mock
+
 import pytest
 
 from benchmarks import loop
@@ -65,30 +67,17 @@ def test_the_reliability_plot_is_drawn(tmp_path):
 
 
 def test_an_interrupted_run_sums_up_what_there_is(monkeypatch, capsys, tmp_path):
-    done = iter([robot()])
-
-    def measured(effect, seed, out):
-        try:
-            return next(done)
-        except StopIteration:
-            raise KeyboardInterrupt from None
-
-    monkeypatch.setattr(loop, "measured", measured)
+    monkeypatch.setattr(loop, "measured", Mock(side_effect=[robot(), KeyboardInterrupt]))
     figures = loop.run(("leak", "stribeck"), range(2), tmp_path)
     assert figures["loop_edge_mm_s"] == 23.0
     assert "interrupted after 1 of 4 robots" in capsys.readouterr().out
 
 
 def test_a_run_goes_on_from_its_records(monkeypatch, tmp_path):
-    asked, kept = [], tmp_path / "loop.jsonl"
-
-    def measured(effect, seed, out):
-        asked.append((effect, seed))
-        return robot(effect, seed)
-
+    kept, measured = tmp_path / "loop.jsonl", Mock(side_effect=lambda effect, seed, out: robot(effect, seed))
     monkeypatch.setattr(loop, "measured", measured)
     first = loop.run(("leak",), range(2), tmp_path, kept)
     assert loop.run(("leak",), range(2), tmp_path, kept) == first
     loop.run(("leak", "stribeck"), range(1), tmp_path, kept)
-    assert asked == [("leak", 0), ("leak", 1), ("stribeck", 0)]
+    assert [call.args[:2] for call in measured.call_args_list] == [("leak", 0), ("leak", 1), ("stribeck", 0)]
     assert len(kept.read_text().splitlines()) == 3

@@ -1,16 +1,17 @@
 """What a search tried is kept, and rules of decision are tried on it."""
 
 import json
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
 
 import lacuna
-from benchmarks import blind_records, records, replay
-from benchmarks.reliability import bins, brier, predicted
+from benchmarks import records, replay
+from benchmarks.cost import SimulationCount
+from benchmarks.replay import bins, brier, predicted
 from benchmarks.rules import RULES, within_confidence
-from benchmarks.search_record import searched
-from benchmarks.simulations import SimulationCount
+from benchmarks.search_record import losses_beside, searched, write_losses
 from lacuna import Effect, Parameter, Record
 
 
@@ -59,16 +60,12 @@ def test_confidence_looks_at_what_was_not_fitted_alone():
     assert within_confidence(search(BASE, fits_only)) == []
 
 
-def write(path, said: list[dict], losses: list[dict]) -> None:
-    records.write(path, said)
-    records.write(blind_records.losses_beside(path), losses)
-
-
 def a_trial(path):
     leak = {"kind": "single", "seed": 1, "truth": ["leak"], "effects": [{"name": "leak"}]}
     withheld = {"kind": "outside", "seed": 2, "truth": ["creep"], "effects": []}
     found = search(BASE, LEAK, weights=[(("leak",), 0.95), ((), 0.05)], chosen=["leak"])
-    write(path, [leak, withheld], [leak | found, withheld | found])
+    records.write(path, [leak, withheld])
+    records.write(losses_beside(path), [leak | found, withheld | found])
 
 
 def test_a_replay_counts_what_each_rule_would_have_named(tmp_path, capsys):
@@ -154,8 +151,6 @@ def test_what_the_engine_tried_is_kept_in_plain_types(diagnosed):
 
 
 def test_a_forked_child_counts_as_well():
-    from multiprocessing import get_context
-
     simulations = SimulationCount()
     child = get_context("fork").Process(target=simulations.add, args=(5,))
     child.start()
@@ -176,20 +171,20 @@ def test_what_a_system_simulates_is_counted_a_trial_a_set_of_values():
 
 
 def test_records_continue_packed_or_not(tmp_path):
-    for name in ("plain.jsonl", "packed.jsonl.gz"):
-        path = tmp_path / name
-        assert records.read(path, lambda r: r["seed"]) == {}
+    plain, packed = tmp_path / "plain.jsonl", tmp_path / "packed.jsonl.gz"
+    for path in (plain, packed):
+        assert records.read(path, "seed") == {}
         records.write(path, [{"seed": 1, "x": 0.123456789}])
-        assert records.read(path, lambda r: r["seed"]) == {1: {"seed": 1, "x": 0.123457}}
-    assert (tmp_path / "packed.jsonl.gz").read_bytes()[:2] == b"\x1f\x8b"
+        assert records.read(path, "seed") == {1: {"seed": 1, "x": 0.123457}}
+    assert packed.read_bytes()[:2] == b"\x1f\x8b"
 
 
 def test_a_blind_trial_adds_what_was_tried_beside_its_records(tmp_path):
     path = tmp_path / "own.jsonl"
-    blind_records.write_losses(path, {"kind": "single", "seed": 1, "truth": ["leak"]})
-    assert not blind_records.losses_beside(path).exists()
+    write_losses(path, {"kind": "single", "seed": 1, "truth": ["leak"]})
+    assert not losses_beside(path).exists()
     for seed in (1, 2):
-        blind_records.write_losses(path, {"kind": "single", "seed": seed, "truth": ["leak"], "search": search(BASE)})
-    found = records.read(blind_records.losses_beside(path), blind_records.place)
+        write_losses(path, {"kind": "single", "seed": seed, "truth": ["leak"], "search": search(BASE)})
+    found = records.read(losses_beside(path), "kind", "seed")
     assert set(found) == {("single", 1), ("single", 2)}
     assert found["single", 2]["tried"] == [BASE]

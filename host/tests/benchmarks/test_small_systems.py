@@ -2,13 +2,15 @@
 
 import json
 import pickle
+import struct
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from benchmarks import small_systems
-from benchmarks.blind_records import losses_beside
+from benchmarks.search_record import losses_beside
 from benchmarks.small import draw as drawing
 from benchmarks.small import run as running
 from benchmarks.small import told
@@ -99,49 +101,29 @@ def test_a_seed_makes_the_same_set_again(truth):
     assert not np.array_equal(first.runs[0].measured, another.runs[0].measured, equal_nan=True)
 
 
-def reachable(value, seen):
-    """All that can be reached from a value by attributes and members."""
-    if id(value) in seen:
-        return
-    seen[id(value)] = value
-    members = list(vars(value).values()) if hasattr(value, "__dict__") else []
-    members += list(value.items()) if isinstance(value, dict) else []
-    members += list(value) if isinstance(value, list | tuple | set | frozenset) else []
-    for member in members:
-        if not isinstance(member, type | np.ndarray):
-            reachable(member, seen)
-
-
 def test_what_is_sealed_is_not_within_reach_of_what_is_offered():
     offered, sealed = drawn("outside", 7003)
-    seen = {}
-    reachable([offered, offered.tables, offered.records], seen)
-    values = [v for v in seen.values() if isinstance(v, float)]
     assert sealed.effects[0] not in {e.name for e in offered.effects}
-    assert sealed not in seen.values()
-    assert not any(true in values for true in sealed.values.values())
-    assert sealed.instrument.noise not in values
+    reached = pickle.dumps((offered, offered.tables, offered.records))
+
+    def within(value: float) -> bool:
+        return any(struct.pack(f"{order}d", value) in reached for order in "<>")
+
+    assert all(within(p.value) for p in offered.parameters)
+    assert not any(within(true) for true in (*sealed.values.values(), sealed.instrument.noise))
 
 
 def test_the_engine_is_given_no_more_than_what_is_offered(monkeypatch):
-    given = {}
-
-    class StoppedError(Exception):
-        pass
-
-    def diagnose(system, records, **how):
-        given.update(system=system, records=records, how=how)
-        raise StoppedError
-
     offered, sealed = drawn("single", 7001)
-    monkeypatch.setattr(running.lacuna, "diagnose", diagnose)
+    monkeypatch.setattr(running.lacuna, "diagnose", diagnose := Mock(side_effect=RuntimeError))
     said, tried, predict = running.diagnosed(offered)
     assert (said["verdict"], tried, predict) == ("crash", {}, None)
-    assert given["how"] == {"progress": False}
+    (system, tables), how = diagnose.call_args
+    assert how == {"progress": False}
     columns = {"name", "condition", "time_s", offered.kind.input, offered.kind.output}
-    assert all(set(table) == columns for table in given["records"])
-    assert set(given["system"].effects) == {e.name for e in offered.effects}
-    assert sealed.effects[0] not in json.dumps([t["name"] + t["condition"] for t in given["records"]])
+    assert all(set(table) == columns for table in tables)
+    assert set(system.effects) == {e.name for e in offered.effects}
+    assert sealed.effects[0] not in json.dumps([t["name"] + t["condition"] for t in tables])
 
 
 def test_a_declared_value_is_no_true_one():
@@ -234,42 +216,39 @@ def test_rates_count_each_miss_once():
     assert shares["crashed"] == (1, 9)
 
 
-def test_a_trial_goes_on_where_it_was_interrupted(tmp_path, monkeypatch, capsys):
-    asked = []
+def of_none(seed):
+    """What the engine says of a set without an effect."""
+    return record("none", []) | {"seed": seed, "processor_seconds": 1.0, "simulations": 9, "version": "v", "off": 1.0}
 
-    def one(truth, seed, with_peers):
-        asked.append(seed)
-        said = record(truth, []) | {
-            "seed": seed,
-            "processor_seconds": 1.0,
-            "simulations": 9,
-            "version": "v",
-            "off": 1.0,
-        }
-        return said, {"kind": truth, "seed": seed, "tried": []}
 
-    monkeypatch.setattr(small_systems, "one", one)
-    monkeypatch.setattr(small_systems, "compiled", lambda: None)
+@pytest.fixture
+def sets_of_none(tmp_path, monkeypatch):
+    """Runs the trial of so many sets without an effect; where its records are."""
     path = tmp_path / "small.jsonl"
-    given = ["--records", str(path), "--singles", "0", "--withheld", "0", "--pairs", "0", "--decoys", "0"]
-    small_systems.main([*given, "--none", "2", "--without-peers"])
-    small_systems.main([*given, "--none", "3", "--without-peers"])
-    assert asked == [8000, 8001, 8002]
+    given = ["--records", str(path), "--singles", "0", "--withheld", "0", "--pairs", "0", "--decoys", "0", "--none"]
+    monkeypatch.setattr(small_systems, "compiled", lambda: None)
+    return lambda *count: small_systems.main([*given, *count]), path
+
+
+def test_a_trial_goes_on_where_it_was_interrupted(sets_of_none, monkeypatch, capsys):
+    run, path = sets_of_none
+    one = Mock(side_effect=lambda truth, seed, _: (of_none(seed), {"kind": truth, "seed": seed, "tried": []}))
+    monkeypatch.setattr(small_systems, "one", one)
+    run("2", "--without-peers")
+    run("3", "--without-peers")
+    assert [call.args[1] for call in one.call_args_list] == [8000, 8001, 8002]
     assert len(path.read_text().splitlines()) == 3
     assert losses_beside(path).exists()
     assert "3/3 = 1.00" in capsys.readouterr().out
 
 
-def test_peers_are_asked_later_of_sets_that_are_there_and_the_engine_is_not(tmp_path, monkeypatch, capsys):
-    said = record("none", []) | {"seed": 8000, "processor_seconds": 1.0, "simulations": 9, "version": "v", "off": 1.0}
-    path = tmp_path / "small.jsonl"
-    small_systems.lines.write(path, [said])
-    monkeypatch.setattr(small_systems, "compiled", lambda: None)
+def test_peers_are_asked_later_of_sets_that_are_there_and_the_engine_is_not(sets_of_none, monkeypatch, capsys):
+    run, path = sets_of_none
+    small_systems.lines.write(path, [of_none(8000)])
     monkeypatch.setattr(small_systems, "drawn", lambda truth, seed: (truth, seed))
     answer = {"named": ["wall"], "off": 2.0, "processor_seconds": 3.0}
     monkeypatch.setattr(small_systems, "asked", lambda truth, seed: {"a peer": answer})
-    given = ["--records", str(path), "--singles", "0", "--withheld", "0", "--pairs", "0", "--decoys", "0"]
-    small_systems.main([*given, "--none", "1"])
+    run("1")
     assert json.loads(path.read_text())["peers"] == {"a peer": answer}
     assert "a peer                      0/1 = 0.00" in capsys.readouterr().out
 

@@ -67,17 +67,9 @@ def test_bic_is_the_textbooks():
 
 def test_fits_keep_to_the_bounds():
     """A cube that would have to be negative stays at nothing."""
-    problem = static({"cube.size": 0.7})
-    assert best_subset.fit(replace(problem, fitted=_negated(problem)), ["cube"])["cube.size"] >= 0.0
-
-
-def _negated(problem):
-    """Records of a system with a cube of the other sign."""
-    found = []
-    for one in problem.fitted:
-        y = 2.0 * one["u"] - 0.7 * one["u"] ** 3
-        found.append(replace(one, channels={"y": y}))
-    return tuple(found)
+    problem = static({})
+    negated = (replace(r, channels={"y": 2.0 * r["u"] - 0.7 * r["u"] ** 3}) for r in problem.fitted)
+    assert best_subset.fit(replace(problem, fitted=tuple(negated)), ["cube"])["cube.size"] >= 0.0
 
 
 def test_an_effect_that_is_off_stands_where_it_is_absent():
@@ -123,28 +115,27 @@ def test_the_error_is_of_records_that_nobody_fits_relative_to_their_spread():
     spread = np.std(problem.held_out[0].channels["y"])
     off = problem.error_percent(lambda record: problem.predict(record, {"gain": 2.0}) + 0.25)
     assert off == pytest.approx(100 * 0.25 / spread)
-    names = {r.name for r in problem.fitted} & {r.name for r in problem.held_out}
-    assert not names
+    assert {r.name for r in problem.fitted}.isdisjoint(r.name for r in problem.held_out)
+
+
+CUBE = static({"cube.size": 0.7})
+NOTHING = replace(static({}), expected="none")
 
 
 @pytest.mark.parametrize(
-    ("named", "verdict", "right"),
+    ("problem", "named", "verdict", "right"),
     [
-        (("cube",), "", "yes"),
-        (("cube",), "identified", "yes"),
-        (("cube", "offset"), "", "no"),
-        ((), "unexplained", "no"),
-        (None, "", "-"),
+        (CUBE, ("cube",), "", "yes"),
+        (CUBE, ("cube",), "identified", "yes"),
+        (CUBE, ("cube", "offset"), "", "no"),
+        (CUBE, (), "unexplained", "no"),
+        (CUBE, None, "", "-"),
+        (NOTHING, (), "none", "yes"),
+        (NOTHING, (), "unexplained", "no"),
     ],
 )
-def test_right_is_neither_more_nor_less_than_what_is_there(named, verdict, right):
-    assert judged(static({"cube.size": 0.7}), RivalAnswer(named, np.zeros, verdict))[0] == right
-
-
-def test_saying_unexplained_where_nothing_is_missing_is_not_right():
-    nothing = replace(static({}), expected="none")
-    assert judged(nothing, RivalAnswer((), np.zeros, "none"))[0] == "yes"
-    assert judged(nothing, RivalAnswer((), np.zeros, "unexplained"))[0] == "no"
+def test_right_is_neither_more_nor_less_than_what_is_there(problem, named, verdict, right):
+    assert judged(problem, RivalAnswer(named, np.zeros, verdict))[0] == right
 
 
 def test_lines_are_those_of_code(tmp_path, monkeypatch):

@@ -1,1 +1,1 @@
-"""What people use, one way a file, each with `solve(problem) -> Answer`."""
+"""What people use, one way a file, each with `solve(problem) -> RivalAnswer`."""

@@ -1,10 +1,16 @@
-"""How often a model was simulated: a cost that no busy machine changes."""
+"""What work costs, by what no busy machine changes: how often a model was simulated, and seconds of the processor."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from multiprocessing import get_context
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Any
+
+
+def processor_s() -> float:
+    """Seconds of the processor that this process has used, and its children that have ended."""
+    return sum(used.ru_utime + used.ru_stime for used in map(getrusage, (RUSAGE_SELF, RUSAGE_CHILDREN)))
 
 
 class SimulationCount:
