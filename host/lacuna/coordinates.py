@@ -106,19 +106,15 @@ def of_size(p: Parameter, absent: float) -> Coordinate:
 
 def of_effect(effect: Effect) -> tuple[Effect, dict[str, Coordinate]]:
     """`effect` as it is fitted, and the coordinate of each of its parameters by its full name."""
-    chosen = {}
-    for place, p in enumerate(effect.parameters):
-        if p.name == effect.frequency:
-            chosen[p.name] = PLAIN  # fits begin at the peaks of a spectrum
-        else:
-            chosen[p.name] = of_size(p, effect.absent) if place < effect.sizes else of_parameter(p)
-    sizes = {chosen[p.name] for p in effect.parameters[: effect.sizes]}
-    if len(sizes) > 1:  # they are absent together
-        chosen |= {p.name: PLAIN for p in effect.parameters[: effect.sizes]}
-    absent = chosen[effect.parameters[0].name].fitted(effect.absent)
+    sizing, shaping = effect.parameters[: effect.sizes], effect.parameters[effect.sizes :]
+    chosen = {p.name: of_size(p, effect.absent) for p in sizing} | {p.name: of_parameter(p) for p in shaping}
+    if effect.frequency is not None:
+        chosen[effect.frequency] = PLAIN  # fits begin at the peaks of a spectrum
+    if len({chosen[p.name] for p in sizing}) > 1:  # they are absent together
+        chosen |= {p.name: PLAIN for p in sizing}
     parameters = tuple(chosen[p.name].of(p) for p in effect.parameters)
     coordinates = {effect.full_name(p): chosen[p.name] for p in effect.parameters}
-    factors = effect.start_factors
-    if factors == START_FACTORS and chosen[effect.parameters[0].name] is INVERSE:
+    size, factors = chosen[sizing[0].name], effect.start_factors
+    if factors == START_FACTORS and size is INVERSE:
         factors = LIMITS
-    return replace(effect, parameters=parameters, absent=absent, start_factors=factors), coordinates
+    return replace(effect, parameters=parameters, absent=size.fitted(effect.absent), start_factors=factors), coordinates

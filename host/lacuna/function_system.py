@@ -245,7 +245,9 @@ class FunctionSystem(System):
     def simulated_whole(self, record: Record, values: Values) -> Any:
         """What `simulate` returns, of copies and as a copy: it may return one array again and again, and is not to
         write into what was measured. Raises MisuseError, with the column, where it does."""
-        given = _copied(record)
+        given = replace(
+            record, time_s=_copy(record.time_s), inputs=_copy(record.inputs), channels=_copy(record.channels)
+        )
         found = self._called(given, values)
         if changed := _changed(record, given):
             raise MisuseError(
@@ -402,11 +404,6 @@ def _shares(found: Any, earlier: Any) -> bool:
     return any(np.may_share_memory(a, b) for a in one for b in other)
 
 
-def _copied(record: Record) -> Record:
-    inputs, channels = _copy(record.inputs), _copy(record.channels)
-    return replace(record, time_s=_copy(record.time_s), inputs=inputs, channels=channels)
-
-
 def _changed(before: Record, after: Record) -> str | None:
     """The name of a column whose samples are not what they were."""
     if not _is_same(before.time_s, after.time_s):
@@ -430,9 +427,7 @@ def _library(effects: Iterable[Effect] | Effect) -> tuple[Effect, ...]:
             if key != effect.name:
                 raise DeclarationError(f"effect {effect.name} is listed under the key {key}: use its name as the key.")
         effects = effects.values()
-    found = several(effects, Effect)
-    _all_different([e.name for e in found], "effect")
-    return found
+    return several(effects, Effect)
 
 
 def _failed(trial: Record) -> Channels:

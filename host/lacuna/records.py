@@ -20,7 +20,7 @@ from lacuna.errors import LacunaError, listed
 from lacuna.system import Record
 from lacuna.values import plain
 
-_TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # of a second
+TIMES = {"time_s": 1, "time": 1, "t": 1, "t_s": 1, "seconds": 1, "time_ms": 1000, "time_us": 1_000_000}  # of a second
 _LABELS = ("name", "experiment", "condition", "order")
 _FEWEST = 8  # samples of a stretch
 _MOST_NAMED = 8  # columns in a message
@@ -99,7 +99,7 @@ def _is_table(data: Any) -> bool:
     if _is_pandas(data) or _is_xarray(data):
         return True
     return isinstance(data, Mapping) and any(
-        name in data and not isinstance(data[name], Mapping) and np.ndim(data[name]) == 1 for name in _TIMES
+        name in data and not isinstance(data[name], Mapping) and np.ndim(data[name]) == 1 for name in TIMES
     )
 
 
@@ -121,7 +121,7 @@ def _parts(data: Any) -> list[tuple[str, Any]]:
             )
         return [(str(name), part) for name, part in data.groupby("name", sort=False)]
     if _is_xarray(data) and len(data.sizes) == 2:
-        along = next((d for d in data.sizes if d not in _TIMES), next(iter(data.sizes)))
+        along = next((d for d in data.sizes if d not in TIMES), next(iter(data.sizes)))
         names = data[along].values if along in data.coords else range(1, data.sizes[along] + 1)
         return [(str(name), data.isel({along: k})) for k, name in enumerate(names)]
     return [("record 1", data)]
@@ -137,7 +137,7 @@ def _of_columns(data: Any, name: str) -> Table:
     for label in _LABELS:
         if label in columns:
             labels[label] = _single(columns.pop(label), name, label)
-    clock = next((t for t in _TIMES if t in columns), "")
+    clock = next((t for t in TIMES if t in columns), "")
     if clock:
         time_s = columns.pop(clock)
     if time_s is None:
@@ -147,7 +147,7 @@ def _of_columns(data: Any, name: str) -> Table:
     name = str(labels.get("name", name))
     singles = {str(n): value for n, value in attrs.items() if isinstance(value, Real | np.bool_ | str)}
     inputs = {n: _own(c, name, n) for n, c in (singles | columns).items()}
-    return Table(name, _seconds(time_s, name) / _TIMES.get(clock, 1), inputs, labels, clock)
+    return Table(name, _seconds(time_s, name) / TIMES.get(clock, 1), inputs, labels, clock)
 
 
 def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]:
@@ -158,7 +158,7 @@ def _columns(data: Any, name: str) -> tuple[dict[str, Any], dict[str, Any], Any]
             raise RecordError(f"record {name} has more than one column {twice[0]!r}: give each its own name.")
         columns = {str(c): _of_series(data[c]) for c in data.columns}
         index = data.index
-        if index.name in _TIMES and index.name not in columns:
+        if index.name in TIMES and index.name not in columns:
             columns[index.name] = _of_series(index.to_series())
         dated = index.dtype.kind in "mM" or getattr(index.dtype, "tz", None) is not None
         return columns, dict(data.attrs), _of_series(index.to_series()) if dated else None
@@ -196,7 +196,7 @@ def _samples(column: Any, record: str, name: str) -> np.ndarray:
     cells = [_of_cell(cell) for cell in column.ravel()]
     if None in cells:
         at = cells.index(None)
-        seconds = "; count seconds from its start" if name in _TIMES else ""
+        seconds = "; count seconds from its start" if name in TIMES else ""
         raise RecordError(
             f"record {record}, sample {at}: column {name} is not all numbers: {column.ravel()[at]!r}{seconds}. A model"
             " computes with numbers: write some, or leave the column out."
@@ -387,7 +387,7 @@ def _names_in_remark(remarks: Sequence[list[str]], cells: list[str], file: Path,
     """The columns' names, where numpy.savetxt wrote them as a remark right above the first row of numbers, `cells`."""
     names = [cell.lstrip("#").strip() for cell in remarks[-1]] if remarks else []
     parted = all(_of_cell(cell) is not None for cell in cells)
-    if parted and len(names) == len(cells) and any(time in names for time in _TIMES):
+    if parted and len(names) == len(cells) and any(time in names for time in TIMES):
         return line - 1, names
     raise RecordError(
         f"{file.name}, line {line}: numbers where the names of the columns belong. With numpy:"

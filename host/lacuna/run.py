@@ -15,15 +15,13 @@ import numpy as np
 
 from lacuna.check.grains import grains_of
 from lacuna.check.numbers import within
-from lacuna.cores import usable_cores
 from lacuna.diagnosis import diagnose as engine
 from lacuna.diagnosis.diagnose import Diagnosis
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.errors import LacunaError, MisuseError, listed
-from lacuna.estimation.problem import use_threads
+from lacuna.estimation.problem import usable_cores, use_threads
 from lacuna.function_system import FunctionSystem
-from lacuna.misfit import compared_at_misfit
-from lacuna.noise_time import left_over_s
+from lacuna.misfit import compared_at_misfit, left_over_s
 from lacuna.progress import Progress
 from lacuna.records import Table, read, stretched
 from lacuna.system import Record, System, several

@@ -231,6 +231,15 @@ def groups_of_repeats(trials: Sequence[Record]) -> list[list[Record]]:
     return list(groups.values())
 
 
+def by_channel(trials: Iterable[Record]) -> dict[tuple[str, str], list[Record]]:
+    """Trials by experiment and channel that they have, in the order in which these first appear."""
+    found: dict[tuple[str, str], list[Record]] = defaultdict(list)
+    for trial in trials:
+        for channel in trial.channels:
+            found[trial.experiment, channel].append(trial)
+    return found
+
+
 def middle_conditions(trials: Sequence[Record]) -> tuple[tuple[str, Hashable], ...]:
     """Of each experiment with three repeated conditions or more the one between the others, by the mean of what was
     measured first: what is never fitted where nobody has said what should be."""

@@ -93,8 +93,7 @@ class Verdict:
         self.error = {side: getattr(diagnosis, side).held_out for side in ("before", "after", "floor")}
 
     def __repr__(self) -> str:
-        named = "".join(f", {e.name}" for e in self.effects)
-        return f"<{self.verdict}{named}: error {self.error['before']:.3g} to {self.error['after']:.3g} floors>"
+        return repr(self.diagnosis)
 
     def __str__(self) -> str:
         from lacuna.report.text import screen_of
@@ -123,7 +122,7 @@ class Verdict:
 
     def plot(self) -> Any:
         """A Matplotlib figure: error before and after, what was tried, and the worst predicted held-out records."""
-        from lacuna.report.overview import overview
+        from lacuna.report.figures import overview
 
         return overview(self.record, self.diagnosis)
 

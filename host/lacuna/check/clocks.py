@@ -7,9 +7,9 @@ from math import inf
 
 import numpy as np
 
+from lacuna.records import TIMES
 from lacuna.system import Parameter, Record, System
 
-_CLOCKS = ("time", "t", "t_s", "seconds", "time_ms", "time_us")  # beside time_s; inputs of these names are clocks too
 _BARE = ("time", "t")  # that do not say what they count
 _OF_SECOND = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _RATES = ("1/s", "Hz", "rad/s")
@@ -20,7 +20,7 @@ def other_clocks(trials: Sequence[Record]) -> Iterator[str]:
     """Which of two columns of times was taken, once for all trials that have both."""
     said = set()
     for trial in trials:
-        for name in (name for name in _CLOCKS if name in trial.inputs):
+        for name in (name for name in TIMES if name in trial.inputs):  # inputs of these names are clocks too
             if trial.clock and (trial.clock, name) not in said:
                 said.add((trial.clock, name))
                 yield f"Trial {trial.name}: times were taken from its column {trial.clock}; {name} is an input."

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
+from lacuna.check.model import initial, sought
 from lacuna.check.numbers import differ
 from lacuna.system import Channels, Parameter, Record, System, Theta
 
@@ -14,24 +15,16 @@ Predict = Callable[[float], Channels]
 
 
 def grains_of(system: System, trials: Sequence[Record]) -> dict[str, float]:
-    """By the full name of each parameter that acts in steps, the width of one, as it is fitted. Costs three simulations
-    of a trial for each of the other parameters."""
-    found = {}
-    for name, parameter, effects, theta in _each(system):
-        seen = [t for t in trials if all(system.effects[effect].shows_in(t) for effect in effects)]
-        if width := _width(system, theta, name, parameter, effects, seen):
-            found[name] = width
-    return found
-
-
-def _each(system: System) -> Iterator[tuple[str, Parameter, tuple[str, ...], Theta]]:
-    """Every parameter of the base model, and of each effect at its typical size."""
-    start = {p.name: p.value for p in system.parameters}
-    for p in system.parameters:
-        yield p.name, p, (), start
+    """By the full name of each parameter that acts in steps, the width of one, as it is fitted, effects at their
+    typical sizes. Costs three simulations of a trial for each of the other parameters."""
+    start = initial(system)
+    widths = {p.name: _width(system, start, p.name, p, (), trials) for p in system.parameters}
     for effect in system.effects.values():
+        seen, typical = [t for t in trials if effect.shows_in(t)], start | effect.typical
         for p in effect.parameters:
-            yield effect.full_name(p), p, (effect.name,), start | effect.typical
+            name = effect.full_name(p)
+            widths[name] = _width(system, typical, name, p, (effect.name,), seen)
+    return {name: width for name, width in widths.items() if width}
 
 
 def _width(
@@ -41,10 +34,9 @@ def _width(
     small = _SMALL * parameter.step_scale
     small = small if parameter.value + 2.0**_DOUBLED * small <= parameter.upper else -small
     for trial in trials:
-        own = {p.name: p.value for p in system.nuisances(trial)}
 
-        def predict(value: float, trial: Record = trial, own: dict[str, float] = own) -> Channels:
-            return system.predict_trials([dict(theta) | own | {name: value}], effects, [trial])[0]
+        def predict(value: float, trial: Record = trial) -> Channels:
+            return sought(system, {**theta, name: value}, effects, trial)
 
         # An initial value may lie right before an edge, as numbers that are whole in samples do.
         first, second, third = (predict(parameter.value + k * small) for k in range(3))

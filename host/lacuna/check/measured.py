@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from lacuna.check.numbers import SAME, first, spread
 from lacuna.errors import MisuseError
 from lacuna.records import falling
-from lacuna.system import Record
+from lacuna.system import Record, by_channel
 
 _FEWEST_SAMPLES = 8
 
@@ -61,16 +60,10 @@ def gaps_in_inputs(trials: Sequence[Record]) -> Iterable[str]:
 
 
 def check_constant(trials: Sequence[Record]) -> None:
-    moving: dict[tuple[str, str], bool] = defaultdict(bool)
-    example: dict[tuple[str, str], str] = {}
-    for trial in trials:
-        for name, column in trial.channels.items():
-            key = trial.experiment, name
-            example.setdefault(key, trial.name)
-            moving[key] |= spread(column) > SAME * np.nanmax(np.abs(column))
-    for (experiment, channel), moves in moving.items():
-        if not moves:
+    for (experiment, channel), members in by_channel(trials).items():
+        columns = [trial.channels[channel] for trial in members]
+        if not any(spread(column) > SAME * np.nanmax(np.abs(column)) for column in columns):
             raise MisuseError(
-                f"trial {example[experiment, channel]}, channel {channel}: constant, as in every trial of {experiment};"
+                f"trial {members[0].name}, channel {channel}: constant, as in every trial of {experiment};"
                 " there is nothing to fit. Leave it out."
             )

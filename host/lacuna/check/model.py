@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lacuna.check.numbers import SAME, differ, spread
+from lacuna.check.numbers import SAME, changed, differ, spread
 from lacuna.errors import LacunaError, MisuseError, listed
 from lacuna.records import Stretch
 from lacuna.system import Channels, Record, System, Theta
@@ -17,7 +17,7 @@ _ELSEWHERE = 0.03  # the same in an experiment where it need not be looked for, 
 _NEAR_ABSENT = 0.1  # of its typical size: how near the absent one an effect may come at least
 
 
-def initial(system: System) -> Theta:
+def initial(system: System) -> dict[str, float]:
     """The base model's initial values."""
     return {p.name: p.value for p in system.parameters}
 
@@ -86,13 +86,11 @@ def predicted(system: System, theta: Theta, effects: tuple[str, ...], trial: Rec
 
 
 def _check_deterministic(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
-    again = predicted(system, start, (), trial)
-    for name in trial.channels:
-        if differ(again[name], predictions[trial.name][name], SAME * spread(trial.channels[name])):
-            raise MisuseError(
-                f"trial {trial.name}, channel {name}: two predictions with the same parameters differ."
-                " The model must not draw random numbers or keep state between calls."
-            )
+    if name := changed(predicted(system, start, (), trial), predictions[trial.name], trial, SAME):
+        raise MisuseError(
+            f"trial {trial.name}, channel {name}: two predictions with the same parameters differ."
+            " The model must not draw random numbers or keep state between calls."
+        )
 
 
 def _check_free_run(system: System, start: Theta, trial: Record, predictions: Mapping[str, Channels]) -> None:
@@ -130,12 +128,10 @@ def _check_effects(system: System, start: Theta, trials: Sequence[Record], predi
                 theta, share = effect.typical, _ELSEWHERE
                 why = f"{trial.experiment} is none of its `experiments`: name that one, too."
             found = predicted(system, dict(start) | theta, (name,), trial)
-            for channel in trial.channels:
-                limit = share * spread(trial.channels[channel])
-                if differ(found[channel], predictions[trial.name][channel], limit):
-                    raise MisuseError(
-                        f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although {why}"
-                    )
+            if channel := changed(found, predictions[trial.name], trial, share):
+                raise MisuseError(
+                    f"trial {trial.name}, channel {channel}: effect {name} changes the prediction although {why}"
+                )
 
 
 def _never_off(system: System) -> list[str]:
@@ -168,10 +164,9 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
         ]
         seen = (t for t in trials if effect.shows_in(t))
         if not any(
-            differ(column, predictions[t.name][c], 0.0)
+            changed(sought(system, dict(start) | effect.typical | size, (name,), t), predictions[t.name], t, 0.0)
             for t in seen
             for size in sizes
-            for c, column in _sought(system, dict(start) | effect.typical | size, name, t).items()
         ):
             found.append(
                 f"Effect {name} changes no prediction, at none of its sizes that fits begin at: does the model use it,"
@@ -180,11 +175,10 @@ def _unused(system: System, start: Theta, trials: Sequence[Record], predictions:
     return found
 
 
-def _sought(system: System, theta: Theta, effect: str, trial: Record) -> Channels:
-    """A prediction far from what is known: where there is none, that is a change."""
+def sought(system: System, theta: Theta, effects: tuple[str, ...], trial: Record) -> Channels:
+    """A prediction as a search makes it, far from what is known: where there is none, that is a change."""
     theta = dict(theta) | {p.name: p.value for p in system.nuisances(trial)}
-    (found,) = system.predict_trials([theta], (effect,), [trial])
-    return {name: found[name] for name in trial.channels}
+    return system.predict_trials([theta], effects, [trial])[0]
 
 
 def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: Mapping[str, Channels]) -> list[str]:
@@ -194,9 +188,7 @@ def _idle(system: System, start: Theta, trials: Sequence[Record], predictions: M
         step = p.step_scale if p.value + p.step_scale <= p.upper else -p.step_scale
         moved = dict(start) | {p.name: min(max(p.value + step, p.lower), p.upper)}
         touched = (t for t in trials if system.matters(p.name, t))
-        if not any(
-            differ(predicted(system, moved, (), t)[c], predictions[t.name][c], 0.0) for t in touched for c in t.channels
-        ):
+        if not any(changed(predicted(system, moved, (), t), predictions[t.name], t, 0.0) for t in touched):
             idle.append(p.name)
     return idle
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from lacuna.check.model import initial, predicted
-from lacuna.check.numbers import SAME, differ, spread
+from lacuna.check.numbers import SAME, changed, fast_noise, spread
 from lacuna.errors import MisuseError, listed
-from lacuna.system import Channels, Record, System, groups_of_repeats
+from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
 _OTHER = 0.5  # of an input's spread, RMS: repeats must differ by less
 _GOOD_PART = 0.25  # of a channel's spread, RMS, that repeats differ by
@@ -39,12 +39,10 @@ def check_inputs(system: System, trials: Sequence[Record], predictions: Mapping[
     for first, other, name, its, said in _differences([t for t in trials if t.name in predictions]):
         there = replace(first, inputs={**first.inputs, name: its})
         of_column = np.ndim(its) > 0
-        changed = _changed(
-            predicted(system, initial(system), (), there), predictions[first.name], first, SAME if of_column else _OTHER
-        )
-        if changed:
+        found, share = predicted(system, initial(system), (), there), SAME if of_column else _OTHER
+        if channel := changed(found, predictions[first.name], first, share):
             raise MisuseError(
-                f"{_declared(first, other)}, but {said}, with which {changed} is predicted differently: the difference"
+                f"{_declared(first, other)}, but {said}, with which {channel} is predicted differently: the difference"
                 " would pass for noise. Give them different conditions."
             )
         if of_column:
@@ -77,7 +75,7 @@ def odd_ones(trials: Sequence[Record]) -> Iterator[str]:
         for first, other in combinations(group, 2):
             if _same_columns(first.channels, other.channels):
                 yield f"Trials {first.name} and {other.name} are the same record: a copy is no repeat. Leave it out."
-    for experiment, channel in dict.fromkeys((t.experiment, c) for t in trials for c in t.channels):
+    for experiment, channel in by_channel(trials):
         members = [group for group in groups if group[0].experiment == experiment]
         apart = [_apart(group, channel) for group in members]
         for k, (group, differences) in enumerate(zip(members, apart, strict=True)):
@@ -94,7 +92,7 @@ def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[st
             continue
         for channel in group[0].channels:
             between = float(np.median(_pairs(_apart(group, channel))))
-            within = float(np.median([_fast_noise(trial.channels[channel]) for trial in group]))
+            within = float(np.median([fast_noise(trial.time_s, trial.channels[channel]) for trial in group]))
             size = max(spread(trial.channels[channel]) for trial in group)
             if between > max(_GOOD_PART * size, _FAR_MORE * within):
                 found.append((between / size, between, within, channel, group))
@@ -105,12 +103,6 @@ def apart_for_no_reason(system: System, trials: Sequence[Record]) -> Iterator[st
             f" (RMS), where each scatters by {within:.2g}: if something was set otherwise in them, give each its own"
             " condition. What repeats differ by is taken for noise."
         )
-
-
-def _fast_noise(column: np.ndarray) -> float:
-    """What is noise from sample to sample, by second differences."""
-    known = column[np.isfinite(column)]
-    return float(np.median(np.abs(np.diff(known, 2))) / (0.6745 * np.sqrt(6.0))) if len(known) > 2 else 0.0
 
 
 def not_declared(trials: Sequence[Record]) -> Iterator[str]:
@@ -177,13 +169,6 @@ def _same_columns(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 
 def _declared(one: Record, other: Record) -> str:
     return f"trials {one.name} and {other.name} are declared as repeats (condition {one.condition})"
-
-
-def _changed(found: Channels, before: Channels, trial: Record, share: float) -> str | None:
-    """The first channel that is predicted differently, by more than that share of its spread."""
-    return next(
-        (c for c, measured in trial.channels.items() if differ(found[c], before[c], share * spread(measured))), None
-    )
 
 
 def _number_changed(one: object, other: object) -> bool:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from lacuna.diagnosis.policy import Policy
-from lacuna.diagnosis.residual_error import at_full_size, rms
+from lacuna.diagnosis.residual_error import at_full_size, rms, with_residuals
 from lacuna.diagnosis.split import Split
 from lacuna.estimation.fit import Fit, evaluate_on, fit, starting_point
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
@@ -67,7 +67,7 @@ class Candidate:
     def checked_error(self) -> tuple[int, float]:
         """How many of the trials that it was not fitted to it cannot predict at all, and the RMS residual of the
         others, large ones at their full size."""
-        return at_full_size(self.checked)
+        return at_full_size(self.judged)
 
     @cached_property
     def cost(self) -> float:
@@ -96,8 +96,7 @@ class Candidate:
     @cached_property
     def errors(self) -> dict[str, float]:
         """Of each trial that it was not fitted to, by name, the RMS residual, large ones at their full size."""
-        every = (pair for fit in self.judged for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
-        return {trial.name: rms([z]) for trial, z in every}
+        return {trial.name: rms([z]) for trial, z in with_residuals(self.judged)}
 
     @property
     def left(self) -> float:

@@ -11,10 +11,17 @@ from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, me
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.race import continued, helps_at_once
 from lacuna.diagnosis.remainder import Remainder, find_remainder
-from lacuna.diagnosis.residual_error import at_full_size, excess_over, repeat_differences, rms, share_of_gap
+from lacuna.diagnosis.residual_error import (
+    at_full_size,
+    by_trial,
+    excess_over,
+    repeat_differences,
+    rms,
+    share_of_gap,
+    with_residuals,
+)
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.clustered import intervals
 from lacuna.estimation.fit import (
     Fit,
     at_its_misfit,
@@ -30,6 +37,7 @@ from lacuna.estimation.fit import (
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
 from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import intervals
 from lacuna.system import System
 
 _SHARPENED = 5  # times at most
@@ -140,7 +148,7 @@ class Case:
         if not self.split.unseen:
             return False
         (lost, error), (lost_before, error_before) = (
-            at_full_size(evaluate_on(fitted, self.split.unseen)) for fitted in (ended, before)
+            at_full_size([evaluate_on(fitted, self.split.unseen)]) for fitted in (ended, before)
         )
         return lost > lost_before or error > _ASTRAY * error_before
 
@@ -152,8 +160,8 @@ class Case:
     def remainder(self, fitted: Fit) -> Remainder:
         """What a fit leaves, on its own trials and on the others that may inform a choice."""
         names = {t.name for t in fitted.problem.trials}
-        others = tuple(t for t in self.split.known + self.split.unseen if t.name not in names)
-        return self._tested(fitted, evaluate_on(fitted, others)) if others else self._tested(fitted)
+        others = [t for t in self.split.known + self.split.unseen if t.name not in names]
+        return self._tested(fitted, evaluate_on(fitted, others))
 
     @_once
     def suffices(self, candidate: Candidate) -> bool:
@@ -202,8 +210,8 @@ class Case:
 
     def _on_all(self, candidate: Candidate) -> list[Fit]:
         """An explanation on all trials that may inform a choice."""
-        known, unseen = self.converged(candidate), self.split.unseen
-        return [known, evaluate_on(known, unseen)] if unseen else [known]
+        known = self.converged(candidate)
+        return [known, evaluate_on(known, self.split.unseen)]
 
     def dominated(self, candidate: Candidate, better: Candidate) -> bool:
         """Whether an explanation leaves what matters beside what one that is surely better leaves. Walks that fail by
@@ -239,15 +247,12 @@ class Case:
         """The share of the base model's gap that an explanation closes on trials that it was not fitted to and that may
         inform a choice."""
         if base in self.by_turns and candidate in self.by_turns:
-            before, after = (self.by_turns[one].checked_error[1] for one in (base, candidate))
-            return share_of_gap(before, after, 1.0)  # without repeats the floor is the unit
-        before, after = (rms(c.checked.scaled_residuals()) for c in (base, candidate))
-        fits = (candidate.fitted, candidate.checked)
-        scaled = {t.name: z for f in fits for t, z in zip(f.problem.trials, f.scaled_residuals(), strict=True)}
+            base, candidate = self.by_turns[base], self.by_turns[candidate]
+        scaled = by_trial([candidate.fitted, candidate.checked])
         pairs = repeat_differences(self.split.fit, self.split.judging, scaled)[1]
-        return share_of_gap(before, after, rms(pairs) if pairs else 1.0)
+        floor = rms(pairs) if pairs else 1.0
+        return share_of_gap(base.checked_error[1], candidate.checked_error[1], floor)
 
     def _tested(self, *fits: Fit) -> Remainder:
-        trials = [trial for one in fits for trial in one.problem.trials]
-        scaled = [channels for one in fits for channels in one.scaled_residuals()]
+        trials, scaled = zip(*with_residuals(fits), strict=True)
         return find_remainder(self.system, trials, scaled, fits[0].problem.floor, policy=self.policy, seed=self.seed)

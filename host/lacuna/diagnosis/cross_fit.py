@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.residual_error import failed, rms
 from lacuna.diagnosis.search import Search
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
@@ -28,10 +26,9 @@ _REFIT: dict[str, Any] = {"max_iterations": 12, "relative": 1e-5}
 @dataclass(frozen=True, eq=False)
 class CrossFitted(Candidate):
     """An explanation `fitted` to all known records; `left_out`: its fits to the others, each on what it was not fitted
-    to; `of`: the explanation as the search found it."""
+    to."""
 
     left_out: tuple[Fit, ...]
-    of: Candidate
 
     @property
     def judged(self) -> tuple[Fit, ...]:
@@ -40,11 +37,6 @@ class CrossFitted(Candidate):
     @property
     def checked_cost(self) -> float:
         return sum(fit.cost - fit.problem.structure_prior_cost(fit.solution.point) for fit in self.left_out)
-
-    @cached_property
-    def checked_error(self) -> tuple[int, float]:
-        lost = sum(len(failed(fit.problem.trials, fit.scaled_residuals())) for fit in self.left_out)
-        return lost, rms(z for fit in self.left_out for z in fit.scaled_residuals())
 
 
 def is_due(case: Case) -> bool:
@@ -65,14 +57,14 @@ def cross_fitted(case: Case, found: Search, workers: Workers) -> Search:
     folds = [case.split.known[k::count] for k in range(count)]
     known = [case.on_known(candidate) for candidate in candidates]
     jobs = [(fit, fold) for fit in known for fold in folds]
-    names = [c.effects or ("nothing",) for c in candidates for _ in folds]
+    names = [c.effects for c in candidates for _ in folds]
     left_out = workers.map("predicting each record in turn with", names, _left_out, jobs)
     judged = case.by_turns
     for k, (candidate, fit) in enumerate(zip(candidates, known, strict=True)):
         mine = left_out[k * len(folds) : (k + 1) * len(folds)]
         unseen = evaluate_on(fit, case.split.unseen)
         left = tuple([*mine, unseen] if case.split.unseen else mine)
-        judged[candidate] = CrossFitted(fit, unseen, case.policy, left, candidate)
+        judged[candidate] = CrossFitted(fit, unseen, case.policy, left)
     return replace(
         found,
         base=judged[found.base],

@@ -6,25 +6,14 @@ import time
 from collections.abc import Collection
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import cast
 
 from lacuna.check import check
+from lacuna.diagnosis import warn
 from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.cross_fit import CrossFitted, cross_fitted, is_due
-from lacuna.diagnosis.decide import Choice, choose, dispersion_of, weigh
-from lacuna.diagnosis.doubts import (
-    but_too_little,
-    doubts,
-    follow_in_words,
-    followed_by_nothing,
-    not_predicted,
-    perhaps_absent,
-    repeats_apart,
-)
+from lacuna.diagnosis.cross_fit import cross_fitted, is_due
+from lacuna.diagnosis.decide import Choice, choose, weigh
 from lacuna.diagnosis.drift import Drift, find_drift
-from lacuna.diagnosis.eliminate import eliminate, may_be_absent
-from lacuna.diagnosis.explain_nuisances import explain_nuisances
 from lacuna.diagnosis.learn import holds, learn_correction
 from lacuna.diagnosis.named import Estimated, Named, Nearest, describe_base, describe_effects, lost_without, nearest
 from lacuna.diagnosis.next_experiment import NextExperiment, next_experiment
@@ -33,13 +22,12 @@ from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.diagnosis.race import from_elsewhere
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
+from lacuna.diagnosis.revise import eliminate, explain_nuisances, may_be_absent
 from lacuna.diagnosis.score import score
-from lacuna.diagnosis.search import Search, search
+from lacuna.diagnosis.search import Search, search, until_now
 from lacuna.diagnosis.signature import Signature, describe
 from lacuna.diagnosis.split import Split, split_trials
-from lacuna.diagnosis.stopped import STOPPED, Found, Stoppable
-from lacuna.diagnosis.warn import impossible_signs, warnings_of
-from lacuna.diagnosis.workers import OnProgress, Workers
+from lacuna.diagnosis.workers import STOPPED, OnProgress, Stoppable, Workers
 from lacuna.errors import MisuseError, TooLittleDataError
 from lacuna.estimation.fit import Fit, evaluate_on, refit_on
 from lacuna.estimation.shrink import shrunk
@@ -49,13 +37,11 @@ from lacuna.system import Correction, CorrectionSite, System
 
 @dataclass(frozen=True)
 class Left:
-    """What the named effects (or the base model) leave. `share_of_gap`: of the base model's gap; `learnt`: sites of the
-    curves that take up some of it."""
+    """What the named effects (or the base model) leave. `share_of_gap`: of the base model's gap."""
 
     remainder: Remainder
     signature: Signature
     share_of_gap: float
-    learnt: tuple[str, ...]
 
     @property
     def matters(self) -> bool:
@@ -145,9 +131,9 @@ def diagnose(
     final = shrunk(final)
     hand.on_progress("estimating how well the parameters are known")
     shown = choice.explanation if judged.verdict == "identified" else found.base
-    followed = followed_by_nothing(case.followed(shown))
+    followed = warn.followed_by_nothing(case.followed(shown))
     told = _told(case, judged, shown, final)
-    said = (*cautions, *followed, *warnings_of(told, split))
+    said = (*cautions, *followed, *warn.warnings_of(told, split))
     reported = _reported(case, found, choice, judged, (final, told), said, time.monotonic() - began)
     return replace(reported, warnings=(STOPPED, *reported.warnings)) if hand.stopped else reported
 
@@ -188,20 +174,23 @@ def _chosen(case: Case, found: Search, workers: Workers) -> Choice:
     if len(found.tried) == 1 or not is_due(case):
         return choose(found, case.policy, case.exceeds)
     choice = choose(cross_fitted(case, found, workers), case.policy, case.exceeds)
-    candidate, freed = cast(CrossFitted, choice.candidate), cast(CrossFitted | None, choice.freed)
-    return replace(choice, candidate=candidate.of, freed=freed and freed.of)
+    originals = {judged: one for one, judged in case.by_turns.items()}
+    return replace(choice, candidate=originals[choice.candidate], freed=choice.freed and originals[choice.freed])
 
 
 @dataclass(frozen=True)
 class Assessed:
-    """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), and what each
-    leaves; `unshared`: where the base model leaves what matters and repeats do not surely share, a sentence that says
-    so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict. `tested`: the share of the gap that
-    these close on the final trials; None where there is no gap, or no such trial."""
+    """The verdict and what it rests on: both models fitted to all known trials (`Case.converged`), their errors
+    `before` and `after`, and what each leaves; `unshared`: where the base model leaves what matters and repeats do not
+    surely share, a sentence that says so. `floor` and `drifts` are seen with the chosen effects, whatever the verdict.
+    `tested`: the share of the gap that these close on the final trials; None where there is no gap, or no such trial.
+    """
 
     verdict: str
     base: Fit
     explained: Fit
+    before: Error
+    after: Error
     remainder: Remainder
     left: Remainder
     unshared: str
@@ -214,18 +203,30 @@ def _judged(case: Case, found: Search, choice: Choice) -> Assessed:
     base, chosen = case.converged(found.base), case.converged(choice.explanation)
     remainder, drifts = case.remainder_of(found.base), find_drift(chosen, policy=case.policy, seed=case.seed)
     unshared = "" if remainder.matters else _unshared(case, choice, found)
-    floor = floor_of(chosen, case.split)
-    tested = _tested(case, base, chosen, floor) if remainder.matters else None
-    verdict = _verdict(case, choice, found, remainder.matters, unshared, drifts, tested)
-    explained, left = (chosen, case.remainder_of(choice.explanation)) if verdict == "identified" else (base, remainder)
-    return Assessed(verdict, base, explained, remainder, left, unshared, floor, drifts, tested)
-
-
-def _tested(case: Case, base: Fit, chosen: Fit, floor: Floor) -> float | None:
-    """The share of the gap that is closed on the final trials, which chose nothing."""
-    before, after = (error_of(fitted, case.split).held_out for fitted in (base, chosen))
+    before, after, floor = error_of(base, case.split), error_of(chosen, case.split), floor_of(chosen, case.split)
     least = floor.held_out**2 * (1.0 + case.policy.relevance)
-    return share_of_gap(before, after, floor.held_out) if before**2 > least or after**2 > least else None
+    is_gap = remainder.matters and (before.held_out**2 > least or after.held_out**2 > least)
+    tested = share_of_gap(before.held_out, after.held_out, floor.held_out) if is_gap else None
+    if remainder.matters or unshared:
+        verdict = "identified" if _explains(case, found, choice, unshared, tested) else "unexplained"
+    else:
+        verdict = "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
+    left = remainder
+    if verdict == "identified":
+        left = case.remainder_of(choice.explanation)
+    else:
+        chosen, after = base, before
+    return Assessed(verdict, base, chosen, before, after, remainder, left, unshared, floor, drifts, tested)
+
+
+def _explains(case: Case, found: Search, choice: Choice, unshared: str, tested: float | None) -> bool:
+    """Whether the chosen effects close half of the gap, wherever that is told."""
+    if not choice.candidate.effects:
+        return False
+    # of what passes for noise, or nuisances take up, there is no gap to close half of
+    hidden, half = bool(unshared or _taken_up(case, choice, found)), case.policy.half
+    closes = case.closed(choice.explanation, found.base) >= half or (hidden and case.suffices(choice.explanation))
+    return closes and (tested is None or tested >= half)
 
 
 def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -> Choice | None:
@@ -235,7 +236,7 @@ def _without_harm(case: Case, found: Search, choice: Choice, judged: Assessed) -
         return None
     lost = lost_without(case, found, choice)
     worst = min(lost, key=lost.__getitem__)
-    if lost[worst] >= -case.policy.relevance * error_of(judged.explained, case.split).held_out ** 2:
+    if lost[worst] >= -case.policy.relevance * judged.after.held_out**2:
         return None
     rest = [e for e in choice.candidate.effects if e != worst]
     smaller = found.with_effects(rest) or refitted_without(choice.candidate, rest, case.split)
@@ -249,7 +250,7 @@ def _unshared(case: Case, choice: Choice, found: Search) -> str:
         named = " and ".join(choice.candidate.effects)
         return f"What repeats share may be chance, but {named} would take away more of it than the accuracy allows."
     if choice.candidate.effects and (taken_up := _taken_up(case, choice, found)):
-        return f"{follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
+        return f"{warn.follow_in_words(taken_up)}: {' and '.join(choice.candidate.effects)} explains it."
     return ""
 
 
@@ -259,17 +260,15 @@ def _taken_up(case: Case, choice: Choice, found: Search) -> list[Followed]:
     return [one for one in case.followed(found.base) if one.nuisance not in still]
 
 
-def _doubts(
-    case: Case, choice: Choice, judged: Assessed, effects: tuple[Named, ...], errors: tuple[Error, Error]
-) -> list[str]:
-    """What speaks against a verdict that names `effects`, or none; `errors` before and with them."""
+def _doubts(case: Case, choice: Choice, judged: Assessed, effects: tuple[Named, ...]) -> list[str]:
+    """What speaks against a verdict that names `effects`, or none."""
     if judged.verdict == "none":
-        return not_predicted(judged.base, case.split, errors[0], judged.floor, case.policy)
+        return warn.not_predicted(judged.base, case.split, judged.before, judged.floor, case.policy)
     if not effects:
-        return but_too_little(choice, case.split, judged.tested, case.policy) if choice.candidate.effects else []
+        return warn.but_too_little(choice, case.split, judged.tested, case.policy) if choice.candidate.effects else []
     within, library = case.intervals(choice.candidate), case.system.effects
     absent = [name for name in choice.candidate.effects if may_be_absent(library[name], within)]
-    return [*doubts(choice, case.split, judged.tested), *perhaps_absent(absent)]
+    return [*warn.doubts(choice, case.split, judged.tested), *warn.perhaps_absent(absent)]
 
 
 def _reported(
@@ -282,13 +281,11 @@ def _reported(
     seconds: float,
 ) -> Diagnosis:
     """`fits`: the final one, and the one that is told."""
-    (final, told), split, identified = fits, case.split, judged.verdict == "identified"
-    before = error_of(judged.base, split)
-    explained = error_of(judged.explained, split) if identified else before
-    closed = share_of_gap(before.held_out, explained.held_out, judged.floor.held_out) if identified else 0.0
+    (final, told), identified, before = fits, judged.verdict == "identified", judged.before
+    closed = share_of_gap(before.held_out, judged.after.held_out, judged.floor.held_out) if identified else 0.0
     shown = choice.candidate if identified else found.base
     signature = describe(judged.explained, judged.left, judged.drifts)
-    effects = describe_effects(case, found, choice, (before, judged.floor)) if identified else ()
+    effects = describe_effects(case, found, choice, closed) if identified else ()
     return Diagnosis(
         verdict=judged.verdict,
         effects=effects,
@@ -298,23 +295,23 @@ def _reported(
         final=final,
         told=told,
         before=before,
-        after=error_of(final, split),
+        after=error_of(final, case.split),
         floor=judged.floor,
         remainder_before=judged.remainder,
         signature=describe(judged.base, judged.remainder, judged.drifts, unshared=judged.unshared),
-        left=Left(judged.left, signature, 1.0 - closed, tuple(final.structure.sites)),
+        left=Left(judged.left, signature, 1.0 - closed),
         nearest=nearest(case, found, choice if identified else None),
         warnings=(
-            *repeats_apart(judged.floor),
-            *_doubts(case, choice, judged, effects, (before, explained)),
+            *warn.repeats_apart(judged.floor),
+            *_doubts(case, choice, judged, effects),
             *said,
-            *(impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
+            *(warn.impossible_signs(judged.explained, case.policy) if judged.left.matters else ()),
         ),
         learnt=tuple((case.system.correction_sites[c.site], c) for c in final.structure.corrections(final.theta)),
-        next=_next(choice, found) if identified else NextExperiment(),
+        next=next_experiment(choice, found) if identified else NextExperiment(),
         search=found,
         choice=choice,
-        split=split,
+        split=case.split,
         drifts=judged.drifts,
         seconds=seconds,
     )
@@ -330,32 +327,12 @@ def explanations(case: Case, base: Fit, hand: Stoppable) -> Search:
     if case.suffices(first):
         screened = score(first.fitted, list(case.system.effects), hand.workers).screened()
         return Search(first, first.fitted.problem.floor, (first,), screened)
-    found = Found()
+    kept: list[Candidate] = []
     return hand.ask(
-        lambda: search(case, first, enough=case.suffices, workers=hand.workers, keep=found.keep),
-        lambda: found.search(first, case.split),
+        lambda: search(case, first, enough=case.suffices, workers=hand.workers, keep=kept.extend),
+        lambda: until_now(first, kept, case.split),
         "weighing what was found until now",
     )
-
-
-def _verdict(
-    case: Case,
-    choice: Choice,
-    found: Search,
-    matters: bool,
-    unshared: str,
-    drifts: tuple[Drift, ...],
-    tested: float | None,
-) -> str:
-    if not matters and not unshared:
-        return "unexplained" if any(d.matters(case.policy) for d in drifts) else "none"
-    if not choice.candidate.effects:
-        return "unexplained"
-    # of what passes for noise, or nuisances take up, there is no gap to close half of
-    hidden = unshared or _taken_up(case, choice, found)
-    half = case.policy.half
-    explains = case.closed(choice.explanation, found.base) >= half or (hidden and case.suffices(choice.explanation))
-    return "identified" if explains and (tested is None or tested >= half) else "unexplained"
 
 
 def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, workers: Workers | None) -> Fit:
@@ -366,7 +343,7 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, work
     parents = list(dict.fromkeys((found.base, choice.explanation))) if unexplained else [choice.explanation]
     learnt = None
     if workers and not any(case.suffices(parent) for parent in parents):
-        learnt = learn_correction(parents, split, enough=case.suffices, policy=case.policy, workers=workers)
+        learnt = learn_correction(parents, split, enough=case.suffices, workers=workers)
     offered = [learnt] if learnt and holds(case.on_known(learnt), judged.explained, split) else []
     if unexplained:
         offered += (*found.tried, *found.freed)
@@ -375,11 +352,3 @@ def _corrected(case: Case, found: Search, choice: Choice, judged: Assessed, work
         return judged.explained
     final = case.converged(best)
     return final if not split.final or holds(final, judged.explained, split) else judged.explained
-
-
-def _next(choice: Choice, found: Search) -> NextExperiment:
-    chosen = frozenset(choice.candidate.effects)
-    exchanges = [(effect, other) for effect, others in choice.confusable_with.items() for other in others]
-    rivals = [found.with_effects(chosen - {effect} | {other}) for effect, other in exchanges]
-    tried = [choice.candidate, *(rival for rival in rivals if rival is not None)]
-    return next_experiment(tried, found.floor, dispersion_of(found.tried))

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
-from lacuna.diagnosis.linear import remaining_after, stacked
-from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.race import cold, initial_guess
 from lacuna.diagnosis.residual_error import rms
+from lacuna.diagnosis.score import remaining_after
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, evaluate_on, starting_point
@@ -29,17 +27,15 @@ _COARSE: dict[str, Any] = {"max_iterations": 8, "relative": 3e-3}
 _REFINED: dict[str, Any] = {"max_iterations": 20, "relative": 3e-4}
 
 
-@dataclass(frozen=True)
-class _Promise:
+class _Promise(NamedTuple):
     """What a curve at a site would be worth: the cost that a linear regression foretells."""
 
-    candidate: Candidate
     problem: Problem
     start: Point
     cost: float
 
 
-def free_form(candidate: Candidate, split: Split, *, policy: Policy, workers: Workers) -> Candidate | None:
+def free_form(candidate: Candidate, split: Split, workers: Workers) -> Candidate | None:
     """`candidate` with the curve that helps most where one of its effects may act in another form than its formula's,
     since no real mechanism follows the formula exactly. None if none helps."""
     structure = candidate.fitted.structure
@@ -47,16 +43,11 @@ def free_form(candidate: Candidate, split: Split, *, policy: Policy, workers: Wo
     if not sites:
         return None
     promises = sorted(_promises(candidate, list(sites), split, workers), key=lambda p: p.cost)
-    return _best_grown([candidate], promises[:_FITTED], split, policy, workers)
+    return _best_grown([candidate], promises[:_FITTED], split, workers)
 
 
 def learn_correction(
-    candidates: Sequence[Candidate],
-    split: Split,
-    *,
-    enough: Callable[[Candidate], bool],
-    policy: Policy,
-    workers: Workers,
+    candidates: Sequence[Candidate], split: Split, *, enough: Callable[[Candidate], bool], workers: Workers
 ) -> Candidate | None:
     """The best curve at any of the system's sites on top of any of `candidates`, and further ones on top of that until
     `enough(candidate)`, or until none takes away its share of what is left on the trials that it was not fitted to.
@@ -69,7 +60,7 @@ def learn_correction(
         for parent in parents:
             promises = sorted([*promises, *_promises(parent, sites, split, workers)], key=lambda p: p.cost)
             sites = list(dict.fromkeys(p.problem.structure.sites[-1] for p in promises))[:_SOUGHT]
-        grown = _best_grown(parents, promises[:_FITTED], split, policy, workers)
+        grown = _best_grown(parents, promises[:_FITTED], split, workers)
         if grown is None:
             break
         best = grown
@@ -79,18 +70,16 @@ def learn_correction(
 
 
 def _best_grown(
-    parents: Sequence[Candidate], promises: Sequence[_Promise], split: Split, policy: Policy, workers: Workers
+    parents: Sequence[Candidate], promises: Sequence[_Promise], split: Split, workers: Workers
 ) -> Candidate | None:
     """The best of the curves promised on any of `parents`, fitted to the end, if it takes away its share of what the
     best of these leaves."""
     before = min(parents, key=lambda c: c.checked.cost)
+    policy = before.policy
     promises = [p for p in promises if before.cost - p.cost > _PROMISING * (before.cost - promises[0].cost)]
-    names = [(*p.candidate.effects, *p.problem.structure.sites) for p in promises]
+    names = [(*p.problem.structure.effects, *p.problem.structure.sites) for p in promises]
     lost = before.checked_error > (0, policy.lost)
-    jobs = [
-        (p.problem, p.start, initial_guess(p.problem.structure, p.candidate.fitted.theta) if lost else None)
-        for p in promises
-    ]
+    jobs = [(p.problem, p.start, lost) for p in promises]
     solutions = workers.map("learning a curve for", names, _coarse, jobs)
     fits = [Fit(p.problem, solution, 1, 1) for p, solution in zip(promises, solutions, strict=True)]
     best = min((judge(fit, split, policy) for fit in fits), key=lambda c: c.checked.cost, default=None)
@@ -105,11 +94,11 @@ def _best_grown(
     return best if best.checked_error < before.checked_error else None
 
 
-def _coarse(problem: Problem, start: Point, cold_values: np.ndarray | None) -> Solution:
+def _coarse(problem: Problem, start: Point, lost: bool) -> Solution:
     """From where the parent stands; where that may be lost, cold as well."""
     found = [solve(problem, start, **_COARSE)]
-    if cold_values is not None:
-        found.append(cold(problem, cold_values))
+    if lost:
+        found.append(cold(problem, initial_guess(problem.structure, problem.structure.theta(start.values))))
     return min(found, key=lambda s: s.cost)
 
 
@@ -126,12 +115,12 @@ def _promises(candidate: Candidate, sites: Sequence[str], split: Split, workers:
         problem = Problem(structure, split.fit, parent.problem.floor)
         start = problem.start(starting_point(parent, structure), parent.solution.point.nuisances)
         knots = range(len(parent.structure.names), len(structure.names))
-        moves, _ = stacked(problem.jacobians(start, knots, problem.first_steps()))
+        moves = np.vstack([one.dense()[0] for one in problem.jacobians(start, knots, problem.first_steps())])
         taken_up, push = basis.T @ moves, moves.T @ remaining
         own = moves.T @ moves - taken_up.T @ taken_up
         prior = problem.prior_precision[np.ix_(knots, knots)]
         gain = 0.5 * push @ np.linalg.solve(own + prior, push)
-        found.append(_Promise(candidate, problem, start, candidate.cost - float(gain)))
+        found.append(_Promise(problem, start, candidate.cost - float(gain)))
     return found
 
 

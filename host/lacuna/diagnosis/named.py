@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from lacuna.diagnosis.candidate import Candidate, refitted_without
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import Choice
-from lacuna.diagnosis.residual_error import Error, Floor, error_of, floor_of, share_of_gap
+from lacuna.diagnosis.residual_error import error_of, floor_of, share_of_gap
 from lacuna.diagnosis.search import Search
-from lacuna.estimation.fit import Fit
 from lacuna.system import Effect
 
 _NEAREST = 5
@@ -48,13 +46,13 @@ class Nearest:
     share_of_gap: float
 
 
-def describe_effects(case: Case, found: Search, choice: Choice, gap: tuple[Error, Floor]) -> tuple[Named, ...]:
-    """Every effect of the choice, in the order of what it explains of the gap between the base model's error and the
-    floor."""
+def describe_effects(case: Case, found: Search, choice: Choice, closed: float) -> tuple[Named, ...]:
+    """Every effect of the choice, in the order of what it explains of the share `closed` of the gap between the base
+    model's error and the floor."""
     candidate = choice.candidate
     fitted, within = case.settled(candidate), case.intervals(candidate)
     named = []
-    for effect, share in _shares(case, found, choice, gap):
+    for effect, share in _shares(case, found, choice, closed):
         described = fitted.structure.system.effects[effect]
         full = {p.name: described.full_name(p) for p in described.parameters}
         values = {name: fitted.theta[key] for name, key in full.items()}
@@ -74,27 +72,20 @@ def nearest(case: Case, found: Search, choice: Choice | None) -> tuple[Nearest, 
     """The best other explanations tried, with what each would close."""
     chosen = choice.candidate if choice else found.base
     others = sorted((c for c in found.tried if c.effects and c is not chosen), key=lambda c: c.cost)[:_NEAREST]
-    closes = _closing(case, *_gap(case, found))
-    return tuple(Nearest(c.effects, closes(c.fitted)) for c in others)
+    best, split = min(found.tried, key=lambda c: c.cost), case.split
+    before, floor = error_of(case.on_known(found.base), split), floor_of(case.on_known(best), split)
+    return tuple(
+        Nearest(c.effects, share_of_gap(before.held_out, error_of(c.fitted, split).held_out, floor.held_out))
+        for c in others
+    )
 
 
-def _gap(case: Case, found: Search) -> tuple[Error, Floor]:
-    best = min(found.tried, key=lambda c: c.cost)
-    return error_of(case.on_known(found.base), case.split), floor_of(case.on_known(best), case.split)
-
-
-def _closing(case: Case, before: Error, floor: Floor) -> Callable[[Fit], float]:
-    """A function that says what share of a gap a fit closes on held-out trials."""
-    return lambda fitted: share_of_gap(before.held_out, error_of(fitted, case.split).held_out, floor.held_out)
-
-
-def _shares(case: Case, found: Search, choice: Choice, gap: tuple[Error, Floor]) -> list[tuple[str, float]]:
+def _shares(case: Case, found: Search, choice: Choice, closed: float) -> list[tuple[str, float]]:
     """Each effect with its part of what they close together of the gap, the largest first."""
-    together = _closing(case, *gap)(case.converged(choice.explanation))
     lost = lost_without(case, found, choice)
     total = sum(max(each, 0.0) for each in lost.values())
     parts = {e: max(each, 0.0) / total if total > 0.0 else 1.0 / len(lost) for e, each in lost.items()}
-    return sorted(((e, together * part) for e, part in parts.items()), key=lambda one: -one[1])
+    return sorted(((e, closed * part) for e, part in parts.items()), key=lambda one: -one[1])
 
 
 def lost_without(case: Case, found: Search, choice: Choice) -> dict[str, float]:

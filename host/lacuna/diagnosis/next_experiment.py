@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate
+from lacuna.diagnosis.decide import Choice, dispersion_of
+from lacuna.diagnosis.search import Search
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.system import CandidateExperiment, Channels
 
@@ -27,16 +29,23 @@ class NextExperiment:
     gain: float = 0.0
 
 
-def next_experiment(rivals: Sequence[Candidate], floor: NoiseFloor, dispersion: float) -> NextExperiment:
-    """The experiment on offer in which the rivals' predictions differ most, against the noise of that experiment."""
+def next_experiment(choice: Choice, found: Search) -> NextExperiment:
+    """The experiment on offer in which predictions by the choice, and with each of its effects exchanged for those that
+    it may be confused with, differ most, against the noise of that experiment."""
+    chosen = frozenset(choice.candidate.effects)
+    exchanges = [(effect, other) for effect, others in choice.confusable_with.items() for other in others]
+    others = [found.with_effects(chosen - {effect} | {other}) for effect, other in exchanges]
+    rivals = [choice.candidate, *(other for other in others if other is not None)]
     if len(rivals) < 2:
         return NextExperiment()
-    system = rivals[0].fitted.structure.system
+    system, dispersion = rivals[0].fitted.structure.system, dispersion_of(found.tried)
     best = NextExperiment()
     for offer in system.candidate_experiments():
         predictions = [_predict(c, offer) for c in rivals]
         gains = [
-            expected_gain(a, b, offer, floor) / dispersion for k, a in enumerate(predictions) for b in predictions[:k]
+            expected_gain(a, b, offer, found.floor) / dispersion
+            for k, a in enumerate(predictions)
+            for b in predictions[:k]
         ]
         if min(gains) > best.gain:
             every = {name for c in rivals for name in c.effects}

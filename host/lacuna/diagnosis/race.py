@@ -15,7 +15,7 @@ import numpy as np
 
 from lacuna.diagnosis.candidate import Candidate, judge
 from lacuna.diagnosis.score import Promise
-from lacuna.diagnosis.sizes import grown, starts
+from lacuna.diagnosis.sizes import one_more
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit, best_of, renewed, spread_starts
@@ -80,9 +80,10 @@ def race(
     policy, done = parent.policy, []
     raced, rest = coarse_fits(parent, promises[:_FIRST], split, workers), list(promises[_FIRST:])
     keep(raced)
-    if raced and min(raced, key=_cost).checked_error <= (0, policy.lost):
-        done = to_the_end([min(raced, key=_cost)], split, workers)
-        raced.remove(min(raced, key=_cost))
+    leading = min(raced, key=_cost, default=None)
+    if leading and leading.checked_error <= (0, policy.lost):
+        done = to_the_end([leading], split, workers)
+        raced.remove(leading)
         keep(done)
         if enough(done[0]):
             least = policy.rival * max(one.gain for one in promises)
@@ -132,9 +133,8 @@ def cold(problem: Problem, values: np.ndarray) -> Solution:
 
 def to_the_end(candidates: Sequence[Candidate], split: Split, workers: Workers) -> list[Candidate]:
     """The explanations fitted to convergence."""
-    names = [c.effects or ("nothing",) for c in candidates]
     jobs = [(c.fitted.problem, c.fitted.solution) for c in candidates]
-    solutions = workers.map("finishing", names, converged, jobs)
+    solutions = workers.map("finishing", [c.effects for c in candidates], converged, jobs)
     each = zip(candidates, solutions, strict=True)
     ended = [judge(Fit(c.fitted.problem, s, 1, 1), split, c.policy, near=c.checked) for c, s in each]
     return [min(before, after, key=_cost) for before, after in zip(candidates, ended, strict=True)]
@@ -154,8 +154,8 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Worke
     begun = spread_starts(structure, values, 1 + _ELSEWHERE, seed)[1:]
     for start in begun:
         start[structure.base_size :] = values[structure.base_size :]
-    names = [structure.effects or ("nothing",)] * len(begun)
-    found = workers.map("from elsewhere, fitting", names, cold, [(problem, start) for start in begun])
+    jobs = [(problem, start) for start in begun]
+    found = workers.map("from elsewhere, fitting", [structure.effects] * len(jobs), cold, jobs)
     best = min(found, key=lambda s: s.cost)
     if best.cost > NEAR * fitted.cost:
         return candidate
@@ -165,21 +165,17 @@ def from_elsewhere(candidate: Candidate, split: Split, seed: int, workers: Worke
 
 def continued(parent: Fit, effects: Sequence[str], workers: Workers) -> list[Fit]:
     """Each effect more on a parent that leaves little, so that it is where it should be: a coarse fit from there."""
-    library, nuisances = parent.structure.system.effects, parent.solution.point.nuisances
-    problems = [grown(parent, effect) for effect in effects]
-    jobs = [
-        (one, starts(parent, one.structure, effect), nuisances, bool(library[effect].apart))
-        for effect, one in zip(effects, problems, strict=True)
-    ]
-    found = workers.map("trying", [p.structure.effects for p in problems], _continued, jobs)
-    return [Fit(one, solution, 1, 1) for one, solution in zip(problems, found, strict=True)]
+    library = parent.structure.system.effects
+    jobs = [(*one_more(parent, effect), bool(library[effect].apart)) for effect in effects]
+    found = workers.map("trying", [problem.structure.effects for problem, *_ in jobs], _continued, jobs)
+    return [Fit(job[0], solution, 1, 1) for job, solution in zip(jobs, found, strict=True)]
 
 
 def helps_at_once(parent: Fit, effect: str, gain: float) -> bool:
     """Whether an effect, at one of the sizes that fits begin at, gains so much log-likelihood with nothing refitted but
     what it has of its own in every trial: quickly told."""
-    problem = grown(parent, effect)
-    begun = (problem.start(v, parent.solution.point.nuisances) for v in starts(parent, problem.structure, effect))
+    problem, vectors, nuisances = one_more(parent, effect)
+    begun = (problem.start(values, nuisances) for values in vectors)
     return any(cost_of(problem, start) < parent.cost - gain for start in begun)
 
 

@@ -100,7 +100,7 @@ def _left(d: Diagnosis) -> dict[str, Any]:
         "times_floor": _number(math.sqrt(max(left.remainder.largest, 0.0))),
         "experiments": list(dict.fromkeys(experiment for experiment, _ in left.remainder.found)),
         "depends_on": list(left.signature.depends_on),
-        "learnt": list(left.learnt),
+        "learnt": [site.name for site, _ in d.learnt],
         "cannot_tell": list(left.remainder.cannot_tell),
         "text": left.signature.text,
     }

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 from lacuna.diagnosis.policy import POLICY, Policy
 from lacuna.estimation.noise import NoiseFloor, at_times
 from lacuna.estimation.problem import FAILED, SOFT_LIMIT
-from lacuna.system import Channels, Record, System
+from lacuna.system import Channels, Record, System, groups_of_repeats
 
 _DRAWS = 200
 _AT_ONCE = 2_000_000  # samples drawn together
@@ -134,17 +134,15 @@ def _of_singles(
 def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[tuple[str, str], list[np.ndarray]]:
     """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base; NaN where
     nothing was measured."""
-    groups: dict[object, list[tuple[Record, Channels]]] = defaultdict(list)
-    for trial, channels in zip(trials, scaled, strict=True):
-        groups[trial.experiment, trial.condition].append((trial, channels))
     found: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
-    for members in groups.values():
-        first, channels = members[0]
-        for channel in channels:
+    z = dict(zip((trial.name for trial in trials), scaled, strict=True))
+    for members in groups_of_repeats(trials):
+        first = members[0]
+        for channel in z[first.name]:
             rows = [
-                _compressed(at_times(first.time_s, t.time_s, _with_failures(c[channel], t.channels[channel])))
-                for t, c in members
-                if channel in c
+                _compressed(at_times(first.time_s, t.time_s, _with_failures(z[t.name][channel], t.channels[channel])))
+                for t in members
+                if channel in z[t.name]
             ]
             found[first.experiment, channel].append(np.array(rows))
     return found

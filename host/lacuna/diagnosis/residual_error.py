@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,15 +38,11 @@ class Floor:
 
 def error_of(fitted: Fit, split: Split) -> Error:
     """Errors of a fit on its own trials and on trials that it has not seen."""
-    known = dict(zip((t.name for t in fitted.problem.trials), fitted.scaled_residuals(), strict=True))
-    unseen = _on(fitted, split.final)
+    known, unseen = by_trial([fitted]), by_trial([evaluate_on(fitted, split.final)])
+    held_out, scaled = {trial.experiment for trial in split.final}, known | unseen
     by_experiment: dict[str, list[Channels]] = defaultdict(list)
-    for trial in split.final:
-        by_experiment[trial.experiment].append(unseen[trial.name])
-    held_out = set(by_experiment)
-    for trial in fitted.problem.trials:
-        if trial.experiment not in held_out:
-            by_experiment[trial.experiment].append(known[trial.name])
+    for trial in (*split.final, *(t for t in fitted.problem.trials if t.experiment not in held_out)):
+        by_experiment[trial.experiment].append(scaled[trial.name])
     return Error(
         rms(known.values()),
         rms(unseen.values()),
@@ -58,7 +54,7 @@ def error_of(fitted: Fit, split: Split) -> Error:
 def floor_of(fitted: Fit, split: Split) -> Floor:
     """The floor on the same trials, from the differences between repeats' residuals."""
     known, others = fitted.problem.trials, (*fitted.problem.trials, *split.unseen)
-    scaled = dict(zip((t.name for t in known), fitted.scaled_residuals(), strict=True)) | _on(fitted, split.not_fitted)
+    scaled = by_trial([fitted, evaluate_on(fitted, split.not_fitted)])
     fit_pairs = repeat_differences(known, (), scaled)[0]
     held_out_pairs = repeat_differences(others, split.final, scaled)[1]
     condition_pairs = repeat_differences(split.unseen, split.conditions, scaled)[1]
@@ -86,8 +82,7 @@ def excess_over(fits: Sequence[Fit], other: Sequence[Fit], accuracy: Callable[[s
 def _mean_squares(fits: Sequence[Fit]) -> dict[tuple[str, str], float]:
     """By experiment and channel, of the residuals that there are."""
     squares: dict[tuple[str, str], list[float]] = defaultdict(list)
-    every = (pair for fit in fits for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
-    for trial, channels in every:
+    for trial, channels in with_residuals(fits):
         for channel, z in channels.items():
             known = z[np.isfinite(trial.channels[channel])]
             squares[trial.experiment, channel].append(float(np.mean(np.nan_to_num(known, nan=FAILED) ** 2)))
@@ -114,25 +109,29 @@ def rms(members: Iterable[Channels]) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 
 
-def failed(trials: Sequence[Record], scaled: Sequence[Channels]) -> list[str]:
-    """Names of the trials that a fit cannot predict: no simulation, or one that was given up."""
+def with_residuals(fits: Iterable[Fit]) -> Iterator[tuple[Record, Channels]]:
+    """Every trial of these fits with its residuals, in standard deviations of the floor."""
+    return (pair for fit in fits for pair in zip(fit.problem.trials, fit.scaled_residuals(), strict=True))
+
+
+def by_trial(fits: Iterable[Fit]) -> dict[str, Channels]:
+    """The same residuals by the trial's name."""
+    return {trial.name: channels for trial, channels in with_residuals(fits)}
+
+
+def failed(every: Iterable[tuple[Record, Channels]]) -> list[str]:
+    """Names of the trials `with_residuals` that a fit cannot predict: no simulation, or one that was given up."""
     return [
         trial.name
-        for trial, channels in zip(trials, scaled, strict=True)
+        for trial, channels in every
         if any(not np.isfinite(z[np.isfinite(trial.channels[c])]).all() for c, z in channels.items())
     ]
 
 
-def at_full_size(fitted: Fit) -> tuple[int, float]:
-    """How many of its trials a fit cannot predict, and the RMS residual of the others, none compressed."""
-    scaled = fitted.scaled_residuals()
-    return len(failed(fitted.problem.trials, scaled)), rms(scaled)
-
-
-def _on(fitted: Fit, trials: Sequence[Record]) -> dict[str, Channels]:
-    if not trials:
-        return {}
-    return dict(zip((t.name for t in trials), evaluate_on(fitted, trials).scaled_residuals(), strict=True))
+def at_full_size(fits: Iterable[Fit]) -> tuple[int, float]:
+    """How many of their trials fits cannot predict, and the RMS residual of the others, none compressed."""
+    every = list(with_residuals(fits))
+    return len(failed(every)), rms(channels for _, channels in every)
 
 
 def _difference(first: Record, second: Record, residuals: Mapping[str, Channels]) -> Channels:

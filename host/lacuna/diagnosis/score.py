@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from lacuna.diagnosis.linear import remaining_after
-from lacuna.diagnosis.sizes import grown, starts
+from lacuna.diagnosis.sizes import one_more
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.problem import Point, Problem
@@ -66,7 +66,6 @@ class Scores:
     residual by; of what is left of that after the parent's own parameters the `squares`, and `push`, its product with
     what the parent leaves, negative where it takes away from it. `square`: of what the parent leaves."""
 
-    parent: Fit
     secants: tuple[Promise, ...]
     whole: np.ndarray
     squares: np.ndarray
@@ -109,17 +108,12 @@ def score(parent: Fit, effects: Sequence[str], workers: Workers) -> Scores:
     """What each of `effects` could take away from what `parent` leaves, at each of its sizes."""
     basis, remaining = remaining_after(parent)
     reference = np.concatenate(parent.problem.residuals(parent.solution.point))
-    problems = [grown(parent, effect) for effect in effects]
-    jobs = [
-        (one, starts(parent, one.structure, e), parent.solution.point.nuisances)
-        for e, one in zip(effects, problems, strict=True)
-    ]
-    moved = workers.map("scoring", [p.structure.effects for p in problems], _moved, jobs)
-    secants = tuple(Promise(one, start) for one, (begun, _) in zip(problems, moved, strict=True) for start in begun)
+    jobs = [one_more(parent, effect) for effect in effects]
+    moved = workers.map("scoring", [problem.structure.effects for problem, *_ in jobs], _moved, jobs)
+    secants = tuple(Promise(job[0], start) for job, (begun, _) in zip(jobs, moved, strict=True) for start in begun)
     changes = np.array([row - reference for _, rows in moved for row in rows]).reshape(len(secants), len(reference)).T
     left = changes - basis @ (basis.T @ changes)
     return Scores(
-        parent,
         secants,
         np.linalg.norm(changes, axis=0),
         np.maximum(np.square(left).sum(axis=0), 1e-12),
@@ -134,3 +128,26 @@ def _moved(
     """Where a fit would begin at each size, and the residuals there."""
     begun = [problem.start(values, nuisances) for values in sizes]
     return begun, [np.concatenate(problem.residuals(start)) for start in begun]
+
+
+def remaining_after(fitted: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """An orthonormal basis, (n, q), of what the fit's parameters and nuisances can move the residuals by, and the
+    residuals, (n,), less that."""
+    problem, point = fitted.problem, fitted.solution.point
+    every = range(len(fitted.structure.names))
+    taken = fitted.solution.sensitivities or problem.jacobians(point, every, problem.first_steps())
+    by_structure, by_nuisances = zip(*(one.dense() for one in taken), strict=True)
+    basis = _orthonormal(np.hstack([np.vstack(by_structure), block_diag(*by_nuisances)]))
+    residual = np.concatenate(problem.residuals(point))
+    return basis, residual - basis @ (basis.T @ residual)
+
+
+def _orthonormal(matrix: np.ndarray) -> np.ndarray:
+    norms = np.linalg.norm(matrix, axis=0)
+    kept = matrix[:, norms > 0] / norms[norms > 0]
+    if kept.shape[1] == 0:
+        return np.zeros((matrix.shape[0], 0))
+    # by the Gram matrix: the columns are few and the rows many
+    values, vectors = np.linalg.eigh(kept.T @ kept)
+    good = values > 1e-10 * values[-1]
+    return kept @ (vectors[:, good] / np.sqrt(values[good]))

@@ -95,7 +95,7 @@ def search(
             ranked = _ranked(tried, size)
         if enough(ranked[0]):
             break
-        if own := free_form(ranked[0], split, policy=case.policy, workers=workers):
+        if own := free_form(ranked[0], split, workers):
             freed.append(own)
             if ranked[0].left < case.policy.half * tried[frozenset()].left and enough(own):
                 break
@@ -104,6 +104,17 @@ def search(
             break
         keep_best(tried, raced(ranked[0], promises))
     return Search(tried[frozenset()], floor, tuple(tried.values()), scores.screened(), tuple(freed))
+
+
+def until_now(base: Candidate, kept: Sequence[Candidate], split: Split) -> Search:
+    """What a search that was stopped would have returned: of what it has `kept`, the best candidate for each set, all
+    against the latest floor."""
+    floor = (kept[-1] if kept else base).fitted.problem.floor
+    tried: dict[frozenset[str], Candidate] = {}
+    keep_best(tried, (c if c.fitted.problem.floor is floor else reweighed(c, split, floor) for c in (base, *kept)))
+    first = tried[frozenset()]
+    screened = score(first.fitted, list(first.fitted.structure.system.effects), Workers(lambda _: None)).screened()
+    return Search(first, floor, tuple(tried.values()), screened)
 
 
 def keep_best(tried: dict[frozenset[str], Candidate], found: Iterable[Candidate]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,18 +103,14 @@ def _predicted_share(make: _Rows, check: _Rows, names: tuple[str, ...]) -> float
     edges = [_edges(np.concatenate([q[n] for _, q in make])) for n in names]
     shape = tuple(len(e) + 1 for e in edges)
     total, count = np.zeros(shape), np.zeros(shape)
-    for z, quantities in make:
-        known = np.isfinite(z)
-        at = _cells(quantities, names, edges, known)
-        np.add.at(total, at, z[known])
+    for z, at in _placed(make, names, edges):
+        np.add.at(total, at, z)
         np.add.at(count, at, 1)
     mean = total / np.maximum(count, 1)
     left = whole = 0.0
-    for z, quantities in check:
-        known = np.isfinite(z)
-        at = _cells(quantities, names, edges, known)
-        left += float(((z[known] - mean[at]) ** 2).sum())
-        whole += float((z[known] ** 2).sum())
+    for z, at in _placed(check, names, edges):
+        left += float(((z - mean[at]) ** 2).sum())
+        whole += float((z**2).sum())
     return 1 - left / max(whole, 1e-12)
 
 
@@ -125,10 +121,13 @@ def _edges(samples: np.ndarray) -> np.ndarray:
     return np.unique(np.quantile(samples, np.linspace(0, 1, _BINS + 1)[1:-1]))
 
 
-def _cells(
-    quantities: Mapping[str, np.ndarray], names: Sequence[str], edges: Sequence[np.ndarray], known: np.ndarray
-) -> tuple[np.ndarray, ...]:
-    return tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
+def _placed(
+    rows: _Rows, names: Sequence[str], edges: Sequence[np.ndarray]
+) -> Iterator[tuple[np.ndarray, tuple[np.ndarray, ...]]]:
+    """Of each trial the residuals that were measured, and the cells that they lie in."""
+    for z, quantities in rows:
+        known = np.isfinite(z)
+        yield z[known], tuple(np.searchsorted(e, quantities[n][known]) for n, e in zip(names, edges, strict=True))
 
 
 def _cannot_tell(remainder: Remainder, experiments: Sequence[str]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from lacuna.diagnosis.spectrum import peaks
@@ -29,6 +31,12 @@ def starts(parent: Fit, structure: Structure, effect: str) -> list[np.ndarray]:
     if described.frequency is None:
         return vectors
     return [v for vector in vectors for v in _at_peaks(parent, structure, described, vector)]
+
+
+def one_more(parent: Fit, effect: str) -> tuple[Problem, list[np.ndarray], Sequence[np.ndarray]]:
+    """What a fit with an effect more begins with: its problem, the starting vectors, and the parent's nuisances."""
+    problem = grown(parent, effect)
+    return problem, starts(parent, problem.structure, effect), parent.solution.point.nuisances
 
 
 def sized(structure: Structure, base: np.ndarray, effect: str, factor: float) -> list[np.ndarray]:

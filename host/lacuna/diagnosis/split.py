@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 
 from lacuna.errors import MisuseError, TooLittleDataError, listed
@@ -82,15 +82,16 @@ def split_trials(
         parts["select"] += parts["final"]
         parts["final"] = [t for t in trials if t.name in test]
         _check_test(**parts)
-        return _split(trials, parts)
-    known = {key for role in ("fit", "select", "unseen") for trial in parts[role] for key in _channels(trial)}
-    alone = [trial for trial in parts["final"] if not _channels(trial) <= known]
-    if not (parts["select"] or parts["unseen"] or alone):
-        parts["select"], parts["final"] = parts["final"][:1], parts["final"][1:]
-    for trial in alone:
-        parts["final"].remove(trial)
-        parts["fit"].append(trial)
-    return _split(trials, parts)
+    else:
+        known = {key for role in ("fit", "select", "unseen") for trial in parts[role] for key in _channels(trial)}
+        alone = [trial for trial in parts["final"] if not _channels(trial) <= known]
+        if not (parts["select"] or parts["unseen"] or alone):
+            parts["select"], parts["final"] = parts["final"][:1], parts["final"][1:]
+        for trial in alone:
+            parts["final"].remove(trial)
+            parts["fit"].append(trial)
+    order = {trial.name: k for k, trial in enumerate(trials)}
+    return Split(**{role: tuple(sorted(ts, key=lambda t: order[t.name])) for role, ts in parts.items()})
 
 
 def _check_test(fit: list[Record], select: list[Record], unseen: list[Record], final: list[Record]) -> None:
@@ -107,11 +108,6 @@ def _check_test(fit: list[Record], select: list[Record], unseen: list[Record], f
                 f"test names {trial.name}, but no other record has {listed(sorted(alone))}, to say how noisy it is:"
                 " leave it out of the test."
             )
-
-
-def _split(trials: Sequence[Record], parts: Mapping[str, list[Record]]) -> Split:
-    order = {trial.name: k for k, trial in enumerate(trials)}
-    return Split(**{role: tuple(sorted(ts, key=lambda t: order[t.name])) for role, ts in parts.items()})
 
 
 def _channels(trial: Record) -> set[tuple[str, str]]:

@@ -1,4 +1,5 @@
-"""Who does the work: children of this process, a core each; an executor's workers; or this process itself."""
+"""Who does the work: children of this process, a core each; an executor's workers; or this process itself. And who
+stops it."""
 
 from __future__ import annotations
 
@@ -9,14 +10,17 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import active_children, current_process, get_context
-from typing import Any
+from typing import Any, TypeVar
 
 from lacuna.estimation.problem import cores, use_threads
 
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
+STOPPED = "The search was stopped by hand: the verdict is based on the best result found so far."
+
 OnProgress = Callable[[str], None]
 Jobs = Sequence[tuple[Any, ...]]
+Answer = TypeVar("Answer")
 
 
 class Workers:
@@ -29,11 +33,11 @@ class Workers:
         self._forks = forks and sys.platform == "linux" and not current_process().daemon
 
     def map(self, doing: str, names: Sequence[Sequence[str]], function: Callable[..., Any], jobs: Jobs) -> list[Any]:
-        """`function(*job)` for each of `jobs`, in their order; `names` are the effects that each is about."""
+        """`function(*job)` for each of `jobs`, in their order; `names` are the effects, if any, that each is about."""
         found = []
         with self._working(function, jobs) as results:
             for effects in names:
-                self.on_progress(f"{doing} {' + '.join(effects)}")
+                self.on_progress(f"{doing} {' + '.join(effects) or 'nothing'}")
                 found.append(next(results))
         return found
 
@@ -80,3 +84,26 @@ def _begin(function: Callable[..., Any], jobs: Jobs) -> None:
 def _do(index: int) -> Any:
     function, jobs = _work
     return function(*jobs[index])
+
+
+class Stoppable:
+    """A diagnosis in steps that still gives a verdict when it is interrupted: once Ctrl-C has stopped it, every further
+    step gives its short answer, from what was finished by then. `stopped`: whether that has happened."""
+
+    def __init__(self, workers: Workers) -> None:
+        self.workers, self.stopped = workers, False
+
+    def on_progress(self, what: str) -> None:
+        """Once stopped, nothing: what was said of that stays to be read."""
+        if not self.stopped:
+            self.workers.on_progress(what)
+
+    def ask(self, full: Callable[[], Answer], short: Callable[[], Answer], said: str) -> Answer:
+        """The full answer; where it is stopped, `said` is shown, and the answer is short."""
+        if not self.stopped:
+            try:
+                return full()
+            except KeyboardInterrupt:
+                self.workers.on_progress(f"stopped: {said} (Ctrl-C again gives up)")
+                self.stopped = True
+        return short()

@@ -118,19 +118,13 @@ def best_of(problem: Problem, solutions: Sequence[Solution]) -> Fit:
 
 
 def refit_on(
-    fitted: Fit,
-    trials: Sequence[Record],
-    *,
-    near: Sequence[Fit] = (),
-    max_iterations: int = 20,
-    relative: float = RELATIVE,
+    fitted: Fit, trials: Sequence[Record], *, near: Sequence[Fit], max_iterations: int = 20, relative: float = RELATIVE
 ) -> Fit:
     """The same structure fitted to other trials, from where it stands. `near`: fits that know the nuisances of all of
-    these trials; without them these begin at their means."""
+    these trials."""
     problem = fitted.problem.over(trials)
-    values = fitted.solution.point.values
     known = {name: nuisances for one in near for name, nuisances in _by_name(one).items()}
-    start = Point(values, tuple(known[t.name] for t in trials)) if near else problem.start(values)
+    start = Point(fitted.solution.point.values, tuple(known[t.name] for t in trials))
     solution = solve(problem, start, max_iterations=max_iterations, relative=relative)
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
@@ -180,7 +174,7 @@ def at_its_misfit(fitted: Fit) -> Fit:
 
 def released(fitted: Fit) -> Fit:
     """The fit as it stands, what was known from its trials beforehand standing back."""
-    problem = fitted.problem.released()
+    problem = fitted.problem.with_prior(released=True)
     cost = cost_of(problem, fitted.solution.point)
     return Fit(problem, replace(fitted.solution, cost=cost), fitted.starts, fitted.starts_agreeing)
 
@@ -229,7 +223,7 @@ def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = Non
     # where all were asked, their residuals are still remembered
     problem = asked if len(asked.trials) == len(trials) else fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))
-    solution = Solution(point, cost_of(problem, point), True, 0, (), np.zeros((0, 0)), ())
+    solution = Solution(point, cost_of(problem, point), True, (), np.zeros((0, 0)), ())
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 

@@ -18,7 +18,6 @@ from lacuna.estimation.solve import RELATIVE, Solution, solve
 
 _FAR, _NEARER, _CLOSE = View(1 / 20, 30.0, 30.0), View(1 / 60, 10.0, 30.0), View(1 / 200, 3.0, 30.0)
 _ISOLATED = (_FAR, _NEARER, _CLOSE)
-_TOGETHER = (_FAR, _NEARER)
 _PLACES = View(raised=10.0)
 _NEAR, _MOST = 1e-3, 40  # of the cost: where a search from a distance may stop; iterations at most
 _SAME = 0.2  # scales: places that end within this of one another are one
@@ -31,12 +30,17 @@ def solve_graduated(
 ) -> Solution:
     """Minimise the cost from `values`, wherever they are. Parameters of which something was known beforehand begin
     there, and stay until the others are near."""
-    values, every = _fitted_to_isolated(problem, values), range(len(values))
-    isolated = _isolated(problem)
-    hidden = [j for j in every if not any(problem.structure.moves(j, t) for t in isolated.trials)]
-    starts = [values, *_elsewhere(isolated, values, _free(problem))]
+    structure, every = problem.structure, range(len(values))
+    isolated = problem.over([t for t in problem.trials if structure.system.isolates(t)])
+    free = [i for i, p in enumerate(structure.parameters) if p.prior_sd is None]
+    values = np.where(np.isin(every, free), values, structure.prior_mean())
+    if isolated.trials:  # a small part of the whole work
+        values = _followed(isolated, values, _ISOLATED, free).point.values
+        values = _followed(isolated, values, (SHARP,), every).point.values
+    hidden = [j for j in every if not any(structure.moves(j, t) for t in isolated.trials)]
+    starts = [values, *_elsewhere(isolated, values, free)]
     # what isolated trials have fitted waits at first: a walk seen from a distance says little of it
-    for view, moving in zip(_TOGETHER, (hidden, every), strict=True):
+    for view, moving in ((_FAR, hidden), (_NEARER, every)):
         found = [_followed(problem, start, (view,), moving, max_iterations) for start in starts]
         least = min(one.cost for one in found)
         found = [one for one in found if one.cost <= max(_ENOUGH, _HOPEFUL * least)]
@@ -44,26 +48,6 @@ def solve_graduated(
     # alike: where it began stays
     best = found[0] if least > _BETTER * found[0].cost else min(found, key=lambda one: one.cost)
     return solve(problem, problem.start(best.point.values), max_iterations=max_iterations, relative=relative)
-
-
-def _fitted_to_isolated(problem: Problem, values: np.ndarray) -> np.ndarray:
-    """Where the trials that isolate parameters lead, a small part of the whole work."""
-    free = _free(problem)
-    values = np.where(np.isin(np.arange(len(values)), free), values, problem.structure.prior_mean())
-    isolated = _isolated(problem)
-    if not isolated.trials:
-        return values
-    values = _followed(isolated, values, _ISOLATED, free).point.values
-    return _followed(isolated, values, (SHARP,), range(len(values))).point.values
-
-
-def _free(problem: Problem) -> tuple[int, ...]:
-    return tuple(i for i, p in enumerate(problem.structure.parameters) if p.prior_sd is None)
-
-
-def _isolated(problem: Problem) -> Problem:
-    isolates = problem.structure.system.isolates
-    return problem.over([t for t in problem.trials if isolates(t)])
 
 
 def _followed(

@@ -19,9 +19,9 @@ from numpy.polynomial.hermite_e import hermegauss
 from scipy.ndimage import median_filter
 from scipy.optimize import brentq
 
-from lacuna.estimation.autocorrelation import correlation_samples
-from lacuna.estimation.sampling import evenly, sample_period
-from lacuna.system import Channels, Record, System, groups_of_repeats
+from lacuna.check.numbers import fast_noise
+from lacuna.estimation.sampling import correlation_samples, evenly, sample_period
+from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
@@ -103,24 +103,22 @@ def estimate_noise(
     nuisances leaves is a sharper basis than the measurements themselves, and what the model gets wrong
     alike in all repeats cancels.
     """
+    measured = {trial.name: trial.channels for trial in trials}
+    basis = measured if residuals is None else residuals
     by_key: dict[tuple[str, str], list[tuple[Record, Record]]] = defaultdict(list)
-    solo: dict[tuple[str, str], list[Record]] = defaultdict(list)
-    for trial in trials:
-        for channel in trial.channels:
-            solo[trial.experiment, channel].append(trial)
     for first, second in repeat_pairs(trials):
         for channel in first.channels.keys() & second.channels.keys():
-            if np.isfinite(_difference(first, second, channel, None)).any():
+            if np.isfinite(_difference(first, second, channel, measured)).any():
                 by_key[first.experiment, channel].append((first, second))
     channels = {}
-    for key, members in solo.items():
+    for key, members in by_channel(trials).items():
         sensor = system.sensor_noise(*key)
         if pairs := by_key.get(key):
-            channels[key] = _from_pairs(pairs, key[1], sensor, residuals)
+            channels[key] = _from_pairs(pairs, key[1], sensor, basis)
         elif correlated_s := system.noise_time_s(*key):
-            channels[key] = _of_correlated(members, key[1], correlated_s, sensor, residuals)
+            channels[key] = _of_correlated(members, key[1], correlated_s, sensor, basis)
         else:
-            channels[key] = _of_fast_noise(members, key[1], sensor, residuals)
+            channels[key] = _offast_noise(members, key[1], sensor, basis)
     return NoiseFloor(channels)
 
 
@@ -131,14 +129,11 @@ def repeat_pairs(trials: Sequence[Record]) -> Iterator[tuple[Record, Record]]:
 
 
 def _from_pairs(
-    pairs: Sequence[tuple[Record, Record]],
-    channel: str,
-    sensor: float,
-    residuals: Mapping[str, Channels] | None,
+    pairs: Sequence[tuple[Record, Record]], channel: str, sensor: float, basis: Mapping[str, Channels]
 ) -> ChannelNoise:
     differences, moving = [], []
     for first, second in pairs:
-        differences.append(_difference(first, second, channel, residuals))
+        differences.append(_difference(first, second, channel, basis))
         also = np.interp(first.time_s, second.time_s, _moves(second, channel).astype(float)) > 0
         moving.append(_moves(first, channel) | also)
     everything = np.concatenate(differences)
@@ -157,29 +152,23 @@ def _from_pairs(
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
 
 
-def _of_fast_noise(
-    members: Sequence[Record], channel: str, sensor: float, residuals: Mapping[str, Channels] | None
+def _offast_noise(
+    members: Sequence[Record], channel: str, sensor: float, basis: Mapping[str, Channels]
 ) -> ChannelNoise:
     """Without repeats, told nothing: from the fast noise of residuals (without them of the records, as an upper bound,
     since a record may itself be fast)."""
-    known = [(t.time_s, t.channels if residuals is None else residuals[t.name]) for t in members]
-    sd = float(np.median([_fast_noise(time_s, samples[channel]) for time_s, samples in known]))
+    sd = float(np.median([fast_noise(trial.time_s, basis[trial.name][channel]) for trial in members]))
     return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, 1.0, 0)
 
 
 def _of_correlated(
-    members: Sequence[Record],
-    channel: str,
-    correlated_s: float,
-    sensor: float,
-    residuals: Mapping[str, Channels] | None,
+    members: Sequence[Record], channel: str, correlated_s: float, sensor: float, basis: Mapping[str, Channels]
 ) -> ChannelNoise:
     """Without repeats, told how long the noise remembers itself: from what residuals (without them the records, as an
     upper bound) change by within that time, since what changes more slowly is no noise."""
     changes, pieces = [], []
     for trial in members:
-        samples = trial.channels[channel] if residuals is None else residuals[trial.name][channel]
-        period, samples = sample_period(trial.time_s), evenly(trial.time_s, samples)
+        period, samples = sample_period(trial.time_s), evenly(trial.time_s, basis[trial.name][channel])
         lag = min(max(1, round(correlated_s / period)), len(samples) // 2)
         kept = np.exp(-period / correlated_s)
         changes.append((samples[lag:] - samples[:-lag]) / np.sqrt(2.0 * (1.0 - kept**lag)))
@@ -188,11 +177,9 @@ def _of_correlated(
     return ChannelNoise(max(sd, sensor, _smallest(members, channel)), 0.0, float(np.median(pieces)), 0)
 
 
-def _difference(first: Record, second: Record, channel: str, residuals: Mapping[str, Channels] | None) -> np.ndarray:
+def _difference(first: Record, second: Record, channel: str, basis: Mapping[str, Channels]) -> np.ndarray:
     """(first - second) / sqrt(2) on the first's time base: of the same variance as the noise of either."""
-    a, b = first.channels[channel], second.channels[channel]
-    if residuals is not None:
-        a, b = residuals[first.name][channel], residuals[second.name][channel]
+    a, b = basis[first.name][channel], basis[second.name][channel]
     known = np.isfinite(b)
     if known.sum() < 2:
         return np.full(a.shape, np.nan)
@@ -210,7 +197,7 @@ def _moves(trial: Record, channel: str) -> np.ndarray:
     window_s = max(1, round(_WINDOW_S / period)) * period
     smooth = _smooth(samples)
     later, sooner = (np.interp(time_s + way * window_s, time_s, smooth) for way in (1, -1))
-    return np.abs(later - sooner) > _MOVING_SIGMAS * max(_fast_noise(time_s, samples), 1e-12)
+    return np.abs(later - sooner) > _MOVING_SIGMAS * max(fast_noise(time_s, samples), 1e-12)
 
 
 def _jitter(
@@ -253,18 +240,6 @@ def _shift_variance(
 
 def _smooth(samples: np.ndarray) -> np.ndarray:
     return median_filter(samples, size=3, mode="nearest")
-
-
-def _fast_noise(time_s: np.ndarray, samples: np.ndarray) -> float:
-    """Standard deviation of white noise in a smooth record, from how far each sample is off the line through its
-    neighbours; robust against jumps."""
-    known = np.isfinite(samples)
-    at, seen = time_s[known], samples[known]
-    if len(seen) < 3:
-        return 0.0
-    share = (at[1:-1] - at[:-2]) / (at[2:] - at[:-2])
-    bends = seen[1:-1] - (1.0 - share) * seen[:-2] - share * seen[2:]
-    return float(1.4826 * np.median(np.abs(bends) / np.sqrt(1.0 + (1.0 - share) ** 2 + share**2)))
 
 
 def _smallest(trials: Sequence[Record], channel: str) -> float:

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lacuna.cores import usable_cores
 from lacuna.estimation.noise import NoiseFloor
 from lacuna.estimation.sampling import even_grid
 from lacuna.estimation.sensitivity import Sensitivity
@@ -29,6 +28,11 @@ _MOST = 1e8  # standard deviations: what is further off ran away, and counts as 
 
 
 _threads: int | None = None
+
+
+def usable_cores() -> int:
+    """How many this process may run on; where the system does not tell (macOS, Windows), all."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def cores() -> int:
@@ -143,16 +147,10 @@ class Problem:
         other.view = view
         return other
 
-    def released(self) -> Problem:
-        """The same problem, what was known from its trials beforehand standing back (`Parameter.prior_from_trials`)."""
+    def with_prior(self, *, released: bool = False, sizes: Mapping[str, float] | None = None) -> Problem:
+        """The same problem with another prior (`Structure.prior_precision`)."""
         other = copy(self)
-        other._prior = self.structure.prior_precision(released=True)
-        return other
-
-    def sized(self, sizes: Mapping[str, float]) -> Problem:
-        """The same problem, the knots of learnt curves as far from zero as `sizes` has it, by site."""
-        other = copy(self)
-        other._prior = self.structure.prior_precision(sizes=sizes)
+        other._prior = self.structure.prior_precision(released, sizes)
         return other
 
     def over(self, trials: Sequence[Record], floor: NoiseFloor | None = None) -> Problem:
@@ -160,11 +158,6 @@ class Problem:
         other = Problem(self.structure, trials, floor or self.floor, self.view)
         other._prior = self._prior
         return other
-
-    def predict(self, point: Point, index: int, *, coarse: bool = False) -> Channels:
-        """Channels of trial `index`."""
-        found = self._simulate([(point.values, point.nuisances[index])], index, coarse=coarse)[0]
-        return self._within_reach(found, index)
 
     def predict_all(self, point: Point) -> list[Channels]:
         return self._of_each(point, self._within_reach)
@@ -300,23 +293,21 @@ class Problem:
 
     def _of_each(self, point: Point, finish: Callable[[Channels, int], Any], *, coarse: bool = False) -> list[Any]:
         """`finish(prediction, index)` of each trial."""
+        structure, theta = self.structure, self.structure.theta(point.values)
+        learnt = structure.corrections(theta)
         found: list[Any] = [None] * len(self.trials)
 
         def together(members: Sequence[int]) -> None:
-            for i, prediction in zip(members, self._simulate_trials(point, members, coarse=coarse), strict=True):
+            thetas = [theta | self.named(i, point.nuisances[i]) for i in members]
+            trials, corrections = [self.trials[i] for i in members], [learnt] * len(members)
+            predictions = structure.system.predict_trials(
+                thetas, structure.effects, trials, coarse=coarse, corrections=corrections
+            )
+            for i, prediction in zip(members, predictions, strict=True):
                 found[i] = finish(prediction, i)
 
         in_parallel(together, self._together, [sum(self.sizes[i] for i in pack) for pack in self._together])
         return found
-
-    def _simulate_trials(self, point: Point, members: Sequence[int], *, coarse: bool) -> list[Channels]:
-        theta = self.structure.theta(point.values)
-        corrections = [self.structure.corrections(theta)] * len(members)
-        thetas = [theta | self.named(i, point.nuisances[i]) for i in members]
-        trials = [self.trials[i] for i in members]
-        return self.structure.system.predict_trials(
-            thetas, self.structure.effects, trials, coarse=coarse, corrections=corrections
-        )
 
     def named(self, index: int, nuisances: np.ndarray) -> dict[str, float]:
         """The nuisances of a trial by their names."""

@@ -36,7 +36,7 @@ def shrunk(fitted: Fit) -> Fit:
         own = np.array([solution.free.index(place) for place in places])
         sizes[name], told = likeliest_size(values[places], known[np.ix_(own, own)], _NONE * site.scale)
         values[places[~told]] = 0.0
-    problem, begin = fitted.problem.sized(sizes), replace(solution.point, values=values)
+    problem, begin = fitted.problem.with_prior(sizes=sizes), replace(solution.point, values=values)
     solution = solve(problem, begin, free=solution.free, sensitivities=solution.sensitivities)
     return replace(fitted, problem=problem, solution=solution)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from itertools import accumulate, pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -42,7 +43,6 @@ class Solution:
     point: Point
     cost: float
     converged: bool
-    iterations: int
     free: tuple[int, ...]
     normal: np.ndarray
     sensitivities: tuple[Sensitivity, ...]
@@ -74,26 +74,25 @@ def solve(
     never taken: cheap steps. The search ends where the next step promises less than `relative` of the cost.
     """
     free = tuple(range(len(problem.structure.names)) if free is None else free)
-    here = _begun(problem, start, free)
+    lower, upper, _ = _limits(problem, start, free)
+    here = _Place.at(problem, start, free, np.clip(_pack(start, free), lower, upper))
     scale = _limits(problem, here.point, free)[2]
     keep, steps = sensitivities is not None, problem.first_steps()
     if sensitivities is None:
         sensitivities = problem.jacobians(here.point, free, steps)
-    damping, converged, iteration = _LAMBDA_START, False, 0
+    damping, converged = _LAMBDA_START, False
     age = 0  # steps since the derivatives were taken
-    while iteration < max_iterations:
-        iteration += 1
-        taken, damping, little = _descended(
+    for _ in range(max_iterations):
+        there, kept, damping, little = _descended(
             problem, here, free, sensitivities, damping, relative, once=age > 0 and not keep
         )
-        if taken:
-            enough = here.cost - taken.there.cost < max(ENOUGH, relative * taken.there.cost)
-            change = (here.residuals, taken.there.residuals)
-            here = taken.there
-            if keep or (taken.ratio > _TRUSTED and age < _OLDEST and not enough):
-                sensitivities, age = _corrected(sensitivities, taken.step, scale, *change, len(free)), age + 1
+        if there:
+            enough = here.cost - there.cost < max(ENOUGH, relative * there.cost)
+            before, here = here, there
+            if keep or (kept > _TRUSTED and age < _OLDEST and not enough):
+                sensitivities, age = _corrected(sensitivities, before, here, scale, len(free)), age + 1
                 continue
-            if enough and (age == 0 or taken.ratio > _PREDICTED):
+            if enough and (age == 0 or kept > _PREDICTED):
                 converged = True
                 break
         elif age == 0:
@@ -104,9 +103,7 @@ def solve(
         steps = problem.tuned_steps(steps, free, [np.diag(s.gram) for s in sensitivities])
         sensitivities, age = problem.jacobians(here.point, free, steps), 0
     normal, _ = _linearize(problem, here, free, sensitivities)
-    return Solution(
-        here.point, here.cost, converged, iteration, free, _eliminate(normal, len(free)), tuple(sensitivities)
-    )
+    return Solution(here.point, here.cost, converged, free, _eliminate(normal, len(free)), tuple(sensitivities))
 
 
 @dataclass(frozen=True)
@@ -119,21 +116,13 @@ class _Place:
     cost: float
 
     @classmethod
-    def at(cls, problem: Problem, point: Point, free: tuple[int, ...]) -> _Place:
+    def at(cls, problem: Problem, old: Point, free: tuple[int, ...], x: np.ndarray) -> _Place:
+        """At `x`, with what is not free as at `old`, and no parameter below one that it cannot be below."""
+        values = old.values.copy()
+        values[list(free)] = x[: len(free)]
+        nuisances = tuple(x[own] for own in _own_places(map(len, old.nuisances), len(free)))
+        point = Point(problem.structure.lifted(values), nuisances)
         return cls(point, _pack(point, free), problem.residuals(point), cost_of(problem, point))
-
-
-class _Taken(NamedTuple):
-    """A step that led down. `ratio`: of what was promised, what it kept."""
-
-    there: _Place
-    step: np.ndarray
-    ratio: float
-
-
-def _begun(problem: Problem, start: Point, free: tuple[int, ...]) -> _Place:
-    lower, upper, _ = _limits(problem, start, free)
-    return _Place.at(problem, _allowed(problem, _unpack(start, free, np.clip(_pack(start, free), lower, upper))), free)
 
 
 def _descended(
@@ -145,9 +134,10 @@ def _descended(
     relative: float,
     *,
     once: bool,
-) -> tuple[_Taken | None, float, bool]:
-    """A step from `here` that leads down, damped the more the oftener it did not (one try where derivatives are old,
-    `once`); the damping for the next; and whether the last step tried promised too little to be worth it."""
+) -> tuple[_Place | None, float, float, bool]:
+    """Where a step from `here` leads down, damped the more the oftener it did not (one try where derivatives are old,
+    `once`), and how much it kept of what it promised; the damping for the next; and whether the last step tried
+    promised too little to be worth it."""
     system = _linearize(problem, here, free, sensitivities)
     lower, upper, scale = _limits(problem, here.point, free)
     reach = _REACH * scale
@@ -158,37 +148,26 @@ def _descended(
         step, promise = _step(*system, here.x, *bounds, scale, damping)
         if promise < least:
             break
-        there = _Place.at(problem, _allowed(problem, _unpack(here.point, free, here.x + step)), free)
+        there = _Place.at(problem, here.point, free, here.x + step)
         ratio = (here.cost - there.cost) / promise
         if there.cost < here.cost:
             damping = max(1e-9, damping * (0.2 if ratio > 0.5 else 1.0 if ratio > 0.2 else 3.0))
-            return _Taken(there, there.x - here.x, ratio), damping, False
+            return there, ratio, damping, False
         damping, growth = max(damping, 1e-6) * growth, 2.0 * growth
         if once:
             break
-    return None, damping, promise < least
+    return None, 0.0, damping, promise < least
 
 
 def _corrected(
-    sensitivities: Sequence[Sensitivity],
-    step: np.ndarray,
-    scale: np.ndarray,
-    before: Sequence[np.ndarray],
-    after: Sequence[np.ndarray],
-    p: int,
+    sensitivities: Sequence[Sensitivity], before: _Place, after: _Place, scale: np.ndarray, p: int
 ) -> tuple[Sensitivity, ...]:
-    found, at = [], p
-    for one, old, new in zip(sensitivities, before, after, strict=True):
-        q = one.gram.shape[0] - p
-        own = slice(at, at + q)
+    found, step = [], after.x - before.x
+    places = _own_places((one.nuisances for one in sensitivities), p)
+    for one, own, old, new in zip(sensitivities, places, before.residuals, after.residuals, strict=True):
         moved, sizes = (np.concatenate([v[:p], v[own]]) for v in (step, scale))
         found.append(one.corrected(moved, sizes, new - old))
-        at += q
     return tuple(found)
-
-
-def _allowed(problem: Problem, point: Point) -> Point:
-    return Point(problem.structure.lifted(point.values), point.nuisances)
 
 
 def _limits(problem: Problem, point: Point, free: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -216,14 +195,9 @@ def _pack(point: Point, free: tuple[int, ...]) -> np.ndarray:
     return np.concatenate([point.values[list(free)], *point.nuisances])
 
 
-def _unpack(point: Point, free: tuple[int, ...], x: np.ndarray) -> Point:
-    values = point.values.copy()
-    values[list(free)] = x[: len(free)]
-    nuisances, at = [], len(free)
-    for old in point.nuisances:
-        nuisances.append(x[at : at + len(old)])
-        at += len(old)
-    return Point(values, tuple(nuisances))
+def _own_places(counts: Iterable[int], p: int) -> list[slice]:
+    """Where each trial's so many nuisances stand in a vector that begins with the p free parameters."""
+    return [slice(begin, end) for begin, end in pairwise(accumulate(counts, initial=p))]
 
 
 def _linearize(
@@ -238,22 +212,19 @@ def _linearize(
     normal[:p, :p] = prior[np.ix_(free, free)]
     gradient[:p] = (prior @ problem.prior_shift(point))[list(free)]
     gradients = in_parallel(lambda pair: pair[1].gradient(pair[0]), zip(here.residuals, sensitivities, strict=True))
-    at = p
-    for one, change, nuisance, parameters in zip(
-        sensitivities, gradients, point.nuisances, problem.nuisances, strict=True
+    places = _own_places(map(len, point.nuisances), p)
+    for one, own, change, nuisance, parameters in zip(
+        sensitivities, places, gradients, point.nuisances, problem.nuisances, strict=True
     ):
-        q = len(nuisance)
-        own = slice(at, at + q)
         normal[:p, :p] += one.gram[:p, :p]
         gradient[:p] += change[:p]
-        if q:
+        if parameters:
             spread = np.array([n.step_scale for n in parameters])
             means = np.array([n.value for n in parameters])
             normal[:p, own] = one.gram[:p, p:]
             normal[own, :p] = one.gram[p:, :p]
             normal[own, own] = one.gram[p:, p:] + np.diag(spread**-2.0)
             gradient[own] = change[p:] + (nuisance - means) / spread**2
-        at += q
     return normal, gradient
 
 

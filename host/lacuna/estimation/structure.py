@@ -57,11 +57,8 @@ class Structure:
 
     def start(self) -> np.ndarray:
         """Start of the base, effects absent (their size at its null, other parameters typical), corrections zero."""
-        values = self.theta(np.array([p.value for p in self.parameters]))
-        for name in self.effects:
-            effect = self.system.effects[name]
-            values |= dict.fromkeys(effect.size_names, effect.absent)
-        return self.values(values)
+        effects = [self.system.effects[name] for name in self.effects]
+        return self.values({size: effect.absent for effect in effects for size in effect.size_names})
 
     def prior_mean(self) -> np.ndarray:
         return np.array([p.value for p in self.parameters])

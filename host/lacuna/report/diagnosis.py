@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.report.evidence import draw_errors, draw_learnt, draw_weights
+from lacuna.report.figures import draw_errors, draw_held_out, draw_learnt, draw_tried, draw_weights
 from lacuna.report.measured import floor_sentence, measured_rows
-from lacuna.report.overview import draw_held_out, draw_tried
 from lacuna.report.page import Page, PageTable, Section, both_palettes
 from lacuna.report.sentence import next_in_words, number_in_words, own_form, share_in_words, verdict_sentence
 
@@ -41,7 +41,7 @@ def diagnosis_page(name: str, record: Mapping[str, Any], found: Diagnosis | None
 def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
     if not effects:
         return []
-    figure = both_palettes(lambda stream, dark: draw_weights(effects, stream, dark), "weight of each effect named")
+    figure = both_palettes(partial(draw_weights, effects), "weight of each effect named")
     rows = [
         (", ".join(filter(None, (_words(e["name"]), own_form(e)))), _sized(e), share_in_words(e["share_of_gap"]))
         for e in effects
@@ -51,16 +51,14 @@ def _evidence(effects: Sequence[Mapping[str, Any]]) -> list[Section]:
 
 
 def _errors(error: Mapping[str, Any]) -> Section:
-    figure = both_palettes(
-        lambda stream, dark: draw_errors(error, stream, dark), "error before and after by experiment, on a log axis"
-    )
+    figure = both_palettes(partial(draw_errors, error), "error before and after by experiment, on a log axis")
     return Section("Error before and after", figures=(figure,))
 
 
 def _held_out(found: Diagnosis) -> Section:
     which = "records that were not fitted" if found.split.final else "all records, which were fitted"
     figure = both_palettes(
-        lambda stream, dark: draw_held_out(found, stream, dark),
+        partial(draw_held_out, found),
         f"measured and predicted, before and after, on {which}",
         "The records that the base model predicts worst. Left: measured and predicted; right: the residual.",
     )
@@ -72,7 +70,7 @@ def _rejected(record: Mapping[str, Any]) -> list[Section]:
         return []
     rows = [(_words(" + ".join(r["effects"])), share_in_words(r["share_of_gap"])) for r in record["nearest"]]
     table = PageTable(("explanation", "would close"), rows)
-    tried = both_palettes(lambda stream, dark: draw_tried(record, stream, dark), "what each explanation leaves")
+    tried = both_palettes(partial(draw_tried, record), "what each explanation leaves")
     why = (
         "An explanation is rejected if it predicts conditions that were never fitted no better than a smaller one,"
         " if it closes too little of the gap, or if a rival explains the same and more."
@@ -82,7 +80,7 @@ def _rejected(record: Mapping[str, Any]) -> list[Section]:
 
 def _learnt(curve: Mapping[str, Any]) -> Section:
     text = f"Added to the model: a curve for {curve['term']}."
-    figure = both_palettes(lambda stream, dark: draw_learnt(curve, stream, dark), f"the curve over {curve['variable']}")
+    figure = both_palettes(partial(draw_learnt, curve), f"the curve over {curve['variable']}")
     return Section("Learnt from the data", (text,), figures=(figure,))
 
 

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-
 from lacuna.diagnosis.diagnose import Diagnosis
-from lacuna.system import Record
-
-Row = tuple[str, str, str, str, str]
+from lacuna.system import by_channel
 
 
-def measured_rows(diagnosis: Diagnosis) -> list[Row]:
+def measured_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str, str, str]]:
     """By experiment and channel: records, conditions, floor, and samples that count as one."""
-    groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
-    for trial in diagnosis.base.structure.system.trials:
-        for channel in trial.channels:
-            groups[trial.experiment, channel].append(trial)
     rows = []
-    for (experiment, channel), trials in groups.items():
+    for (experiment, channel), trials in by_channel(diagnosis.base.structure.system.trials).items():
         noise = diagnosis.search.floor.of(experiment, channel)
         conditions = len({t.condition for t in trials})
         basis = _pairs(noise.repeats) if noise.repeats else "the fast noise of the residual"
@@ -33,7 +25,8 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
     alone = sorted({channel for (_, channel), noise in channels.items() if not noise.repeats})
     if not alone:
         return f"The floor comes from the differences between {_pairs(repeats)}."
-    told = {c: noise_time for c in alone if (noise_time := _noise_time(diagnosis, c))}
+    time_s = diagnosis.base.structure.system.noise_time_s
+    told = {c: seconds for c in alone if (seconds := max(time_s(*key) for key in channels if key[1] == c))}
     if len(told) == len(alone):
         listed = ", ".join(f"{seconds:.3g} s of {channel}" for channel, seconds in told.items())
         return (
@@ -48,8 +41,3 @@ def floor_sentence(diagnosis: Diagnosis) -> str:
 
 def _pairs(count: int) -> str:
     return "one pair of repeats" if count == 1 else f"{count} pairs of repeats"
-
-
-def _noise_time(diagnosis: Diagnosis, channel: str) -> float:
-    system = diagnosis.base.structure.system
-    return max(system.noise_time_s(*key) for key in diagnosis.search.floor.channels if key[1] == channel)

@@ -18,20 +18,12 @@ COLORS = {  # by role; what is quiet is still to be read
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing in both palettes; `alt` says in words what it shows."""
+    """A drawing in both palettes, each as a data URI; `alt` says in words what it shows."""
 
-    light_png: bytes
-    dark_png: bytes
+    light: str
+    dark: str
     alt: str
     caption: str = ""
-
-    @property
-    def light(self) -> str:
-        return _data_uri(self.light_png)
-
-    @property
-    def dark(self) -> str:
-        return _data_uri(self.dark_png)
 
 
 @dataclass(frozen=True)
@@ -84,10 +76,13 @@ class Page:
 
 def both_palettes(draw: Callable[[BytesIO, bool], None], alt: str, caption: str = "") -> Figure:
     """A figure from `draw(stream, dark)`, which writes a PNG."""
-    light, dark = BytesIO(), BytesIO()
-    draw(light, False)
-    draw(dark, True)
-    return Figure(light.getvalue(), dark.getvalue(), alt, caption)
+
+    def data_uri(dark: bool) -> str:
+        png = BytesIO()
+        draw(png, dark)
+        return "data:image/png;base64," + base64.b64encode(png.getvalue()).decode()
+
+    return Figure(data_uri(False), data_uri(True), alt, caption)
 
 
 def render(page: Page) -> str:
@@ -109,7 +104,3 @@ def environment(*more: jinja2.BaseLoader) -> jinja2.Environment:
 def style() -> Markup:
     """The rules of every page, which name colours by the roles of `COLORS`."""
     return Markup(files("lacuna.report").joinpath("page.css").read_text(encoding="utf-8"))
-
-
-def _data_uri(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode()

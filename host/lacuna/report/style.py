@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 
@@ -54,15 +53,15 @@ def figure_style(dark: bool = False) -> Iterator[Palette]:
 
 @contextmanager
 def drawn(
-    path: Path | BytesIO, dark: bool, size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any
+    stream: BytesIO, dark: bool, size: tuple[float, float], rows: int = 1, columns: int = 1, **how: Any
 ) -> Iterator[tuple[Any, Palette]]:
-    """The axes of a figure of so many inches, which is written at the end of the block; `how`: of `plt.subplots`."""
+    """The axes of a figure of so many inches, written as PNG at the end of the block; `how`: of `plt.subplots`."""
     with figure_style(dark) as palette:
         import matplotlib.pyplot as plt
 
         figure, axes = plt.subplots(rows, columns, figsize=size, **how)
         yield axes, palette
-        figure.savefig(path, format=path.suffix[1:] if isinstance(path, Path) else "png")
+        figure.savefig(stream, format="png")
         plt.close(figure)
 
 

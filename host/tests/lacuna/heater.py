@@ -10,6 +10,9 @@ from scipy.signal import lfilter
 
 import lacuna
 from lacuna import Effect, Parameter
+from lacuna.check import check
+from lacuna.run import with_records
+from lacuna.values import Values
 
 SAMPLE_S, NOISE_K = 0.5, 0.05
 TIME_S = np.arange(0.0, 120.0, SAMPLE_S)
@@ -22,6 +25,7 @@ OFFSET = Effect("offset", Parameter("power_W", "W", 0.5, -5.0, 5.0))
 LIMITED = Effect("saturation", Parameter("limit_W", "W", 8.0, 1.0, np.inf), absent=np.inf)
 DEAD = Effect("dead_band", Parameter("half_W", "W", 0.5, 0.0, 4.0))
 INVERSE = Effect("saturation", Parameter("per_limit_1_W", "1/W", 0.125, 0.0, 1.0))
+EFFECTS = (SENSOR, OFFSET, LIMITED, DEAD)
 
 
 def simulate(record, theta):
@@ -34,13 +38,28 @@ def simulate(record, theta):
     return {"temperature_K": lag(temperature, theta.sensor_lag.lag_s)}
 
 
-def lag(samples, tau_s):
-    keep = np.exp(-SAMPLE_S / tau_s) if tau_s > 0.0 else 0.0
+def lag(samples, tau_s, sample_s=SAMPLE_S):
+    keep = np.exp(-sample_s / tau_s) if tau_s > 0.0 else 0.0
     return lfilter([1.0 - keep], [1.0, -keep], samples)
 
 
 def system(*effects, **told):
-    return lacuna.System(simulate, PARAMETERS, effects or (SENSOR, OFFSET, LIMITED, DEAD), **told)
+    return lacuna.System(simulate, PARAMETERS, effects or EFFECTS, **told)
+
+
+def bare(record, theta):
+    """Temperature above ambient, K, without any effect."""
+    return lag(theta.gain_K_W * record["power_W"], theta.tau_s)
+
+
+def modelled(simulate, *parameters, **told):
+    """The block as `simulate` has it, with more `parameters`; without effects if none are told."""
+    return lacuna.System(simulate, (*PARAMETERS, *parameters), outputs="temperature_K", **told)
+
+
+def said_of(records, given=None):
+    """What is said of records before a search. Raises MisuseError."""
+    return check(with_records(given or system(), records))
 
 
 def power(kind, size, time_s=TIME_S):
@@ -57,6 +76,16 @@ def measured(power_W, seed, **hidden):
     values = known.values({name: known.coordinate(name).fitted(value) for name, value in theta.items()})
     clean = simulate({"power_W": power_W}, values)["temperature_K"]
     return clean + NOISE_K * draw.standard_normal(len(clean))
+
+
+def residuals_of(records, names):
+    """What a block leaves of records, by the values of the parameters `names`: a function for SciPy's fits."""
+
+    def residuals(values):
+        theta = Values(system().values({}) | dict(zip(names, values, strict=True)))
+        return np.concatenate([one["temperature_K"] - simulate(one, theta)["temperature_K"] for one in records])
+
+    return residuals
 
 
 def records(repeats=3, seed=0, **hidden):

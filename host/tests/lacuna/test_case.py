@@ -1,20 +1,16 @@
 """What a verdict rests on: fits that were not led astray, and explanations that were begun in more than one place."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from toy import NOBODY, case_of, hide
+from toy import NOBODY, case_of, hide, moved
 
 from lacuna.diagnosis import case as case_module
 from lacuna.diagnosis import race as race_module
 from lacuna.diagnosis.case import Case
-from lacuna.diagnosis.linear import remaining_after
 from lacuna.diagnosis.race import from_elsewhere
-from lacuna.diagnosis.score import score
+from lacuna.diagnosis.score import remaining_after, score
 from lacuna.diagnosis.search import led_out, search, with_derivatives
 from lacuna.estimation.fit import Fit, fit, reweigh
-from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 
 
@@ -26,50 +22,47 @@ def case():
     return case_of(system, [(first.experiment, first.condition)])
 
 
-def moved(fitted: Fit, by: float) -> Fit:
-    """The fit with its first parameter so many scales away."""
-    values = fitted.solution.point.values + by * fitted.structure.scales() * np.eye(len(fitted.theta))[0]
-    point = replace(fitted.solution.point, values=values)
-    solution = replace(fitted.solution, point=point, cost=cost_of(fitted.problem, point))
-    return Fit(fitted.problem, solution, 1, 1)
+@pytest.fixture
+def right(case):
+    """The base model, fitted."""
+    return case.judge(case.fit_base(1))
+
+
+def astray_by(fitted: Fit, scales: float) -> Fit:
+    return moved(fitted, mass_kg=fitted.theta["mass_kg"] + 0.1 * scales)
 
 
 @pytest.mark.parametrize(("by", "believed"), [(0.0, True), (2.0, False)])
-def test_a_fit_that_plain_least_squares_lead_astray_is_not_what_a_verdict_rests_on(case, monkeypatch, by, believed):
+def test_a_fit_led_astray_by_plain_least_squares_is_not_what_a_verdict_rests_on(case, right, monkeypatch, by, believed):
     assert case.split.unseen
-    candidate = case.judge(case.fit_base(1))
-    ended = moved(case.on_known(candidate), by)
+    ended = astray_by(case.on_known(right), by)
     monkeypatch.setattr(case_module, "converged", lambda fitted: ended)
-    assert (case.converged(candidate) is ended) is believed
+    assert (case.converged(right) is ended) is believed
 
 
-def test_what_a_better_explanation_takes_away_matters_whatever_repeats_share(case, monkeypatch):
+def test_what_a_better_explanation_takes_away_matters_whatever_repeats_share(case, right, monkeypatch):
     """A tenth of the floor, RMS, of the noise alone is no more than is relevant."""
-    right = case.judge(case.fit_base(1))
-    a_little, much = (case.judge(moved(right.fitted, by)) for by in (0.003, 0.3))
+    a_little, much = (case.judge(astray_by(right.fitted, by)) for by in (0.003, 0.3))
     monkeypatch.setattr(Case, "converged", lambda self, candidate: candidate.fitted)
     assert not case.dominated(right, much)
     assert not case.dominated(a_little, right)
     assert case.dominated(much, right)
 
 
-def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case):
-    right = case.judge(case.fit_base(1))
-    astray = case.judge(moved(right.fitted, 0.3))
+def test_an_explanation_in_a_wrong_minimum_is_found_from_elsewhere(case, right):
+    astray = case.judge(astray_by(right.fitted, 0.3))
     assert astray.cost > right.cost + 10.0
     assert from_elsewhere(astray, case.split, 0, NOBODY).cost < right.cost + 1.0
 
 
-def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, monkeypatch):
-    right = case.judge(case.fit_base(1))
-    worse = moved(right.fitted, 0.1).solution
+def test_what_starts_elsewhere_do_not_improve_stays_as_it_is(case, right, monkeypatch):
+    worse = astray_by(right.fitted, 0.1).solution
     for name in ("solve_graduated", "solve", "renewed"):
         monkeypatch.setattr(race_module, name, lambda *_, **__: worse)
     assert from_elsewhere(right, case.split, 0, NOBODY) is right
 
 
-def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):
-    right = case.judge(case.fit_base(1))
+def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case, right):
     floor = right.fitted.problem.floor
     bare = reweigh(right.fitted, floor, max_iterations=0)
     assert bare.cost == pytest.approx(right.fitted.cost)
@@ -80,20 +73,18 @@ def test_a_fit_reweighed_without_steps_can_be_weighed_again_and_grown(case):
     assert np.abs(basis.T @ remaining).max() < 1e-6 * np.linalg.norm(remaining)
 
 
-def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case):
-    right = case.judge(case.fit_base(1))
+def test_a_base_model_in_a_wrong_minimum_is_led_out_by_a_fit_with_an_effect(case, right):
     floor = right.fitted.problem.floor
     delayed = case.judge(fit(Structure(case.system, ("delay",)), case.split.fit, floor))
-    astray = case.judge(moved(right.fitted, 0.3))
+    astray = case.judge(astray_by(right.fitted, 0.3))
     assert led_out(astray, [delayed], case.split).cost < right.cost + 1.0
     assert led_out(astray, [], case.split) is None
     assert led_out(right, [delayed], case.split) is None
 
 
 @pytest.mark.slow
-def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case):
-    right = case.judge(case.fit_base(1))
-    found = search(case, case.judge(moved(right.fitted, 0.3)), enough=case.suffices, workers=NOBODY)
+def test_a_search_from_a_lost_base_fit_ends_with_the_right_one(case, right):
+    found = search(case, case.judge(astray_by(right.fitted, 0.3)), enough=case.suffices, workers=NOBODY)
     assert found.base.cost < right.cost + 1e-3 * right.cost, "as far as such a refit goes"
     assert case.suffices(found.base)
 

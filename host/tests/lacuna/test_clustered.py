@@ -4,10 +4,10 @@ import numpy as np
 
 import lacuna
 from lacuna import Parameter
-from lacuna.estimation.clustered import clustered_covariance, intervals
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.structure import Structure
+from lacuna.estimation.uncertainty import clustered_covariance, intervals
 from lacuna.run import with_records
 
 TIME_S = np.linspace(0.0, 10.0, 60)

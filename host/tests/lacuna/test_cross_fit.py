@@ -19,13 +19,9 @@ def simulate(record, theta):
     return {"y": theta.level + theta.bend.per_x2 * record["x"] ** 2}
 
 
-def system():
-    return lacuna.System(
-        simulate,
-        [Parameter("level", "", 1.0, -10.0, 10.0)],
-        [Effect("bend", Parameter("per_x2", "", 0.5, -5.0, 5.0))],
-        sensor_noise={"y": NOISE},
-    )
+def system(simulate=simulate, *decoys):
+    effects = (Effect("bend", Parameter("per_x2", "", 0.5, -5.0, 5.0)), *decoys)
+    return lacuna.System(simulate, Parameter("level", "", 1.0, -10.0, 10.0), effects, sensor_noise={"y": NOISE})
 
 
 def records(seed, count, bend=0.0, steps=0.0, **more):
@@ -78,10 +74,7 @@ def test_an_effect_is_judged_alone_though_more_sets_than_are_compared_cost_less_
         tilts = sum(theta[f"decoy_{k}.per_x"] * np.sin((k + 1) * record["x"]) for k in range(12))
         return {"y": simulate(record, theta)["y"] + tilts}
 
-    library = [Effect("bend", Parameter("per_x2", "", 0.5, -5.0, 5.0)), *decoys]
-    told = with_records(
-        lacuna.System(with_decoys, system().parameters, library, sensor_noise={"y": NOISE}), records(3, 7, bend=0.6)
-    )
+    told = with_records(system(with_decoys, *decoys), records(3, 7, bend=0.6))
     case = case_of(told)
     base = case.judge(case.fit_base(1))
     floor, known = base.fitted.problem.floor, case.split.fit

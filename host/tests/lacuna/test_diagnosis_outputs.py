@@ -1,18 +1,16 @@
-"""What a diagnosis is handed on as: a page, and an exit status where the input is unusable."""
+"""What a diagnosis is handed on as: a page, a record, and words of doubt."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
 from toy import hide
 
 from lacuna.diagnosis.diagnose import diagnose
-from lacuna.diagnosis.doubts import but_too_little, doubts
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.record import as_record
 from lacuna.diagnosis.remainder import Remainder
 from lacuna.diagnosis.signature import describe
+from lacuna.diagnosis.warn import but_too_little, doubts
 from lacuna.report.diagnosis import diagnosis_page
 from lacuna.report.page import render
 
@@ -33,8 +31,8 @@ def test_page_says_the_effect_and_loads_nothing(found):
     assert 'src="http' not in page
 
 
-def test_page_shows_what_was_learnt_where_no_effect_explains_the_data():
-    record = as_record(diagnose(hide({"cubic_spring.stiffness_N_m3": 2000.0}, seed=15, withhold=["cubic_spring"])))
+def test_page_shows_what_was_learnt_where_no_effect_explains_the_data(withheld_spring):
+    record = as_record(withheld_spring)
     (curve,) = record["learnt"]
     assert curve["term"] in render(diagnosis_page("toy", record))
     assert curve["rows"][""][-1] * curve["rows"][""][0] < 0.0
@@ -55,9 +53,8 @@ def test_what_is_named_is_not_what_the_data_would_hardly_show(found):
     assert "delay" not in hidden
 
 
-def test_where_something_matters_it_is_told_where():
+def test_where_something_matters_it_is_told_where(found):
     """By the test that decides, however many standard deviations that is."""
-    found = diagnose(hide({}, seed=31))
     small = Remainder({KEY: 0.5}, {KEY: 2.9}, {KEY: 0.004}, {KEY: 0.0}, POLICY)
     assert small.matters
     assert "position_mm in sweep (0.7 x the floor)" in describe(found.base, small).text
@@ -74,10 +71,3 @@ def test_final_records_and_a_likelier_set_speak_against_a_verdict(found):
     likelier = replace(found.choice, weights=found.choice.weights | {("delay", "stiction"): 3.0})
     (odds,) = doubts(likelier, found.split, None)
     assert "With stiction, too," in odds
-
-
-def test_unusable_input_ends_with_status_2(tmp_path):
-    command = [sys.executable, "-c", "from bifa.cli import main; main()", "diagnose", str(tmp_path / "nothing")]
-    ended = subprocess.run(command, capture_output=True, text=True)
-    assert ended.returncode == 2
-    assert "does not exist" in " ".join(ended.stderr.replace("│", " ").split())

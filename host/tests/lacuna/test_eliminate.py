@@ -8,9 +8,9 @@ from toy import NOBODY, case_of, hide, with_effect
 
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.decide import weigh
-from lacuna.diagnosis.eliminate import eliminate
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.revise import eliminate
 from lacuna.diagnosis.search import Search
 
 OPEN, SURE = (-1.0, 1.0), (0.01, 0.05)  # intervals: one that holds 0, one that does not
@@ -39,7 +39,7 @@ def test_an_effect_stays_beside_a_curve_only_if_its_formula_does_most_of_the_wor
     cubic_spring = replace(system.effects["cubic_spring"], freed_at=("spring",))
     case = case_of(replace(system, effects={"cubic_spring": cubic_spring}))
     base, cubic = with_effect(case, "cubic_spring")
-    freed = free_form(cubic, case.split, policy=POLICY, workers=NOBODY)
+    freed = free_form(cubic, case.split, NOBODY)
     found = Search(base, base.fitted.problem.floor, (base, cubic), (), (freed,))
     found, kept = eliminate(case, found, weigh(found, cubic, POLICY))
     assert kept.candidate is (cubic if stays else base)

@@ -15,7 +15,6 @@ from lacuna.estimation.problem import Problem
 from lacuna.estimation.structure import Structure
 from lacuna.records import Table, segments, stretched
 from lacuna.run import with_records
-from lacuna.system import CorrectionSite
 
 
 def test_what_a_loop_reads_of_an_effect_is_no_search_among_names():
@@ -34,7 +33,7 @@ def failing(how):
         found = theta.gain_K_W * record["power_W"] * (1.0 - np.exp(-record.time_s / theta.tau_s))
         return how(found) if theta.gain_K_W > FAR else found
 
-    return lacuna.System(simulate, heater.PARAMETERS, outputs="temperature_K")
+    return heater.modelled(simulate)
 
 
 def at_a_far_gain(system):
@@ -105,25 +104,10 @@ def test_records_that_the_model_cannot_predict_are_structure():
         found = heater.simulate(record, theta)["temperature_K"]
         return np.full(found.shape, np.nan) if np.max(record["power_W"]) > 5.0 else found
 
-    effects = (heater.SENSOR, heater.OFFSET, heater.DEAD)
-    system = lacuna.System(simulate, heater.PARAMETERS, effects, outputs="temperature_K")
+    system = heater.modelled(simulate, effects=(heater.SENSOR, heater.OFFSET, heater.DEAD))
     verdict = lacuna.diagnose(system, heater.records(), progress=False)
     assert verdict.verdict == "unexplained"
     assert "could not predict" in " ".join(verdict.warnings)
-
-
-def test_one_alone_needs_no_brackets():
-    gain, tau = heater.PARAMETERS
-    site = CorrectionSite("loss", "loss", "temperature (K)", "W", 0.0, 9.0, 0.1)
-    system = lacuna.System(heater.simulate, gain, heater.SENSOR, outputs="temperature_K", nuisances=tau, curves=site)
-    trial = with_records(system, heater.records(1)).trials[0]
-    assert [p.name for p in system.parameters] == ["gain_K_W"]
-    assert list(system.effects) == ["sensor_lag"]
-    assert system.nuisances(trial) == (tau,)
-    assert list(system.correction_sites) == ["loss"]
-    effect = Effect("loss", tau, experiments="run", freed_at="loss", apart="gain_K_W", start_factors=1.0)
-    assert (effect.experiments, effect.freed_at, effect.apart) == (("run",), ("loss",), ("gain_K_W",))
-    assert effect.start_factors == (1.0,)
 
 
 @pytest.mark.parametrize("how", [{"test": "nope"}, {"suspected": "nope"}])

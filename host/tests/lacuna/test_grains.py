@@ -1,8 +1,8 @@
 """Parameters that act in steps: a delay that counts whole samples."""
 
+import heater
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 import lacuna
 from lacuna import Effect, Parameter
@@ -24,8 +24,7 @@ def delayed(drive, delay_s):
 
 
 def lagged(drive, lag_s):
-    keep = np.exp(-SAMPLE_S / lag_s) if lag_s > 0.0 else 0.0
-    return lfilter([1.0 - keep], [1.0, -keep], drive)
+    return heater.lag(drive, lag_s, SAMPLE_S)
 
 
 def a_system(delay, typical_s=0.15):

@@ -76,13 +76,6 @@ def test_what_may_not_be_held_is_refused(held, says):
         seen(**held)
 
 
-def test_an_order_needs_both_to_be_fitted():
-    lower = Parameter("mu_k", "", 0.2, 0.0, 1.0)
-    upper = Parameter("mu_s", "", 0.3, 0.0, 1.0, at_least="mu_k")
-    with pytest.raises(DeclarationError, match="at_least of mu_s names 'mu_k', which is no parameter that is fitted"):
-        lacuna.System(lambda record, theta: record, [lower, upper], fixed={"mu_k": 0.2})
-
-
 def test_a_completed_model_ties_again_what_is_tied_and_takes_nothing_that_is_held():
     def simulate(record, theta):
         return {"y": theta.left * np.sin(record.time_s) + theta.right * np.cos(record.time_s) + theta.known}

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.estimation.autocorrelation import correlation_samples
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
 from lacuna.estimation.problem import Problem, View
-from lacuna.estimation.sampling import even_grid, evenly
+from lacuna.estimation.sampling import correlation_samples, even_grid, evenly
 from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
 
@@ -28,13 +27,15 @@ def system(simulate=line, effects=()):
 # --- Rounding ---
 
 
-def floor_of(samples, **more):
+def floor_of(samples, predicted=False):
+    """Of two records alike. `predicted`: beside a model that leaves nothing of them."""
     trials = with_records(system(), [{"time_s": np.arange(float(len(samples))), "y": samples}] * 2).trials
-    return estimate_noise(system(), trials, **more).channels["run", "y"].sd
+    residuals = {trial.name: {"y": 0.0 * samples} for trial in trials} if predicted else None
+    return estimate_noise(system(), trials, residuals=residuals).channels["run", "y"].sd
 
 
 @given(st.floats(1e-6, 1e3), st.integers(0, 1000))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_floor_is_at_least_what_rounding_leaves(step, seed):
     draw = np.random.default_rng(seed)
     slow = np.cumsum(draw.standard_normal(400)) * 0.3
@@ -44,7 +45,7 @@ def test_a_floor_is_at_least_what_rounding_leaves(step, seed):
 
 
 @given(st.floats(0.2, 1.0), st.integers(1, 4), st.integers(0, 1000))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_rounded_record_written_with_few_decimals_has_the_same_floor(step, decimals, seed):
     """An ADC of 0.3226 K, logged as 22.83, 23.15, 23.48: steps of 0.32 and 0.33."""
     draw = np.random.default_rng(seed)
@@ -57,10 +58,10 @@ def test_a_rounded_record_written_with_few_decimals_has_the_same_floor(step, dec
 def test_a_record_that_was_not_rounded_has_no_rounding():
     draw = np.random.default_rng(0)
     decimals = np.round(np.sin(np.linspace(0, 9, 400)) + 1e-2 * draw.standard_normal(400), 3)
-    assert floor_of(decimals, residuals={"record 1": {"y": 0 * decimals}, "record 2": {"y": 0 * decimals}}) < 1e-3
+    assert floor_of(decimals, predicted=True) < 1e-3
     assert floor_of(np.sin(np.linspace(0, 9, 400)) + 1e-3 * draw.standard_normal(400)) < 1.5e-3
     again = np.tile(np.sin(np.linspace(0, 2 * np.pi, 20, endpoint=False)), 20)  # the same values, and no grid
-    assert floor_of(again, residuals={"record 1": {"y": 0 * again}, "record 2": {"y": 0 * again}}) < 1e-3
+    assert floor_of(again, predicted=True) < 1e-3
 
 
 def test_an_exact_model_of_a_rounded_record_lacks_nothing():
@@ -86,9 +87,8 @@ def test_even_times_stay_as_they_are_and_uneven_ones_become_even():
     assert even_grid(even) is None
     assert even_grid(even + 0.002 * np.sin(even)) is None
     uneven = np.sort(np.random.default_rng(0).uniform(0, 5, 80))
-    np.testing.assert_allclose(
-        evenly(uneven, 3.0 * uneven + 1.0), 3.0 * np.linspace(uneven[0], uneven[-1], 80) + 1.0, rtol=1e-9
-    )
+    expected = 3.0 * np.linspace(uneven[0], uneven[-1], 80) + 1.0
+    np.testing.assert_allclose(evenly(uneven, 3.0 * uneven + 1.0), expected, rtol=1e-9)
 
 
 def test_samples_on_either_side_of_a_gap_are_no_neighbours():
@@ -96,9 +96,8 @@ def test_samples_on_either_side_of_a_gap_are_no_neighbours():
     draw = np.random.default_rng(2)
     parts = [np.convolve(draw.standard_normal(2000), np.ones(20), mode="same") / 4.5 for _ in range(2)]
     gap = np.full(300, np.nan)
-    assert correlation_samples([np.concatenate([parts[0], gap, parts[1]])]) == pytest.approx(
-        correlation_samples(parts), rel=0.05
-    )
+    joined = np.concatenate([parts[0], gap, parts[1]])
+    assert correlation_samples([joined]) == pytest.approx(correlation_samples(parts), rel=0.05)
     period = np.sin(2 * np.pi * np.arange(60) / 60.0)  # half a period is missing, and again, and again
     holes = np.where(np.arange(6000) % 60 < 30, np.tile(period, 100), np.nan)
     halves = holes[np.isfinite(holes)]
@@ -106,8 +105,7 @@ def test_samples_on_either_side_of_a_gap_are_no_neighbours():
 
 
 def blurred(time_s, y):
-    record = {"time_s": time_s, "y": y}
-    (trial,) = with_records(system(), [record]).trials
+    (trial,) = with_records(system(), [{"time_s": time_s, "y": y}]).trials
     problem = Problem(Structure(system()), [trial], FLOOR, View(1 / 20, 30.0, 30.0))
     (found,) = problem.residuals(problem.start())
     return found
@@ -136,9 +134,8 @@ def test_uneven_records_are_diagnosed():
     for k in range(8):
         time_s = np.sort(draw.uniform(0.0, 3.0 + 0.2 * k, 150))
         records.append({"time_s": time_s, "y": 2.0 * time_s + 0.4 * time_s**2 + 0.1 * draw.standard_normal(150)})
-    found = lacuna.diagnose(
-        system(bent, [Effect("bend", Parameter("per", "", 0.3, -5.0, 5.0))]), records, progress=False
-    )
+    one = system(bent, Effect("bend", Parameter("per", "", 0.3, -5.0, 5.0)))
+    found = lacuna.diagnose(one, records, progress=False)
     assert [e.name for e in found.effects] == ["bend"]
 
 

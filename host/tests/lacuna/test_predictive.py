@@ -1,12 +1,12 @@
 """What the factors of each run take up: an effect that goes with the condition is no scatter between runs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import pytest
-from toy import NOBODY, case_of
+from toy import NOBODY, case_of, moved
 
 from lacuna.diagnosis.diagnose import diagnose
 from lacuna.diagnosis.policy import POLICY
@@ -14,7 +14,6 @@ from lacuna.diagnosis.race import COARSE, continued
 from lacuna.diagnosis.residual_error import excess_over
 from lacuna.diagnosis.sizes import starts
 from lacuna.estimation.fit import fit, predictive
-from lacuna.estimation.problem import Point
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.system import CorrectionSite, Effect, Parameter, Record, System
@@ -106,17 +105,12 @@ def test_nothing_is_grown_on_an_explanation_with_a_learnt_curve():
 
 def test_an_effect_with_nothing_to_do_is_refitted_from_all_of_its_sizes():
     """Steps with derivatives from where both frictions are one would make them one again, whatever the size."""
-    case, judged = diagnosed(10.0, 8)
-    base = judged.fitted
-    holding, sliding = (base.structure.names.index(f"{name}_N") for name in ("holding", "sliding"))
-
-    values = base.solution.point.values.copy()
-    values[holding] = values[sliding]
-    one = replace(base, solution=replace(base.solution, point=Point(values, base.solution.point.nuisances)))
+    case, base = diagnosed(10.0, 8)
+    one = moved(base.fitted, holding_N=base.fitted.theta["sliding_N"])
     structure = Structure(case.system, ("fading",))
     begun = starts(one, structure, "fading")
     assert len(begun) == 3
-    assert all(each[holding] > each[sliding] for each in begun)
+    assert all(theta["holding_N"] > theta["sliding_N"] for theta in map(structure.theta, begun))
     (refitted,) = continued(one, ["fading"], NOBODY)
     problem = refitted.problem
     alone = [solve(problem, problem.start(v, one.solution.point.nuisances), **COARSE).cost for v in begun]

@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import heater
 import numpy as np
 import pytest
-from toy import NOBODY, ToySystem, case_of, hide
+from toy import NOBODY, ToySystem, case_of, hide, moved
 
 import lacuna
 from lacuna import Effect, Parameter
@@ -17,8 +18,7 @@ from lacuna.diagnosis.race import cold, cold_starts, initial_guess, joined, race
 from lacuna.diagnosis.score import score
 from lacuna.diagnosis.search import search
 from lacuna.errors import MisuseError
-from lacuna.estimation.fit import Fit, evaluate_on
-from lacuna.estimation.problem import Problem
+from lacuna.estimation.fit import Fit
 from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 from lacuna.run import with_records
@@ -27,30 +27,32 @@ TIME_S = np.linspace(0.0, 10.0, 200)
 SHAPES = {"a": np.cos(2 * TIME_S), "b": np.cos(3 * TIME_S), "c": np.cos(2 * TIME_S) + np.cos(3 * TIME_S), "d": TIME_S}
 
 
-def linear(sizes, seed=0, sizes_given=0.02) -> Case:
+def lines(shapes, sizes, seed=0) -> lacuna.System:
     """A line, and what is added to it: all linear, so that first order is all there is."""
 
     def simulate(record, theta):
-        return {"y": theta.slope * TIME_S + sum(theta[f"{name}.size"] * shape for name, shape in SHAPES.items())}
+        return {"y": theta.slope * TIME_S + sum(theta[f"{name}.size"] * shape for name, shape in shapes.items())}
 
-    draw, records = np.random.default_rng(seed), []
-    for k in range(8):
-        y = 2.0 * TIME_S + sum(size * SHAPES[name] for name, size in sizes.items())
-        records.append({"time_s": TIME_S, "k": k, "y": y + 0.1 * draw.standard_normal(200)})
-    effects = [Effect(name, Parameter("size", "", sizes_given, -5.0, 5.0)) for name in SHAPES]
-    system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -9.0, 9.0)], effects, sensor_noise={"y": 0.1})
-    return case_of(with_records(system, records))
+    draw, clean = np.random.default_rng(seed), 2.0 * TIME_S + sum(size * shapes[name] for name, size in sizes.items())
+    records = [{"time_s": TIME_S, "k": k, "y": clean + 0.1 * draw.standard_normal(200)} for k in range(8)]
+    effects = [Effect(name, Parameter("size", "", 0.02, -5.0, 5.0)) for name in shapes]
+    system = lacuna.System(simulate, Parameter("slope", "", 1.0, -9.0, 9.0), effects, sensor_noise={"y": 0.1})
+    return with_records(system, records)
 
 
-def scored(case):
-    return score(case.fit_base(1), list(case.system.effects), NOBODY)
+def linear(sizes) -> Case:
+    return case_of(lines(SHAPES, sizes))
+
+
+def scored(case, base=None):
+    return score(base or case.fit_base(1), list(case.system.effects), NOBODY)
 
 
 def test_the_score_of_one_effect_is_what_a_fit_with_it_gains():
     """In a linear model, within three times the size that the secant has."""
     case = linear({"a": 0.03})
     base = case.fit_base(1)
-    promises = score(base, list(case.system.effects), NOBODY).singles()
+    promises = scored(case, base).singles()
     assert promises[0].effect == "a"
     fitted = race_module.solve(promises[0].problem, promises[0].start)
     residuals = np.concatenate(base.problem.residuals(base.solution.point))
@@ -68,19 +70,8 @@ def test_a_secant_is_followed_only_forwards_and_not_too_far(effects):
 
 
 def test_what_is_suspected_is_fitted_whatever_it_promises():
-    def simulate(record, theta):
-        return {
-            "y": theta.slope * TIME_S + sum(theta[f"{name}.size"] * np.cos(k * TIME_S) for k, name in enumerate(names))
-        }
-
-    names = [f"tone_{k}" for k in range(9)]
-    effects = [Effect(name, Parameter("size", "", 0.02, -5.0, 5.0)) for name in names]
-    system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -9.0, 9.0)], effects, sensor_noise={"y": 0.1})
-    draw, tones = np.random.default_rng(5), sum(0.03 * np.cos(k * TIME_S) for k in range(8))
-    records = [
-        {"time_s": TIME_S, "k": k, "y": 2.0 * TIME_S + tones + 0.1 * draw.standard_normal(200)} for k in range(8)
-    ]
-    system = with_records(system, records)
+    tones = {f"tone_{k}": np.cos(k * TIME_S) for k in range(9)}
+    system = lines(tones, dict.fromkeys([*tones][:8], 0.03), seed=5)
     for suspected in ((), ("tone_8",)):
         case = case_of(system, suspected=suspected)
         found = search(case, case.judge(case.fit_base(1)), enough=lambda _: False, workers=NOBODY)
@@ -99,10 +90,6 @@ def test_what_the_base_can_do_is_absorbed_and_says_nothing():
     assert found["a"].detectable
 
 
-def promises(case, base):
-    return score(base.fitted, list(case.system.effects), NOBODY).singles()
-
-
 def test_a_race_ends_where_one_is_enough_and_runs_on_where_none_is(monkeypatch):
     case = linear({"a": 0.03})
     base = case.judge(case.fit_base(1))
@@ -110,7 +97,7 @@ def test_a_race_ends_where_one_is_enough_and_runs_on_where_none_is(monkeypatch):
     monkeypatch.setattr(
         race_module, "coarse_fits", lambda parent, some, *more: begun.extend(some) or before(parent, some, *more)
     )
-    given = promises(case, base)
+    given = scored(case, base.fitted).singles()
     found = race(base, given, 3, split=case.split, enough=lambda c: True, workers=NOBODY)
     least = POLICY.rival * given[0].gain
     assert [one.gain for one in begun] == [one.gain for k, one in enumerate(given) if k < 2 or one.gain > least]
@@ -132,14 +119,10 @@ def bench(effects, seed) -> Case:
     return case_of(Bench(hidden.trials, hidden.effects))
 
 
-def lost(case: Case, effects=()) -> Candidate:
-    """A fit of these effects that is nowhere near, and continues from nothing."""
-    base = case.fit_base(1)
-    problem = Problem(Structure(case.system, effects), case.split.fit, base.problem.floor)
-    point = problem.start(problem.structure.values({"mass_kg": 4.0, "stiffness_N_m": 190.0, "damping_Ns_m": 19.0}))
-    solution = replace(base.solution, point=point, cost=cost_of(problem, point), sensitivities=())
-    fitted = Fit(problem, solution, 1, 1)
-    return Candidate(fitted, evaluate_on(fitted, case.split.judging), POLICY)
+def lost(case: Case) -> Candidate:
+    """A base fit that is nowhere near, and continues from nothing."""
+    astray = moved(case.fit_base(1), mass_kg=4.0, stiffness_N_m=190.0, damping_Ns_m=19.0)
+    return case.judge(replace(astray, solution=replace(astray.solution, sensitivities=())))
 
 
 def test_a_set_begun_cold_owes_nothing_to_a_lost_parent():
@@ -154,7 +137,7 @@ def test_a_set_begun_cold_owes_nothing_to_a_lost_parent():
 def test_a_set_that_costs_more_than_one_it_contains_begins_from_that_one(monkeypatch):
     case = linear({"a": 0.03, "b": 0.02})
     base = case.judge(case.fit_base(1))
-    one = next(e for e in promises(case, base) if e.problem.structure.effects == ("a",))
+    one = next(e for e in scored(case, base.fitted).singles() if e.problem.structure.effects == ("a",))
     nowhere = race_module.solve(one.problem, one.problem.start(cold_starts(one)[0] + 3.0), max_iterations=0)
     monkeypatch.setattr(race_module, "cold", lambda problem, values: nowhere)
     assert nowhere.cost > base.fitted.cost
@@ -163,24 +146,18 @@ def test_a_set_that_costs_more_than_one_it_contains_begins_from_that_one(monkeyp
 
 
 def test_a_limit_begins_where_it_is_declared_too():
-    def simulate(record, theta):
-        return {"y": np.minimum(theta.slope * TIME_S, theta.clip.limit)}
-
-    clip = Effect("clip", Parameter("limit", "", 10.0, 1.0, np.inf), absent=np.inf)
-    system = with_records(
-        lacuna.System(simulate, [Parameter("slope", "", 1.0, 0.1, 9.0)], [clip]),
-        [{"time_s": TIME_S, "k": k, "y": np.minimum(2.0 * TIME_S, 12.0) + 0.01 * np.cos(9 * TIME_S)} for k in range(5)],
-    )
-    (one,) = score(case_of(system).fit_base(1), ["clip"], NOBODY).singles()
-    declared = [one.problem.structure.theta(values)["clip.limit"] for values in cold_starts(one)]
-    assert 0.1 in declared
+    case = case_of(with_records(heater.system(), heater.records(2)))
+    (one,) = score(case.fit_base(1), ["saturation"], NOBODY).singles()
+    (limit,) = heater.LIMITED.parameters
+    inverses = [one.problem.structure.theta(values)["saturation.limit_W"] for values in cold_starts(one)]
+    assert 1.0 / limit.value in inverses
 
 
 def test_a_curve_is_begun_cold_where_what_it_stands_on_may_be_lost():
     case = bench({"cubic_spring.stiffness_N_m3": 4000.0}, 42)
     astray = lost(case)
     assert astray.checked_error > (0, POLICY.lost)
-    found = learn_correction([astray], case.split, enough=case.suffices, policy=POLICY, workers=NOBODY)
+    found = learn_correction([astray], case.split, enough=case.suffices, workers=NOBODY)
     assert found.fitted.structure.sites == ("spring",)
     assert found.checked_error < (0, 1.5)
 
@@ -202,8 +179,8 @@ def test_what_is_fitted_to_the_end_is_never_worse():
 def test_two_that_are_joined_are_as_they_are_in_each():
     case = linear({"a": 0.03, "b": 0.02, "c": 0.01})
     base = case.judge(case.fit_base(1))
-    fits = {p.effect: race_module.solve(p.problem, p.start) for p in promises(case, base)}
-    of = {p.effect: Fit(p.problem, fits[p.effect], 1, 1) for p in promises(case, base)}
+    promises = scored(case, base.fitted).singles()
+    of = {p.effect: Fit(p.problem, race_module.solve(p.problem, p.start), 1, 1) for p in promises}
     both = joined(of["a"], of["b"], 5.0)
     assert (both.problem.structure.effects, both.gain) == (("a", "b"), 5.0)
     begun = both.problem.structure.theta(both.start.values)

@@ -21,10 +21,13 @@ def write(folder, name, text, **how):
     return folder
 
 
+def conditioned(condition):
+    return "time_s,y,condition\n" + "".join(f"{k},{k * k},{condition}\n" for k in range(10))
+
+
 def test_conditions_in_words_make_repeats(tmp_path):
-    rows = "\n".join(f"{k},{k * k},heat 2 W" for k in range(10))
     for name in ("monday.csv", "tuesday.csv"):
-        write(tmp_path, name, f"time_s,y,condition\n{rows}\n")
+        write(tmp_path, name, conditioned("heat 2 W"))
     assert {table.record(["y"]).condition for table in read(tmp_path)} == {"heat 2 W"}
 
 
@@ -57,11 +60,9 @@ def test_numbers_without_names_are_refused_with_how_to_write_them(tmp_path, rema
         read(write(tmp_path, "a.csv", text))
 
 
-def test_an_empty_cell_is_a_missing_sample_and_words_are_no_input(tmp_path):
+def test_an_empty_cell_is_a_missing_sample(tmp_path):
     (one,) = read(write(tmp_path, "a.csv", "time_s,y\n0,1\n1,\n"))
     assert np.isnan(one.columns["y"]).tolist() == [False, True]
-    with pytest.raises(RecordError, match=r"a\.csv, line 2, column who: 'Ann' is text.*leave the column out"):
-        read(write(tmp_path, "a.csv", "time_s,y,who\n0,1,Ann\n1,,Bob\n"))
 
 
 @pytest.mark.parametrize(
@@ -76,17 +77,21 @@ def test_an_empty_cell_is_a_missing_sample_and_words_are_no_input(tmp_path):
         ("time_s,y\n", "no rows"),
         ("# nothing\n\n", "is empty"),
         ("", "is empty"),
+        ("time_s,y,who\n0,1,Ann\n1,,Bob\n", r"a\.csv, line 2, column who: 'Ann' is text.*leave the column out"),
+        ("time_s,y,valve\n0,1,0\n1,2,open\n", r"a\.csv, line 3, column valve: 'open' is"),
+        ('time_s,y,force\n0,1,"1,000.5"\n1,2,"1,200.5"\n', "line 2, column force: '1,000.5' is"),
+        # What a spreadsheet could not compute is no remark, and lines above the names are called that.
+        ("time_s,y\n0,1\n#N/A,2\n2,3\n", r"a\.csv, line 3, column time_s: '#N/A' is not a number"),
+        ("time_s,y\n0,1\n#DIV/0!,2\n2,3\n", "line 3, column time_s: '#DIV/0!'"),
+        (
+            "Test,today\nUnits,mm\ntime_s,y,u\n0,1,2\n",
+            r"line 3: 3 values for 2 columns\. If the names stand further down, remove",
+        ),
     ],
 )
 def test_refuses_with_file_line_and_column(tmp_path, text, said):
     with pytest.raises(RecordError, match=said):
         read(write(tmp_path, "a.csv", text))
-
-
-def test_refuses_what_is_no_text(tmp_path):
-    (tmp_path / "a.csv").write_bytes(b"time_s,y\n\xff\xfe\x00\n")
-    with pytest.raises(RecordError, match="UTF-8"):
-        read(tmp_path)
 
 
 def test_one_file_is_one_record_and_so_is_a_segment(tmp_path):
@@ -97,16 +102,10 @@ def test_one_file_is_one_record_and_so_is_a_segment(tmp_path):
     assert read(piece) == [piece]
 
 
-def test_a_place_in_the_day_is_a_whole_number(tmp_path):
-    (one,) = read(write(tmp_path, "a.csv", "time_s,y,order\n0,1,first\n1,2,first\n"))
-    with pytest.raises(RecordError, match=r"record a: its order is .*first"):
-        one.record(["y"])
-
-
-@pytest.mark.parametrize("order", [1.5, "1.5", np.inf])
-def test_half_a_place_in_the_day_is_none(order):
+@pytest.mark.parametrize("order", [1.5, "1.5", np.inf, "first"])
+def test_a_place_in_the_day_is_a_whole_number(order):
     (one,) = read({"a": {"time_s": [0.0, 1.0], "y": [1.0, 2.0], "order": order}})
-    with pytest.raises(RecordError, match="record a: its order is"):
+    with pytest.raises(RecordError, match=f"record a: its order is .*{order}"):
         one.record(["y"])
 
 
@@ -130,9 +129,17 @@ def test_parts_of_several_runs_go_together_by_the_runs_names():
     assert len({part.labels["condition"] for part in cut}) == 2, "the same phase of a cycle, on whatever day"
 
 
-def test_arrays_without_times_are_one_record_without_times():
-    with pytest.raises(RecordError, match="a record of y, u has no times: give a column time_s"):
-        read({"y": np.zeros(9), "u": np.zeros(9)})
+REFUSED_ARRAYS = {
+    "a record of y, u has no times: give a column time_s": {"y": np.zeros(9), "u": np.zeros(9)},
+    r"sample 0: column force is not all numbers: .*1,000\.5": {"time_s": [0.0, 1.0], "force": ["1,000.5", "2"]},
+    "sample 1: column note .*windy.*leave the column out": {"time_s": [0.0, 1.0], "note": ["", "windy"]},
+}
+
+
+@pytest.mark.parametrize("said", REFUSED_ARRAYS)
+def test_refuses_arrays_saying(said):
+    with pytest.raises(RecordError, match=said):
+        read(REFUSED_ARRAYS[said])
 
 
 # -- numbers ---------------------------------------------------------------------------------------------------
@@ -156,25 +163,12 @@ def test_what_is_no_plain_decimal_is_no_number(text):
     assert decimal(text) is None or set(text.strip(" \t")) <= set("0123456789+-.eE")
 
 
-def test_truths_are_one_and_zero_and_other_text_is_refused_by_its_cell(tmp_path):
+def test_truths_are_one_and_zero(tmp_path):
     (one,) = read(write(tmp_path, "a.csv", "time_s,y,valve\n0,1,True\n1,2,False\n2,3,true\n"))
     assert one.columns["valve"].tolist() == [1.0, 0.0, 1.0]
     (one,) = read({"time_s": [0.0, 1.0], "y": [1.0, 2.0], "valve": np.array([True, False]), "on": ["True", "False"]})
     assert one.columns["valve"].tolist() == one.columns["on"].tolist() == [1.0, 0.0]
     assert one.columns["valve"].dtype == float
-    with pytest.raises(RecordError, match=r"a\.csv, line 3, column valve: 'open' is"):
-        read(write(tmp_path, "a.csv", "time_s,y,valve\n0,1,0\n1,2,open\n"))
-    with pytest.raises(RecordError, match=r"line 2, column force: '1,000.5' is"):
-        read(write(tmp_path, "a.csv", 'time_s,y,force\n0,1,"1,000.5"\n1,2,"1,200.5"\n'))
-    with pytest.raises(RecordError, match=r"sample 0: column force is not all numbers: .*1,000\.5"):
-        read({"time_s": [0.0, 1.0], "y": [1.0, 2.0], "force": ["1,000.5", "2"]})
-
-
-def test_what_a_spreadsheet_could_not_compute_is_no_remark(tmp_path):
-    with pytest.raises(RecordError, match=r"a\.csv, line 3, column time_s: '#N/A' is not a number"):
-        read(write(tmp_path, "a.csv", "time_s,y\n0,1\n#N/A,2\n2,3\n"))
-    with pytest.raises(RecordError, match=r"line 3, column time_s: '#DIV/0!'"):
-        read(write(tmp_path, "a.csv", "time_s,y\n0,1\n#DIV/0!,2\n2,3\n"))
 
 
 # -- names of files ----------------------------------------------------------------------------------------------
@@ -200,8 +194,7 @@ def test_numbers_that_count_make_repeats(tmp_path, numbers):
 
 def test_a_column_says_what_numbers_are(tmp_path):
     for bar in (4, 6):
-        rows = "\n".join(f"{k},{k * k},{bar} bar" for k in range(10))
-        write(tmp_path, f"step_{bar}.csv", f"time_s,y,condition\n{rows}\n")
+        write(tmp_path, f"step_{bar}.csv", conditioned(f"{bar} bar"))
     assert [table.labels["condition"] for table in read(tmp_path)] == ["4 bar", "6 bar"]
 
 
@@ -213,11 +206,6 @@ def test_what_systems_and_office_programs_leave_is_no_record(tmp_path):
 
 
 # -- messages ------------------------------------------------------------------------------------------------------
-
-
-def test_lines_above_the_names_are_called_that(tmp_path):
-    with pytest.raises(RecordError, match=r"line 3: 3 values for 2 columns\. If the names stand further down, remove"):
-        read(write(tmp_path, "a.csv", "Test,today\nUnits,mm\ntime_s,y,u\n0,1,2\n"))
 
 
 def test_another_encoding_is_named_with_its_line(tmp_path):
@@ -258,10 +246,13 @@ def test_times_of_a_zone_are_times():
     pandas = pytest.importorskip("pandas")
     when = pandas.date_range("2026-11-25 10:00", periods=3, freq="500ms", tz="Europe/Berlin")
     table = pandas.DataFrame({"y": [1.0, 2.0, 3.0]})
-    for dated in (table.assign(time=when), table.set_index(when), table.assign(time=when.tz_convert(None))):
+    of_utc = when.tz_convert(None)
+    for dated in (
+        *(table.assign(time=times) for times in (when, of_utc)),
+        *(table.set_index(times) for times in (when, of_utc)),
+        {"time": when.to_pydatetime(), "y": np.arange(3.0)},
+    ):
         assert read(dated)[0].time_s.tolist() == [0.0, 0.5, 1.0]
-    (one,) = read({"time": when.to_pydatetime(), "y": np.arange(3.0)})
-    assert one.time_s.tolist() == [0.0, 0.5, 1.0]
 
 
 def test_a_time_that_says_milliseconds_is_taken_for_that():

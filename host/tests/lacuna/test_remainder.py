@@ -1,11 +1,14 @@
 """Structure is found wherever it is: in conditions that were run once, between samples that are missing, where a
 prediction fails, and without noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from toy import slow
 
-from lacuna.diagnosis.remainder import find_remainder
+from lacuna.diagnosis.policy import POLICY
+from lacuna.diagnosis.remainder import Remainder, find_remainder
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
 from lacuna.system import Record, System
 
@@ -14,25 +17,69 @@ SINE = np.sqrt(2.0) * np.sin(2 * np.pi * TIME_S)
 KEY = ("steps", "position_mm")
 
 
-class Plain(System):
-    """A system of which nothing is asked."""
+class OneChannel(System):
+    """A system of which only the accuracy is asked."""
+
+    def __init__(self, good_enough):
+        self.accuracy = lambda experiment, channel: good_enough
 
 
-def remainder(rows, *, missing=()):
+def remainder(rows, *, missing=(), good_enough=0.0, policy=POLICY, correlation_samples=1.0):
     """Of residuals by condition, each of shape (repeats, samples). `missing`: slices that were not measured."""
     trials, scaled = [], []
     for condition, repeats in rows.items():
-        for z in np.array(repeats):
-            measured = TIME_S.copy()
+        for z in repeats:
+            measured = TIME_S[: len(z)].copy()
             for where in missing:
                 measured[where] = np.nan
-            trials.append(Record(f"{len(trials)}", KEY[0], condition, TIME_S, {KEY[1]: measured}))
+            trials.append(Record(f"{len(trials)}", KEY[0], condition, TIME_S[: len(z)], {KEY[1]: measured}))
             scaled.append({KEY[1]: np.where(np.isfinite(measured), z, np.nan)})
-    return find_remainder(Plain(), trials, scaled, NoiseFloor({KEY: ChannelNoise(0.2, 0.0, 1.0, 6)}))
+    floor = NoiseFloor({KEY: ChannelNoise(0.2, 0.0, correlation_samples, 6)})
+    return find_remainder(OneChannel(good_enough), trials, scaled, floor, policy=policy)
 
 
-def noise(repeats, seed, sd=1.0):
-    return sd * np.random.default_rng(seed).standard_normal((repeats, len(TIME_S)))
+def noise(repeats, seed, samples=1000):
+    return np.random.default_rng(seed).standard_normal((repeats, samples))
+
+
+def sharing(rms, **how):
+    """Of four repeats that share a sine."""
+    return remainder({"a": noise(4, 0) + rms * SINE}, **how)
+
+
+def test_relevance_what_a_prediction_within_a_tenth_of_the_floor_leaves_does_not_matter():
+    assert sharing(0.40).found, "it is no chance"
+    assert not sharing(0.40).matters, "RMS 1.08 of the floor"
+    assert sharing(0.52).matters, "RMS 1.13 of the floor"
+
+
+def test_relevance_gives_way_to_the_accuracy_that_the_person_asked_for():
+    assert sharing(2.0, good_enough=0.3).matters, "0.4 mm shared where 0.3 mm were asked"
+    assert not sharing(2.0, good_enough=0.5).matters, "0.4 mm shared where 0.5 mm are good enough"
+
+
+def test_that_nothing_was_found_does_not_say_that_nothing_is_missing():
+    """Equivalence: what may be missing, not what was found, is less than what matters."""
+    short = {"a": noise(2, 0, samples=12)}
+    assert not remainder(short).matters
+    assert remainder(short).cannot_tell["steps"] > np.sqrt(POLICY.relevance)
+    assert not sharing(0.0).cannot_tell
+    assert not remainder(short, good_enough=10.0).cannot_tell, "what is asked is met"
+
+
+def test_chance_decides_what_counts_as_structure():
+    def with_chance(p):
+        return Remainder({KEY: 9.0}, {KEY: 3.0}, {KEY: p}, {KEY: 0.0}, POLICY)
+
+    assert with_chance(0.9 * POLICY.chance).matters
+    assert not with_chance(1.1 * POLICY.chance).matters
+
+
+@pytest.mark.slow
+def test_noise_alone_is_structure_as_seldom_as_the_rule_says():
+    policy = replace(POLICY, chance=0.05)
+    found = sum(bool(remainder({"a": noise(4, seed)}, policy=policy).found) for seed in range(100))
+    assert found <= 11, "binomial, 100 draws at 0.05: more than 11 happen once in 200"
 
 
 @pytest.mark.parametrize("amplitude", [0.0, 1.0])
@@ -50,7 +97,7 @@ def test_noise_alone_is_seldom_structure_where_some_conditions_have_repeats():
 
 
 def test_repeats_without_noise_do_not_hide_structure():
-    assert remainder({"a": np.array([SINE, SINE, SINE])}).matters
+    assert remainder({"a": [SINE, SINE, SINE]}).matters
     assert not remainder({"a": np.zeros((3, len(TIME_S)))}).matters
 
 
@@ -78,10 +125,6 @@ def test_noise_is_seldom_structure_where_repeats_end_early():
     found = 0
     for seed in range(40):
         draw = np.random.default_rng(seed)
-        trials, scaled = [], []
-        for k, length in enumerate((1000, 500, 500)):
-            z = lfilter([np.sqrt(1 - 0.9**2)], [1.0, -0.9], draw.standard_normal(length + 200))[200:]
-            trials.append(Record(f"{k}", KEY[0], "a", TIME_S[:length], {KEY[1]: TIME_S[:length]}))
-            scaled.append({KEY[1]: z})
-        found += bool(find_remainder(Plain(), trials, scaled, NoiseFloor({KEY: ChannelNoise(0.2, 0.0, 19.0, 3)})).found)
+        repeats = [slow(draw.standard_normal(samples + 200), 0.9)[200:] for samples in (1000, 500, 500)]
+        found += bool(remainder({"a": repeats}, correlation_samples=19.0).found)
     assert found <= 1, "binomial, 40 draws at 0.005: two or more happen once in 60"

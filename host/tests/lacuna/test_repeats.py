@@ -3,15 +3,11 @@
 import heater
 import numpy as np
 import pytest
+from heater import said_of
 
 import lacuna
-from lacuna.check import check
+from lacuna import Effect, Parameter
 from lacuna.errors import MisuseError
-from lacuna.run import with_records
-
-
-def said_of(records, *effects):
-    return check(with_records(heater.system(*effects), records))
 
 
 def spiked(column):
@@ -22,7 +18,7 @@ def in_another_unit(column):
     column *= 1e3
 
 
-def switched_off(column):
+def switched_off(column):  # at rest, as no channel may be in every trial
     column[:] = 0.0
 
 
@@ -116,12 +112,9 @@ def test_runs_that_differ_by_more_than_the_noise_do_not_hide_what_is_missing(spr
         for level in (1, 2, 3, 4)
         for k in range(3)
     }
-    system = lacuna.System(
-        simulate,
-        [lacuna.Parameter("gain", "", 0.8, 0.0, 5.0)],
-        [lacuna.Effect("bend", lacuna.Parameter("by", "", 0.001, -0.1, 0.1))],
-        nuisances=[lacuna.Parameter("offset", "", 0.0, -20.0, 20.0, scale=spread)],
-    )
+    effect = Effect("bend", Parameter("by", "", 0.001, -0.1, 0.1))
+    offset = Parameter("offset", "", 0.0, -20.0, 20.0, scale=spread)
+    system = lacuna.System(simulate, Parameter("gain", "", 0.8, 0.0, 5.0), effect, nuisances=offset)
     found = lacuna.diagnose(system, records, progress=False)
     assert found.verdict == verdict
     if verdict == "identified":

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from toy import moved
 
 from lacuna.estimation.fit import fit, released
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor
@@ -21,6 +22,7 @@ ERROR_LENGTH = 1e-3
 FRICTION_SD = 0.05
 T = np.linspace(0.0, 1.0, 1000)
 SEEDS = range(20)
+FLOOR = NoiseFloor({(experiment, "y_m"): ChannelNoise(SD, 0.0, 1.0, 0) for experiment in ("line", "hum")})
 
 _random = np.random.default_rng(1)
 _ERROR_DIRECTION = _random.standard_normal((3, len(T))) / ERROR_LENGTH
@@ -37,22 +39,13 @@ class Lines(System):
     name = "lines"
     effects: ClassVar = {}
 
-    def __init__(self, runs: int, upper: float = 10.0, seed: int = 0):
-        random = np.random.default_rng(seed)
+    def __init__(self, runs: int, upper: float = 10.0, seed: int = 0, factor_of: tuple[str, ...] = ()):
+        random, self.factor_of, self.trials = np.random.default_rng(seed), factor_of, ()
         self.parameters = tuple(Parameter(name, "m", 1.4, -10.0, upper, scale=1.0) for name in TRUTH)
-        self.trials = tuple(
-            Record(
-                f"{run}",
-                "line",
-                "all alike",
-                T,
-                {
-                    "y_m": (1.0 + FRICTION_SD * random.standard_normal()) * columns() @ list(TRUTH.values())
-                    + SD * random.standard_normal(T.shape)
-                },
-            )
-            for run in range(runs)
-        )
+        for run in range(runs):
+            y_m = (1.0 + FRICTION_SD * random.standard_normal()) * columns() @ list(TRUTH.values())
+            y_m += SD * random.standard_normal(T.shape)
+            self.trials += (Record(f"{run}", "line", "all alike", T, {"y_m": y_m}),)
 
     def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
         slopes, factor = [theta[name] for name in TRUTH], theta["factor"]
@@ -60,7 +53,7 @@ class Lines(System):
         return {"y_m": factor * (columns() @ slopes) + ERROR * wrong}
 
     def nuisances(self, trial):
-        return (Parameter("factor", "", 1.0, 0.5, 1.5, scale=FRICTION_SD),)
+        return (Parameter("factor", "", 1.0, 0.5, 1.5, scale=FRICTION_SD, factor_of=self.factor_of),)
 
 
 def expected_sd(runs: int) -> np.ndarray:
@@ -74,8 +67,7 @@ def expected_sd(runs: int) -> np.ndarray:
 
 
 def fitted(system: Lines):
-    floor = NoiseFloor({("line", "y_m"): ChannelNoise(SD, 0.0, 1.0, 0)})
-    return fit(Structure(system), system.trials, floor)
+    return fit(Structure(system), system.trials, FLOOR)
 
 
 def stated_sd(found) -> np.ndarray:
@@ -144,23 +136,9 @@ class WithinBounds(Lines):
         return super().predict(theta, effects, trial, **how)
 
 
-def moved(found, **theta: float):
-    """The fit as it would be had it ended at `theta`."""
-    point = found.solution.point
-    there = replace(point, values=found.structure.values(found.theta | theta))
-    return replace(found, solution=replace(found.solution, point=there))
-
-
-class Told(Lines):
-    """The same, where the factor is said to be one of both slopes."""
-
-    def nuisances(self, trial):
-        return tuple(replace(p, factor_of=tuple(TRUTH)) for p in super().nuisances(trial))
-
-
 def test_derivatives_by_a_factor_are_those_of_what_it_multiplies():
-    system = Told(3)
-    problem = Problem(Structure(system), system.trials, NoiseFloor({("line", "y_m"): ChannelNoise(SD, 0.0, 1.0, 3)}))
+    system = Lines(3, factor_of=tuple(TRUTH))
+    problem = Problem(Structure(system), system.trials, FLOOR)
     point = problem.start(np.array([1.1, 1.9]))
     for slopes, factor in (one.dense() for one in problem.jacobians(point, (0, 1), problem.first_steps())):
         np.testing.assert_allclose(factor[:, 0], slopes @ point.values / point.nuisances[0], rtol=1e-12, atol=1e-12)
@@ -193,13 +171,9 @@ def hum(size_m, phase_rad):
 
 
 def test_a_phase_may_leave_its_range():
-    floor = NoiseFloor({("hum", "y_m"): ChannelNoise(SD, 0.0, 1.0, 3)})
-    costs = [
-        fit(Structure(system, ("hum",)), system.trials, floor).cost
-        for system in (Hum(periodic=True), Hum(periodic=False))
-    ]
-    assert costs[0] == pytest.approx(0.5 * 3 * len(T), rel=0.1)
-    assert costs[1] > 1.3 * costs[0]
+    free, bounded = (fit(Structure(one, ("hum",)), one.trials, FLOOR).cost for one in (Hum(True), Hum(False)))
+    assert free == pytest.approx(0.5 * 3 * len(T), rel=0.1)
+    assert bounded > 1.3 * free
 
 
 @pytest.mark.parametrize("from_trials", [True, False])

@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
+from toy import case_of, hide
 
 import lacuna
 from lacuna import CorrectionSite, Parameter, Record
+from lacuna.diagnosis import warn
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import estimate_noise
 from lacuna.estimation.shrink import likeliest_size, shrunk
 from lacuna.estimation.structure import Structure, is_learnt
-from lacuna.estimation.uncertainty import uncertainty
+from lacuna.estimation.uncertainty import Uncertainty, uncertainty
 
 TIME_S = np.linspace(0.0, 10.0, 201)
 KNOTS = np.linspace(0.0, 1.0, 33)
@@ -76,3 +78,13 @@ def test_without_a_curve_there_is_nothing_to_shrink():
     fitted = with_curve(5, upper=0.5)
     bare = fit(Structure(fitted.structure.system), fitted.problem.trials, fitted.problem.floor)
     assert shrunk(bare) is bare
+
+
+def test_no_knot_of_a_learnt_curve_is_said_to_be_undetermined(monkeypatch):
+    """Beyond its data a curve is what its prior makes of it; a direction that is spread thin has no name at all."""
+    case = case_of(hide({}, seed=31))
+    name = case.system.parameters[0].name
+    undetermined = ({"correction.spring.0_1": 0.9}, {"correction.spring.0_2": 0.6, name: 0.8}, {})
+    monkeypatch.setattr(warn, "uncertainty", lambda _: Uncertainty((), np.eye(0), undetermined))
+    said = warn.warnings_of(case.fit_base(1), case.split)
+    assert said == (f"The data hardly determine {name}.",)

@@ -4,15 +4,17 @@ import os
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.cores import usable_cores
 from lacuna.diagnosis.next_experiment import expected_gain
 from lacuna.diagnosis.sizes import grown, sized, starts
-from lacuna.estimation.autocorrelation import correlation_samples
+from lacuna.diagnosis.spectrum import peaks
 from lacuna.estimation.fit import fit
 from lacuna.estimation.noise import ChannelNoise, NoiseFloor, estimate_noise
+from lacuna.estimation.problem import usable_cores
+from lacuna.estimation.sampling import correlation_samples
 from lacuna.estimation.structure import Structure
 from lacuna.system import CandidateExperiment, Record
 
@@ -26,11 +28,9 @@ def test_a_size_that_is_absent_at_one_is_tried_on_either_side_of_it():
     stretch = Effect("stretch", Parameter("factor", "", 1.2, 0.5, 2.0), absent=1.0)
     system = lacuna.System(lambda r, t: r.time_s, [Parameter("slope", "", 1.0, -5.0, 5.0)], [stretch])
     structure = Structure(system, ("stretch",))
-    told = [
-        system.told("stretch.factor", v[structure.names.index("stretch.factor")])
-        for v in sized(structure, structure.start(), "stretch", 1.0)
-    ]
-    np.testing.assert_allclose(told, [1.2, 0.8], rtol=1e-12)
+    begun = sized(structure, structure.start(), "stretch", 1.0)
+    told = [system.told("stretch.factor", structure.theta(values)["stretch.factor"]) for values in begun]
+    assert told == pytest.approx([1.2, 0.8], rel=1e-12)
 
 
 def test_an_experiment_never_run_is_weighed_by_what_its_channel_has_had_elsewhere():
@@ -56,8 +56,8 @@ def test_missing_samples_are_no_neighbours():
 
 def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():
     """Sampled at 10 Hz: no spectrum has a peak there, and without a start it would never be tried."""
-    hum = Effect("hum", (Parameter("size", "", 0.3, 0.0, 5.0), Parameter("f_Hz", "Hz", 50.3, 20.0, 100.0)), sizes=1)
-    hum = replace(hum, frequency="f_Hz")
+    sizes = (Parameter("size", "", 0.3, 0.0, 5.0), Parameter("f_Hz", "Hz", 50.3, 20.0, 100.0))
+    hum = Effect("hum", sizes, frequency="f_Hz")
     time_s = np.arange(0.0, 10.0, 0.1)
     trials = tuple(Record(f"{k}", "run", "c", time_s, {"y": np.sin(time_s + 0.01 * k)}) for k in range(4))
 
@@ -68,8 +68,7 @@ def test_a_frequency_that_no_record_resolves_begins_at_its_typical_value():
     system = lacuna.System(simulate, [Parameter("slope", "", 1.0, -5.0, 5.0)], hum).with_trials(trials)
     parent = fit(Structure(system), trials, estimate_noise(system, trials))
     structure = grown(parent, "hum").structure
-    begun = starts(parent, structure, "hum")
-    assert {v[structure.names.index("hum.f_Hz")] for v in begun} == {50.3}
+    assert {structure.theta(values)["hum.f_Hz"] for values in starts(parent, structure, "hum")} == {50.3}
 
 
 def test_what_a_trial_has_of_its_own_may_lie_anywhere_if_nothing_is_said_of_its_spread():
@@ -80,3 +79,21 @@ def test_what_a_trial_has_of_its_own_may_lie_anywhere_if_nothing_is_said_of_its_
         system = lacuna.System(lambda r, t: r.time_s, Parameter("slope", "", 1.0, -5.0, 5.0), hum)
         (found,) = Structure(system, ("hum",)).own(trial)
         assert found.step_scale == scale
+
+
+@pytest.mark.parametrize(("duration_s", "line_hz"), [(0.05, 7300.0), (6.0, 7.3), (54.0, 0.61), (2000.0, 0.0123)])
+def test_a_line_is_among_the_peaks_of_the_residual_whatever_the_records_duration(duration_s, line_hz):
+    draw, time_s = np.random.default_rng(3), np.linspace(0.0, duration_s, 1500, endpoint=False)
+    lines = (2.0 * np.sin(2.0 * np.pi * (line_hz * time_s + draw.random())) for _ in range(8))
+    scaled = [{"y": draw.standard_normal(1500) + line} for line in lines]
+    trials = [Record(f"{k}", "run", "c", time_s, one) for k, one in enumerate(scaled)]
+    found = peaks(trials, scaled, line_hz / 7.0, 4.0 * line_hz, 3)
+    assert min(abs(hz - line_hz) for hz in found) < 0.5 / duration_s
+
+
+def test_a_range_far_wider_than_records_resolve_is_searched_coarsely():
+    """A range of 100 kHz in records of 2000 s: no more cells than fit in memory."""
+    time_s = np.linspace(0.0, 2000.0, 1500, endpoint=False)
+    scaled = [{"y": np.sin(2.0 * np.pi * 0.3 * time_s)}]
+    trials = [Record("1", "run", "c", time_s, scaled[0])]
+    assert len(peaks(trials, scaled, 0.001, 1e5, 3)) <= 3

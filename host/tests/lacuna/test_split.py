@@ -26,6 +26,14 @@ def test_a_spare_condition_is_never_fitted_though_it_was_run_once():
     assert not {"0", "2"} & set(names(split.known))
 
 
+def test_of_a_spare_condition_that_was_repeated_something_informs_no_choice_either():
+    split = split_trials(trials(*"aaabbbcccdddeee"), spare=[("steps", "d")])
+    assert names(split.unseen) == ["9", "10"]
+    assert not {t.condition for t in split.known} & {"d"}
+    assert names(split.conditions) == ["11"]
+    assert len(split.repeats) == 4
+
+
 def test_the_only_trial_of_an_experiment_is_not_held_out_since_its_floor_would_be_unknown():
     given = list(trials(*"abcdefghij"))
     given[4] = Record("4", "cooling", "e", T, {"y": T})
@@ -41,6 +49,11 @@ def test_something_is_left_to_judge_by(conditions):
     assert len(split.fit + split.judging + split.final) == len(conditions)
 
 
+def test_many_repeats_are_dealt_out_in_thirds():
+    split = split_trials(trials(*12 * "c"))
+    assert [len(part) for part in (split.fit, split.select, split.final)] == [4, 4, 4]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [3, 4])
 def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
@@ -49,6 +62,13 @@ def test_a_verdict_without_held_out_trials_can_be_told(count, tmp_path):
     assert verdict.verdict in str(verdict)
     assert "<html" in verdict.report(tmp_path / "page.html").read_text()
     assert verdict.plot()
+
+
+def test_what_a_person_makes_the_test_informs_nothing():
+    split = split_trials(trials(*"aaabbb"), (), ["0", "5"])
+    assert names(split.final) == ["0", "5"]
+    assert not {"0", "5"} & set(names(split.known + split.unseen))
+    assert len(split.fit + split.judging + split.final) == 6
 
 
 def test_what_a_person_makes_the_test_is_it_though_it_is_of_an_experiment_of_its_own():

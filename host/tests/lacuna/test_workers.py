@@ -6,11 +6,12 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing import active_children
+from threading import Event
 
 import pytest
 
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.problem import use_threads
+from lacuna.estimation.problem import in_parallel, use_threads
 
 NAMES = [("one",), ("two",), ("three",)]
 JOBS = [(1,), (2,), (3,)]
@@ -20,6 +21,28 @@ JOBS = [(1,), (2,), (3,)]
 def cores():
     yield use_threads
     use_threads(None)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_results_come_in_the_order_of_the_items_whatever_is_begun_first(cores, count):
+    cores(count)
+    assert in_parallel(lambda x: x * x, (3, 1, 2), work=(1.0, 3.0, 2.0)) == [9, 1, 4]
+    assert in_parallel(str, [], work=[]) == []
+
+
+def test_what_is_most_work_is_begun_first(cores):
+    cores(2)
+    begun, second = [], Event()
+
+    def note(item: str) -> None:
+        begun.append(item)
+        if item == "long":
+            assert second.wait(10.0)  # the other thread does all the rest meanwhile
+        if len(begun) == 3:
+            second.set()
+
+    in_parallel(note, ("short", "middle", "long"), work=(1.0, 2.0, 3.0))
+    assert begun == ["long", "middle", "short"]
 
 
 def test_children_answer_in_order_what_need_not_be_shipped(cores):

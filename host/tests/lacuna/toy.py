@@ -10,17 +10,19 @@ from run to run.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
+from scipy.signal import lfilter
 
 from lacuna.diagnosis.candidate import Candidate
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.policy import POLICY
 from lacuna.diagnosis.split import split_trials
 from lacuna.diagnosis.workers import Workers
-from lacuna.estimation.fit import fit, starting_point
+from lacuna.estimation.fit import Fit, fit, starting_point
+from lacuna.estimation.solve import cost_of
 from lacuna.estimation.structure import Structure
 from lacuna.system import (
     CandidateExperiment,
@@ -40,6 +42,7 @@ STEPS_PER_SAMPLE = 8
 RIPPLE_PITCH_M = 0.06
 WOBBLE_SD = 0.02
 SENSOR_SD_MM = 0.2
+DRIFTING = {"seed": 16, "repeats": 6, "drift": 0.02}  # how `hide` draws a drift that is no noise
 
 _BASE = (
     Parameter("mass_kg", "kg", 1.0, 0.2, 5.0, plausible=(0.8, 1.25), scale=0.1),
@@ -48,36 +51,21 @@ _BASE = (
 )
 
 
-def _effect(name: str, parameter: Parameter, enters: str, equation: str, **more) -> Effect:
-    return Effect(name, (parameter,), enters, equation=equation, source="textbook", **more)
-
-
 _EFFECTS = {
-    e.name: e
-    for e in (
-        _effect("coulomb", Parameter("force_N", "N", 0.3, 0.0, 3.0, scale=0.1), "friction", "F = f sign(x')"),
-        _effect(
-            "cubic_spring",
-            Parameter("stiffness_N_m3", "N/m^3", 4000.0, -2e4, 4e4, scale=1000.0),
-            "spring",
-            "F = k3 x^3",
-        ),
-        _effect(
-            "quadratic_drag",
-            Parameter("drag_Ns2_m2", "N s^2/m^2", 4.0, 0.0, 40.0, scale=1.0),
-            "friction",
-            "F = c |x'| x'",
-        ),
-        _effect("delay", Parameter("delay_s", "s", 0.03, 0.0, 0.2, scale=0.01), "input", "u(t - delay)"),
-        _effect("sensor_gain", Parameter("gain", "1", 0.05, -0.3, 0.3, scale=0.02), "sensor", "y = (1 + gain) x"),
-        _effect(
-            "asymmetric_friction",
-            Parameter("difference_N", "N", 0.3, -2.0, 2.0, scale=0.1),
-            "friction",
-            "F = d if x' > 0",
-        ),
+    name: Effect(name, Parameter(*parameter, scale=scale), enters, equation=equation, source="textbook")
+    for name, parameter, scale, enters, equation in (
+        ("coulomb", ("force_N", "N", 0.3, 0.0, 3.0), 0.1, "friction", "F = f sign(x')"),
+        ("cubic_spring", ("stiffness_N_m3", "N/m^3", 4000.0, -2e4, 4e4), 1000.0, "spring", "F = k3 x^3"),
+        ("quadratic_drag", ("drag_Ns2_m2", "N s^2/m^2", 4.0, 0.0, 40.0), 1.0, "friction", "F = c |x'| x'"),
+        ("delay", ("delay_s", "s", 0.03, 0.0, 0.2), 0.01, "input", "u(t - delay)"),
+        ("sensor_gain", ("gain", "1", 0.05, -0.3, 0.3), 0.02, "sensor", "y = (1 + gain) x"),
+        ("asymmetric_friction", ("difference_N", "N", 0.3, -2.0, 2.0), 0.1, "friction", "F = d if x' > 0"),
     )
 }
+_IN_ITS_MOTION = [  # as `_simulate` takes them
+    *(e.full_name(p) for e in _EFFECTS.values() for p in e.parameters if e.enters != "sensor"),
+    "ripple.force_N",
+]
 
 
 @numba.njit(nogil=True, cache=True)
@@ -123,15 +111,7 @@ class ToySystem(System):
     name: str = "mass on a spring"
     parameters: tuple[Parameter, ...] = _BASE
 
-    def predict(
-        self,
-        theta: Theta,
-        effects: tuple[str, ...],
-        trial: Record,
-        *,
-        coarse: bool = False,
-        corrections: Sequence[Correction] = (),
-    ) -> Channels:
+    def predict(self, theta, effects, trial, *, coarse=False, corrections=()):
         return {"position_mm": _position_mm(theta, trial.payload, corrections)}
 
     def regressors(self, trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
@@ -156,31 +136,15 @@ class ToySystem(System):
         return {site.name: site}
 
     def candidate_experiments(self) -> tuple[CandidateExperiment, ...]:
-        return tuple(
-            CandidateExperiment(
-                experiment,
-                {"force_N": size},
-                _trial(experiment, size, 0, None, np.full(len(_force(experiment, size)), np.nan)),
-            )
-            for experiment in ("steps", "sweep")
-            for size in (0.5, 4.0)
-        )
+        offers = [(experiment, size) for experiment in ("steps", "sweep") for size in (0.5, 4.0)]
+        unknown = np.full(len(self.trials[0].time_s), np.nan)
+        return tuple(CandidateExperiment(e, {"force_N": size}, _trial(e, size, 0, None, unknown)) for e, size in offers)
 
 
 def _position_mm(theta: Theta, force: np.ndarray, corrections: Sequence[Correction] = ()) -> np.ndarray:
-    p = np.array(
-        [
-            theta["mass_kg"],
-            theta["stiffness_N_m"],
-            theta["damping_Ns_m"] * (1 + theta.get("wobble", 0.0)),
-            theta.get("coulomb.force_N", 0.0),
-            theta.get("cubic_spring.stiffness_N_m3", 0.0),
-            theta.get("quadratic_drag.drag_Ns2_m2", 0.0),
-            theta.get("delay.delay_s", 0.0),
-            theta.get("asymmetric_friction.difference_N", 0.0),
-            theta.get("ripple.force_N", 0.0),
-        ]
-    )
+    damping_Ns_m = theta["damping_Ns_m"] * (1 + theta.get("wobble", 0.0))
+    effects = (theta.get(name, 0.0) for name in _IN_ITS_MOTION)
+    p = np.array([theta["mass_kg"], theta["stiffness_N_m"], damping_Ns_m, *effects])
     table = corrections[0].table[0] if corrections else np.zeros(1)
     return 1e3 * (1 + theta.get("sensor_gain.gain", 0.0)) * _simulate(force, p, table, -0.08, 0.08)
 
@@ -193,16 +157,14 @@ def _force(experiment: str, size: float) -> np.ndarray:
 
 
 def _trial(experiment, size, repeat, order, position_mm) -> Record:
-    force = _force(experiment, size)
-    return Record(
-        f"{experiment}_{size:g}N_{repeat}",
-        experiment,
-        size,
-        np.arange(len(force)) * SAMPLE_S,
-        {"position_mm": position_mm},
-        order,
-        force,
-    )
+    time_s, name = np.arange(0, 6, SAMPLE_S), f"{experiment}_{size:g}N_{repeat}"
+    channels = {"position_mm": position_mm}
+    return Record(name, experiment, size, time_s, channels, order, _force(experiment, size))
+
+
+def slow(noise: np.ndarray, correlation: float) -> np.ndarray:
+    """White noise made one of the same size whose neighbouring samples are correlated."""
+    return lfilter([np.sqrt(1 - correlation**2)], [1.0, -correlation], noise)
 
 
 def hide(
@@ -229,8 +191,7 @@ def hide(
         run["stiffness_N_m"] *= 1 + drift * order / len(plan)
         clean = _position_mm(run, _force(experiment, size))
         noise = SENSOR_SD_MM * draw.standard_normal(len(clean))
-        for i in range(1, len(noise)):
-            noise[i] = noise_correlation * noise[i - 1] + np.sqrt(1 - noise_correlation**2) * noise[i]
+        noise = slow(noise, noise_correlation)
         trials.append(_trial(experiment, size, repeat + 1, order, clean + noise))
     library = {name: e for name, e in _EFFECTS.items() if name not in withhold}
     return ToySystem(tuple(trials), library)
@@ -248,6 +209,13 @@ def with_effect(case: Case, effect: str) -> tuple[Candidate, Candidate]:
     structure = Structure(case.system, (effect,))
     start = [starting_point(base.fitted, structure)]
     return base, case.judge(fit(structure, case.split.fit, base.fitted.problem.floor, starts=start))
+
+
+def moved(fitted: Fit, **theta: float) -> Fit:
+    """A fit as it would be had it ended at `theta`."""
+    point = replace(fitted.solution.point, values=fitted.structure.values(fitted.theta | theta))
+    solution = replace(fitted.solution, point=point, cost=cost_of(fitted.problem, point))
+    return replace(fitted, solution=solution)
 
 
 def draw_base(draw: np.random.Generator) -> dict[str, float]:

@@ -1,4 +1,5 @@
-"""A verdict in one figure: errors, what was tried, and measured against predicted where nothing was fitted."""
+"""Figures of a diagnosis: the verdict in one, errors, what was tried, effects' weights, learnt curves, and measured
+against predicted where nothing was fitted."""
 
 from __future__ import annotations
 
@@ -22,10 +23,10 @@ def overview(record: Mapping[str, Any], diagnosis: Diagnosis) -> Any:
     with look() as palette:
         import matplotlib.pyplot as plt
 
-        shown = held_out(diagnosis)[:_SHOWN]
+        shown = _held_out(diagnosis)[:_SHOWN]
         figure = plt.figure(figsize=(9.6, 3.0 + 2.1 * len(shown)), layout="constrained")
         rows = figure.add_gridspec(1 + len(shown), 2, height_ratios=[1.3, *([1.0] * len(shown))])
-        tried_on(figure.add_subplot(rows[0, :]), palette, record)
+        _tried_on(figure.add_subplot(rows[0, :]), palette, record)
         for row, one in enumerate(shown, start=1):
             _traces_on([figure.add_subplot(rows[row, 0]), figure.add_subplot(rows[row, 1])], palette, one, row == 1)
         return figure
@@ -33,7 +34,7 @@ def overview(record: Mapping[str, Any], diagnosis: Diagnosis) -> Any:
 
 def draw_held_out(diagnosis: Diagnosis, stream: BytesIO, dark: bool = False) -> None:
     """Measured and predicted, and the residual, of the records that were predicted worst before."""
-    shown = held_out(diagnosis)[: _SHOWN + 1]
+    shown = _held_out(diagnosis)[: _SHOWN + 1]
     size = (9.0, 1.9 * len(shown))
     with drawn(stream, dark, size, len(shown), 2, squeeze=False, layout="constrained") as (axes, palette):
         for k, (pair, one) in enumerate(zip(axes, shown, strict=True)):
@@ -43,10 +44,10 @@ def draw_held_out(diagnosis: Diagnosis, stream: BytesIO, dark: bool = False) -> 
 def draw_tried(record: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
     """What each explanation tried leaves, on a logarithmic axis."""
     with drawn(stream, dark, (7.2, 0.4 * min(len(record["tried"]), _TRIED) + 1.2)) as (axis, palette):
-        tried_on(axis, palette, record)
+        _tried_on(axis, palette, record)
 
 
-def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
+def _tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
     """Bars: the error of the base model and of the best explanations tried; a line: the floor."""
     tried = [one for one in record["tried"] if one["effects"]][:_TRIED]
     base = [one for one in record["tried"] if not one["effects"]]
@@ -63,7 +64,57 @@ def tried_on(axis: Any, palette: Palette, record: Mapping[str, Any]) -> None:
     axis.set_xlabel("RMS residual in units of the noise (dotted: the floor)")
 
 
-def held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
+def draw_errors(error: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
+    """Before against after, against the floor, on a logarithmic axis.
+
+    error: the `error` object of `bifa diagnose --json` (contracts, section 5), RMS in units of the noise.
+    """
+    before, after = _bars(error["before"]), _bars(error["after"])
+    names = [name for name in before if name in after]
+    rows = np.arange(len(names))[::-1]
+    with drawn(stream, dark, (7.2, 0.55 * len(names) + 1.1)) as (axis, palette):
+        for row, name in zip(rows, names, strict=True):
+            axis.plot([before[name], after[name]], [row, row], color=palette.quiet, linewidth=1.5, zorder=1)
+        axis.scatter(
+            [before[n] for n in names], rows, s=60, color=palette.before, edgecolor=palette.ink, label="base model"
+        )
+        axis.scatter([after[n] for n in names], rows, s=60, color=palette.after, label="after", zorder=3)
+        axis.axvline(error["noise_floor"]["held_out"], color=palette.ink, linestyle=":", label="noise floor")
+        axis.set_xscale("log")
+        axis.set_yticks(rows, names)
+        axis.set_ylim(-0.6, len(names) - 0.4)
+        axis.set_xlabel("RMS residual in units of the noise")
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def draw_weights(effects: Sequence[Mapping[str, Any]], stream: BytesIO, dark: bool = False) -> None:
+    """The weight of each effect named (`effects` of `bifa diagnose --json`), confusable ones beside it."""
+    with drawn(stream, dark, (7.2, 0.5 * max(len(effects), 1) + 0.9)) as (axis, palette):
+        rows = np.arange(len(effects))[::-1]
+        axis.barh(rows, [effect["probability"] for effect in effects], height=0.55, color=palette.after)
+        for row, effect in zip(rows, effects, strict=True):
+            confusable = ", ".join(effect["confusable_with"])
+            note = f"{effect['probability']:.2f}" + (f"   indistinguishable from: {confusable}" if confusable else "")
+            axis.text(effect["probability"] + 0.01, row, note, va="center")
+        axis.set_yticks(rows, [effect["name"].replace("_", " ") for effect in effects])
+        axis.set_xlim(0, 1.25)
+        axis.set_xticks([0, 0.5, 1])
+        axis.set_xlabel("weight")
+
+
+def draw_learnt(curve: Mapping[str, Any], stream: BytesIO, dark: bool = False) -> None:
+    """A curve learnt where no effect explains the data (an entry of `learnt` of `bifa diagnose --json`)."""
+    with drawn(stream, dark, (7.2, 2.4)) as (axis, palette):
+        axis.axhline(0.0, color=palette.quiet, linewidth=0.8)
+        for row, values in curve["rows"].items():
+            axis.plot(np.linspace(curve["lower"], curve["upper"], len(values)), values, label=row)
+        axis.set_xlabel(curve["variable"])
+        axis.set_ylabel(f"added ({curve['unit']})" if curve["unit"] else "added (relative)")
+        if len(curve["rows"]) > 1:
+            axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _held_out(diagnosis: Diagnosis) -> list[tuple[Record, str, Channels, Channels, float]]:
     """Records that were not fitted (without any, all), the worst predicted first: each with its worst channel,
     predictions before and after, and the floor's standard deviation of that channel."""
     trials = diagnosis.split.final or diagnosis.split.known
@@ -97,4 +148,11 @@ def _traces_on(axes: Sequence[Any], palette: Palette, one: tuple[Any, ...], lege
 
 def _rms(samples: np.ndarray) -> float:
     known = samples[np.isfinite(samples)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("inf")  # not predicted at all: the worst
+
+
+def _bars(side: Mapping[str, Any]) -> dict[str, float]:
+    bars = {"fitted trials": side["fitted"], "trials not fitted": side["held_out"]}
+    if side.get("held_out_conditions") is not None:
+        bars["conditions not fitted"] = side["held_out_conditions"]
+    return bars | {name.replace("_", " "): value for name, value in side.get("by_experiment", {}).items()}
