@@ -16,6 +16,15 @@ struct Program {
 };
 
 struct Board {
+  Board() {
+    memset(cells, 0xFF, sizeof cells);
+    start(bifa::StartCause::kPower);
+  }
+  ~Board() { delete program; }
+
+  void start(bifa::StartCause cause);
+  void step();
+
   uint8_t valves = 0;
   uint8_t cells[bifa::kEepromBytes];
   int cells_busy_ms = 0;
@@ -25,10 +34,6 @@ struct Board {
   uint16_t boots = 0;
   uint32_t now_ms = 0;
   uint16_t wobble = 0;
-  int32_t stopped_after_ms = -1;
-
-  void start(bifa::StartCause cause);
-  void step();
 };
 
 Board* running = nullptr;  ///< the one whose program is at work
@@ -64,11 +69,18 @@ void Board::step() {
 }  // namespace
 
 namespace bifa {
-void set_valves(ValvePattern pattern) { running->valves = pattern.bits(); }
+void set_valves(ValvePattern pattern) {
+  const uint8_t bits = running->valves = pattern.bits();
+  if (bits & (bits >> 1) & 0x15) __builtin_trap();  // both valves of a chamber
+}
 void outdate_input() { running->program->port.outdate(); }
-uint8_t eeprom_read(uint16_t address) { return running->cells[address % kEepromBytes]; }
+uint8_t eeprom_read(uint16_t address) {
+  if (address >= kEepromBytes) __builtin_trap();
+  return running->cells[address];
+}
 void eeprom_write(uint16_t address, uint8_t value) {
-  running->cells[address % kEepromBytes] = value;
+  if (address >= kEepromBytes) __builtin_trap();
+  running->cells[address] = value;
   running->cells_busy_ms = 4;
 }
 bool eeprom_busy() { return running->cells_busy_ms > 0; }
@@ -78,16 +90,8 @@ uint8_t output_room() { return 127; }
 
 extern "C" {
 
-Board* board_new() {
-  Board* board = new Board;
-  memset(board->cells, 0xFF, sizeof board->cells);
-  board->start(bifa::StartCause::kPower);
-  return board;
-}
-void board_free(Board* board) {
-  delete board->program;
-  delete board;
-}
+Board* board_new() { return new Board; }
+void board_free(Board* board) { delete board; }
 void board_reset(Board* board) { board->start(bifa::StartCause::kExternal); }
 void board_send(Board* board, const uint8_t* data, size_t size) {
   board->input.insert(board->input.end(), data, data + size);

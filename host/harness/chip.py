@@ -1,14 +1,17 @@
 """The image in the simulated ATmega328P behind the link's transport and clock, in virtual time."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from bifa import link
-from virtual_robot.uno import CLOCK_HZ, Uno
+from bifa.link import frames
+from bifa.link.table import COMMANDS
+from virtual_robot.uno import CLOCK_HZ, Event, Uno
 
 FIRMWARE = Path(__file__).parents[2] / ".pio/build/uno/firmware.elf"
 AT_REST_V = 2.5  # the sensors' reading of no pressure
 A_BIT_V = 0.005  # by which it moves, as that of a sensor that lives
-ALIVE_EVERY_S = 0.5
+ALIVE_EVERY_S = 0.01
 CYCLES_A_BYTE = 10 * CLOCK_HZ // 250_000
 VALVES = range(4, 10)
 
@@ -47,21 +50,28 @@ def connected(uno: Uno) -> link.Uno:
     return host
 
 
+def encoded(host: link.Uno, *names: str) -> list[bytes]:
+    """The frames of commands without fields, numbered as the next ones of its session."""
+    seed, sequence = frames.session_seed(host.session.key), host.session.sequence
+    return [frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(names)]
+
+
 class Chip(Line):
-    """A bare Uno (no robot) whose sensors live."""
+    """A bare Uno (no robot) whose sensors live; `volts` is what they read."""
 
     def __init__(self, keep_events: bool = False, eeprom: bytes | None = None) -> None:
         super().__init__(Uno(FIRMWARE, keep_events=keep_events))
         if eeprom is not None:
             self.uno.eeprom = eeprom
             self.uno.reset("power-on")
+        self.volts = [AT_REST_V] * 3
         self._turn = 0
         self._live()
 
     def _live(self) -> None:
         self._turn += 1
-        for channel in range(3):
-            self.uno.set_analog(channel, AT_REST_V + A_BIT_V * (self._turn % 2))
+        for channel, volts in enumerate(self.volts):
+            self.uno.set_analog(channel, volts + A_BIT_V * (self._turn % 2))
 
     def read(self, timeout_s: float) -> bytes:
         self._live()
@@ -77,6 +87,14 @@ class Chip(Line):
         """Levels of D4 to D9, one bit each."""
         return sum((self.uno.pin(pin) or 0) << i for i, pin in enumerate(VALVES))
 
+    def edges(self, first: int, pins: Iterable[int] = VALVES) -> list[Event]:
+        """Events of these pins, since the one of number `first`."""
+        return [event for event in self.uno.iter_events(first) if event.kind == "pin" and event.index in pins]
+
+    def fell(self, first: int) -> list[int]:
+        """Cycles at which a valve was taken off since then."""
+        return [edge.cycle for edge in self.edges(first) if edge.value == 0]
+
     def stop_latency_s(self, before: bytes, stop: bytes, after: bytes) -> float:
         """From the last bit of `stop`, sent between `before` and `after` without a pause, to the last valve's fall.
 
@@ -87,6 +105,5 @@ class Chip(Line):
         arrived = self.uno.cycle + (len(before) + len(stop)) * CYCLES_A_BYTE
         self.uno.send(before + stop + after)
         self.uno.run_until(arrived + len(after) * CYCLES_A_BYTE + CLOCK_HZ // 100)
-        falls = [e.cycle for e in self.uno.iter_events(known) if e.kind == "pin" and e.index in VALVES and e.value == 0]
         assert self.valves() == 0
-        return (max(falls) - arrived) / CLOCK_HZ
+        return (max(self.fell(known)) - arrived) / CLOCK_HZ

@@ -15,11 +15,10 @@ Columns = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Program:
-    """`suffix` of its files; `write(columns)`; `declared`: what its preset leaves to the lab, as TOML."""
+    """`suffix` of its files; `write(columns)`."""
 
     suffix: str
     write: Callable[[Columns], bytes]
-    declared: str = ""
 
 
 def _table(rows: Sequence[Sequence[object]], separator: str = ",", comma: bool = False, quoted: bool = False) -> str:
@@ -114,47 +113,23 @@ def tracker(columns: Columns) -> bytes:
     return ("mass_A\t\t\r\n" + _table([["t", "x", "y"], *_rows(time_s, 1e-3 * x_mm, 0.0 * x_mm)], "\t")).encode()
 
 
-def _machine(columns: Columns, names: Sequence[str], units: Sequence[str], newton: float = 1.0) -> list[list[object]]:
-    numbers = _rows(columns["time_s"], columns["displacement_mm"], columns["force_N"] / newton)
-    return [list(names), list(units), *numbers]
+def _machine(
+    names: Sequence[str],
+    units: Sequence[str],
+    above: str = "",
+    separator: str = ";",
+    comma: bool = True,
+    quoted: bool = False,
+    newton: float = 1.0,
+    encoding: str = "cp1252",
+) -> Callable[[Columns], bytes]:
+    """A testing machine's program: time, travel and force below `above`; a count of its force is `newton`."""
 
+    def write(columns: Columns) -> bytes:
+        numbers = _rows(columns["time_s"], columns["displacement_mm"], columns["force_N"] / newton)
+        return (above + _table([names, units, *numbers], separator, comma, quoted)).encode(encoding)
 
-def bluehill(columns: Columns) -> bytes:
-    """Instron Bluehill, English: a table of results above the raw data, cells in quotes."""
-    above = '"Results Table 1"\r\n"","Maximum Load"\r\n"","(N)"\r\n"1","12.3"\r\n\r\n"Specimen 1"\r\n'
-    rows = _machine(columns, ("Time", "Extension", "Load"), ("(s)", "(mm)", "(N)"))
-    return (above + _table(rows, quoted=True)).encode()
-
-
-def bluehill_german(columns: Columns) -> bytes:
-    """Instron Bluehill, German: semicolons, decimal commas, Windows' encoding."""
-    rows = _machine(columns, ("Zeit", "Verlängerung", "Last"), ("(s)", "(mm)", "(N)"))
-    return ("Ergebnistabelle 1\r\n" + _table(rows, ";", comma=True)).encode("cp1252")
-
-
-def bluehill_french(columns: Columns) -> bytes:
-    """Instron Bluehill, French."""
-    rows = _machine(columns, ("Temps", "Extension", "Charge"), ("(s)", "(mm)", "(N)"))
-    return ("Éprouvette 1\r\n" + _table(rows, ";", comma=True)).encode("cp1252")
-
-
-def trapezium(columns: Columns) -> bytes:
-    """Shimadzu Trapezium: the specimen's name, quoted cells."""
-    rows = _machine(columns, ("Time", "Stroke", "Force"), ("sec", "mm", "N"))
-    return ('"1 _ 1","",""\r\n' + _table(rows, quoted=True)).encode()
-
-
-def walter_bai(columns: Columns) -> bytes:
-    """Walter+Bai: a preamble, tabs, kilonewtons."""
-    rows = _machine(columns, ("Zeit", "Weg", "Kraft"), ("[s]", "[mm]", "[kN]"), 1000.0)
-    text = "Prüfung\tRückstellkraft\r\nDatum\t25.11.2026\r\n\r\n" + _table(rows, "\t", comma=True)
-    return text.encode("cp1252")
-
-
-def testxpert(columns: Columns) -> bytes:
-    """Zwick testXpert, .TRA."""
-    rows = _machine(columns, ('"Prüfzeit"', '"Standardweg"', '"Standardkraft"'), ('"s"', '"mm"', '"N"'))
-    return _table(rows, ";", comma=True).encode("cp1252")
+    return write
 
 
 def labview(columns: Columns) -> bytes:
@@ -177,6 +152,12 @@ def arduino(columns: Columns) -> bytes:
     return _table([["millis", *found], *_rows(millis, *found.values())]).encode()
 
 
+_RESULTS = '"Results Table 1"\r\n"","Maximum Load"\r\n"","(N)"\r\n"1","12.3"\r\n\r\n"Specimen 1"\r\n'
+_TEST = "Prüfung\tRückstellkraft\r\nDatum\t25.11.2026\r\n\r\n"
+_INSTRON = ("(s)", "(mm)", "(N)")
+_ENGLISH = {"separator": ",", "comma": False, "quoted": True, "encoding": "utf-8"}
+_ZWICK = ('"Prüfzeit"', '"Standardweg"', '"Standardkraft"'), ('"s"', '"mm"', '"N"')
+
 EXPORTS = {
     "motive": Program(".csv", motive),
     "motive, format 1.25": Program(".csv", motive3),
@@ -184,12 +165,16 @@ EXPORTS = {
     "qualisys": Program(".tsv", qualisys),
     "vicon": Program(".csv", vicon),
     "tracker": Program(".txt", tracker),
-    "bluehill": Program(".csv", bluehill),
-    "bluehill-german": Program(".csv", bluehill_german),
-    "bluehill-french": Program(".CSV", bluehill_french),
-    "trapezium": Program(".csv", trapezium),
-    "walter-bai": Program(".txt", walter_bai),
-    "testxpert": Program(".TRA", testxpert),
+    "bluehill": Program(".csv", _machine(("Time", "Extension", "Load"), _INSTRON, _RESULTS, **_ENGLISH)),
+    "bluehill-german": Program(".csv", _machine(("Zeit", "Verlängerung", "Last"), _INSTRON, "Ergebnistabelle 1\r\n")),
+    "bluehill-french": Program(".CSV", _machine(("Temps", "Extension", "Charge"), _INSTRON, "Éprouvette 1\r\n")),
+    "trapezium": Program(
+        ".csv", _machine(("Time", "Stroke", "Force"), ("sec", "mm", "N"), '"1 _ 1","",""\r\n', **_ENGLISH)
+    ),
+    "walter-bai": Program(
+        ".txt", _machine(("Zeit", "Weg", "Kraft"), ("[s]", "[mm]", "[kN]"), _TEST, "\t", newton=1000.0)
+    ),
+    "testxpert": Program(".TRA", _machine(*_ZWICK)),
     "labview": Program(".lvm", labview),
     "arduino": Program(".csv", arduino),
 }

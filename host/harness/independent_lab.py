@@ -7,14 +7,17 @@ steps of a single actuator come from SciPy, and every channel carries noise of a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from bifa import robot
 from bifa.data import Dataset, Trial
 
 G = 9.81
@@ -101,7 +104,9 @@ class IndependentLab:
             "force_N": force + self.noise(len(x), self.force_noise),
             "pressure_psi": self.sensor(np.full(len(x), pressure)),
         }
-        return _trial("static_loading", columns, actuator=which, pressure_psi=pressure, rate_mm_s=rate_mm_s, **labels)
+        return Trial(
+            "", "static_loading", columns, actuator=which, pressure_psi=pressure, rate_mm_s=rate_mm_s, **labels
+        )
 
     def step(self, which: str, pressure: float, **labels) -> Trial:
         """At rest under vacuum, positive from 0.5 s, vacuum again from 3.5 s, to 8 s."""
@@ -112,7 +117,7 @@ class IndependentLab:
             "displacement_mm": x * 1e3 + self.noise(len(time), self.displacement_noise_mm),
             "pressure_psi": self.sensor(sensed),
         }
-        return _trial("step_response", columns, actuator=which, pressure_psi=pressure, **labels)
+        return Trial("", "step_response", columns, which, pressure, **labels)
 
     def anchor(self, pressure: float, rate_mm_s: float = 20.0, **labels) -> Trial:
         """Quasi-static: the load cell winds up to static friction, then the head slides."""
@@ -136,7 +141,7 @@ class IndependentLab:
             "force_N": force + self.noise(len(time), self.force_noise),
             "pressure_psi": self.sensor(np.full(len(time), pressure)),
         }
-        return _trial("anchor_pull", columns, pressure_psi=pressure, rate_mm_s=rate_mm_s, **labels)
+        return Trial("", "anchor_pull", columns, pressure_psi=pressure, rate_mm_s=rate_mm_s, **labels)
 
     def walk(self, gait: dict[str, float], duration_s: float = 20.0, **labels) -> Trial:
         """All three phases start where eq. (9) settles, the body's at 0."""
@@ -165,20 +170,20 @@ class IndependentLab:
             columns[f"pressure_{chamber}_psi"] = self.sensor(out[2 + i, :n])
         columns["displacement_head_mm"] = out[0, :n] * 1e3 + self.noise(n, self.displacement_noise_mm)
         columns["displacement_tail_mm"] = out[1, :n] * 1e3 + self.noise(n, self.displacement_noise_mm)
-        return _trial("locomotion", columns, gait=gait, **labels)
+        return Trial("", "locomotion", columns, gait=gait, **labels)
+
+    def day(self, name: str, trials: Sequence[Trial], path: Path | None = None) -> Dataset:
+        """A data set of trials in the order in which they were measured."""
+        known = {"head_mass_kg": self.head_mass, "tail_mass_kg": self.tail_mass}
+        known |= {"supply_positive_psi": self.positive, "supply_negative_psi": self.negative}
+        trials = tuple(replace(t, file=f"{i:03d}_{t.experiment}.csv", session_order=i) for i, t in enumerate(trials))
+        return Dataset(path=path, name=name, known=known, trials=trials)
 
 
-BASELINE = {
-    "period_s": 5.7,
-    "psi12_deg": 270.0,
-    "psi13_deg": 90.0,
-    "duty_body": 0.5,
-    "duty_head": 0.5,
-    "duty_tail": 0.5,
-}
+BASELINE = robot.BASELINE.as_dict()
 
 
-def session(lab: IndependentLab, path, repeats: int = 3, walks: int = 2) -> Dataset:
+def session(lab: IndependentLab, path: Path | None, repeats: int = 3, walks: int = 2) -> Dataset:
     """A day at the bench: both actuators at three pressures, steps at two, pulls at three, walks."""
     trials = []
     for repeat in range(1, repeats + 1):
@@ -187,16 +192,7 @@ def session(lab: IndependentLab, path, repeats: int = 3, walks: int = 2) -> Data
             trials += [lab.step(which, p, repeat=repeat) for p in (6.5, 8.5)]
         trials += [lab.anchor(p, repeat=repeat) for p in (0.0, 4.0, 8.5)]
     trials += [lab.walk(BASELINE, repeat=repeat) for repeat in range(1, walks + 1)]
-    known = {
-        "head_mass_kg": lab.head_mass,
-        "tail_mass_kg": lab.tail_mass,
-        "supply_positive_psi": lab.positive,
-        "supply_negative_psi": lab.negative,
-    }
-    trials = tuple(
-        replace(trial, file=f"{i:03d}_{trial.experiment}.csv", session_order=i) for i, trial in enumerate(trials)
-    )
-    return Dataset(path=path, name="independent laboratory", known=known, trials=trials)
+    return lab.day("independent laboratory", trials, path)
 
 
 def small_session(lab: IndependentLab) -> Dataset:
@@ -208,24 +204,7 @@ def small_session(lab: IndependentLab) -> Dataset:
             trials += [lab.step(which, p, repeat=repeat) for p in (6.5, 8.5)]
         trials += [lab.anchor(p, repeat=repeat) for p in (0.0, 4.0, 8.5)]
         trials += [lab.walk(BASELINE, 12.0, repeat=repeat)]
-    trials = tuple(replace(t, file=f"{i:02d}.csv", session_order=i) for i, t in enumerate(trials))
-    known = {"head_mass_kg": lab.head_mass, "tail_mass_kg": lab.tail_mass}
-    known |= {"supply_positive_psi": lab.positive, "supply_negative_psi": lab.negative}
-    return Dataset(path=None, name="small session", known=known, trials=trials)
-
-
-def _trial(experiment, columns, **labels) -> Trial:
-    fields = {
-        "file": "",
-        "actuator": None,
-        "pressure_psi": None,
-        "rate_mm_s": None,
-        "gait": None,
-        "repeat": 1,
-        "session_order": None,
-        "extra": {},
-    }
-    return Trial(experiment=experiment, columns=columns, **(fields | labels))
+    return lab.day("small session", trials)
 
 
 @lru_cache(maxsize=64)

@@ -17,8 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
+from bifa.measure.plan import BRISK, PlannedTrial
 from harness.exports import CAMERAS, EXPORTS, MACHINES, preset_of
 from virtual_robot.rig import VirtualRig, open_rig
+
+STATIC = PlannedTrial("static_loading", "small", 4.0, 20.0)
+STEP = PlannedTrial("step_response", "small", 8.5)
+PULL = PlannedTrial("anchor_pull", None, 8.5, 40.0)
+WALK = PlannedTrial("locomotion", gait=BRISK, cycles=1)
+PLAN = (STATIC, STEP, PULL, WALK)  # every experiment, each as short as it may be
 
 _MOUNTED_BY = {  # which of a trial's settings the stand is told
     "static_loading": ("actuator", "rate_mm_s"),

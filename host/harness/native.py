@@ -1,7 +1,9 @@
 """Compiles the Uno's own code (lib/) for this computer, so that proofs run millions of times."""
 
 import hashlib
+import os
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import cffi
@@ -10,21 +12,29 @@ ROOT = Path(__file__).parents[2]
 BUILD = ROOT / "build/native"
 
 
+def compiled(name: str, command: Sequence[str], sources: Sequence[Path], included: Sequence[Path] = ()) -> Path:
+    """What the compiler makes of the sources with the headers of lib/; made once for each state of all of them.
+
+    Raises RuntimeError with what the compiler said.
+    """
+    headers = sorted((ROOT / "lib").glob("*/*.h"))
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *included, *headers])).hexdigest()[:16]
+    target = BUILD / f"{name}-{digest}"
+    if not target.exists():
+        BUILD.mkdir(parents=True, exist_ok=True)
+        partial = target.with_suffix(f".{os.getpid()}.tmp")
+        includes = [f"-I{folder}" for folder in sorted((ROOT / "lib").iterdir())]
+        done = subprocess.run([*command, *includes, *sources, "-o", partial], capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(done.stderr)
+        partial.replace(target)
+    return target
+
+
 def load(harness: Path, declarations: str, parts: tuple[str, ...] = ("*/*.cpp",)) -> tuple[cffi.FFI, object]:
     """The harness (a C++ file with C functions) linked with parts of lib/, as a cffi library."""
     sources = [harness, *sorted(path for part in parts for path in (ROOT / "lib").glob(part))]
-    headers = sorted((ROOT / "lib").glob("*/*.h"))
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *headers])).hexdigest()[:16]
-    library = BUILD / f"{harness.stem}-{digest}.so"
-    if not library.exists():
-        BUILD.mkdir(parents=True, exist_ok=True)
-        partial = library.with_suffix(f".{id(library)}.tmp")
-        includes = [f"-I{folder}" for folder in sorted((ROOT / "lib").iterdir())]
-        subprocess.run(
-            ["g++", "-std=gnu++11", "-O2", "-Wall", "-Wextra", "-shared", "-fPIC", *includes, *sources, "-o", partial],
-            check=True,
-        )
-        partial.replace(library)
     ffi = cffi.FFI()
     ffi.cdef(declarations)
-    return ffi, ffi.dlopen(str(library))
+    command = ("g++", "-std=gnu++11", "-O2", "-Wall", "-Wextra", "-shared", "-fPIC")
+    return ffi, ffi.dlopen(str(compiled(harness.stem, command, sources)))

@@ -94,18 +94,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--label", type=Path, help="the sealed file (default: OUT.sealed.toml)")
     parser.add_argument("--profile", choices=("ideal", "realistic", "worn"), default="realistic")
     parser.add_argument("--quick", action="store_true", help="fewer conditions, each twice")
-    options = parser.parse_args(arguments)
+    options = vars(parser.parse_args(arguments))
+    trials = plan.session(quick=options.pop("quick"))
     try:
-        generate(
-            options.seed,
-            options.out,
-            options.kind,
-            options.effect,
-            options.size,
-            options.label,
-            plan.session(quick=options.quick),
-            options.profile,
-        )
+        generate(**options, trials=trials)
     except (VirtualRobotError, BifaError) as error:
         print(error, file=sys.stderr)
         return 2

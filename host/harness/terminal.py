@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pexpect
 import pyte
 
-PATIENCE_S = 60  # other tests may keep the computer busy
+from harness.waiting import PATIENCE_S
 
 
 class Terminal:

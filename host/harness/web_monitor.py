@@ -2,11 +2,12 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
-import time
 
 from harness.pty_uno import PtyUno
+from harness.waiting import until
 from harness.web_socket import WebSocket
 
 
@@ -25,21 +26,24 @@ class WebMonitor:
         self.said = self.process.stdout.readline()
         self.url = re.search(r"http://\S+", self.said)[0]
         self.origin, self.token = self.url.split("/#")
+        self.port = int(self.origin.rpartition(":")[2])
 
     def gait(self):
         """What the Uno has."""
-        watcher = WebSocket(int(self.origin.rpartition(":")[2]))
+        watcher = WebSocket(self.port)
         try:
             return watcher.until(lambda state: "parameters" in state)["parameters"]
         finally:
             watcher.close()
 
     def until(self, state, timeout_s=10.0):
-        """Wait for the board's state."""
-        end_s = time.monotonic() + timeout_s
-        while self.uno.board.state != state and time.monotonic() < end_s:
-            time.sleep(0.02)
-        return self.uno.board.state
+        """Whether the board comes to this state in time."""
+        return until(lambda: self.uno.board.state == state, timeout_s)
+
+    def interrupt(self):
+        """Ctrl-C; the exit status."""
+        self.process.send_signal(signal.SIGINT)
+        return self.process.wait(15)
 
     def close(self):
         self.process.kill()

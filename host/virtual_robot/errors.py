@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What can go wrong on the virtual bench, each saying what to do."""
+"""What can go wrong on the virtual bench, each saying what to do; and the check of a file's place, before the work."""
+
+import os
+from pathlib import Path
 
 
 class VirtualRobotError(Exception):
@@ -36,3 +39,12 @@ class EventsGoneError(VirtualRobotError):
 
 class PortClosedError(ConnectionError):
     """The simulated serial port is no longer there (closed, or the board has no power)."""
+
+
+def check_place(file: Path, what: str) -> None:
+    """Before the work: raise VirtualRobotError unless the folder of `file`, called `what`, can be written in."""
+    folder = file.absolute().parent
+    if not folder.is_dir():
+        raise VirtualRobotError(f"the folder of {what} {file} does not exist; create it first")
+    if not os.access(folder, os.W_OK):
+        raise VirtualRobotError(f"{what} {file} cannot be written (no permission); choose another place")

@@ -15,8 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from virtual_robot.errors import VirtualRobotError
-from virtual_robot.places import check_place
+from virtual_robot.errors import VirtualRobotError, check_place
 
 _SLICE_S = 0.005
 _STATUS_S = 0.25
@@ -27,12 +26,12 @@ _MAX_LAG_S = 0.5  # after a longer stall (a suspended process) lost time is not 
 def serve(
     rig: Any,
     on_ready: Callable[[str], None],
-    on_status: Callable[[dict[str, Any]], None],
-    link: Path | None,
-    stop: Callable[[], bool],
+    on_status: Callable[[dict[str, Any]], None] = lambda status: None,
+    link: Path | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Serve until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path, `on_status` a dict four times a
-    second; `link` is a symbolic link kept to the pty meanwhile."""
+    """Offer the bench on a pty in real time until `stop()` or KeyboardInterrupt. `on_ready` gets the pty's path,
+    `on_status` a dict four times a second; `link` is a symbolic link kept to the pty meanwhile."""
     if not hasattr(os, "openpty"):
         raise VirtualRobotError("a pseudo-terminal needs Linux or macOS")
     import tty  # there is none on Windows

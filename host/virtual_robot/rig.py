@@ -10,11 +10,10 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from virtual_robot.errors import FirmwareError, PortClosedError
 from virtual_robot.instruments import Instruments, Noise
 from virtual_robot.plant import Plant
 from virtual_robot.plant import profile as parameters_in
+from virtual_robot.pty_server import serve
 from virtual_robot.sealed import draw_effects, specimen
 from virtual_robot.uno import CLOCK_HZ, Uno
 
@@ -158,17 +158,7 @@ class VirtualRig:
         """Fix a pressure sensor's output ("body", "head", "tail", "regulator"); None = in order again."""
         self.plant.break_sensor(("body", "head", "tail", "regulator").index(chamber), volts)
 
-    def serve_pty(
-        self,
-        on_ready: Callable[[str], None],
-        on_status: Callable[[dict[str, Any]], None] = lambda status: None,
-        link: Path | None = None,
-        stop: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Offer the bench on a pty in real time until `stop()` or Ctrl-C; see virtual_robot.pty_server."""
-        from virtual_robot.pty_server import serve
-
-        serve(self, on_ready, on_status, link, stop)
+    serve_pty = serve
 
     def close(self) -> None:
         """Let go of everything; the EEPROM goes to its file. A second call does nothing."""

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from virtual_robot.gait import Gait
+from virtual_robot.instruments.bench import CAMERA_HZ, MACHINE_HZ
 from virtual_robot.instruments.sensors import Noise, converted_psi, measured
 from virtual_robot.plant import Curve, Plant
 from virtual_robot.plant.plant import CHAMBERS
 
-_STATIC_HZ, _STEP_HZ, _ANCHOR_HZ, _WALK_HZ = 50.0, 100.0, 50.0, 100.0
 _STEP_UP_S, _STEP_DOWN_S, _STEP_END_S = 0.5, 5.0, 14.0
 _PULL_M = 0.06
 
@@ -78,33 +78,30 @@ class Lab:
     def pressure(self, rows: np.ndarray, chamber: int, random: np.random.Generator) -> np.ndarray:
         return converted_psi(rows["pressure_psi"][:, chamber], self.noise.pressure_psi, random)
 
-    def machine(
-        self, time: np.ndarray, rows: np.ndarray, plan: Plan, random: np.random.Generator
-    ) -> dict[str, np.ndarray]:
-        """The columns of an experiment with a cross-head."""
-        return {
-            "time_s": time,
-            "displacement_mm": 1e3 * measured(rows["crosshead_m"], self.noise.crosshead_m, random),
-            "force_N": measured(rows["force_N"], self.noise.force_N, random),
-            "pressure_psi": self.pressure(rows, CHAMBERS.index(plan.chamber), random),
-        }
 
-
-def _static(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
+def _pulled(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
+    """An experiment with a cross-head: to the extended state and back, or the pull, without its very end."""
+    static = plan.experiment == "static_loading"
     contracted, _, extended = plant.landmarks_m(plan.chamber != "body")
-    travel = np.round((extended - contracted) * 1e3, 1) * 1e-3
-    plant.mount("static_loading", plan.chamber, "positive" if plan.pressure_psi > 0 else "off")
-    plant.move(0.0, travel, plan.rate_m_s, there_and_back=True)
-    time = np.arange(int(2.0 * travel / plan.rate_m_s * _STATIC_HZ) + 1) / _STATIC_HZ
+    travel = np.round((extended - contracted) * 1e3, 1) * 1e-3 if static else _PULL_M
+    plant.mount(plan.experiment, plan.chamber, "positive" if plan.pressure_psi > 0 else "off")
+    plant.move(0.0, travel, plan.rate_m_s, there_and_back=static)
+    path = 2.0 * travel if static else travel
+    time = np.arange(int(path / plan.rate_m_s * MACHINE_HZ) + static) / MACHINE_HZ
     rows = plant.record(time)
-    return lab.machine(time, rows, plan, random)
+    return {
+        "time_s": time,
+        "displacement_mm": 1e3 * measured(rows["crosshead_m"], lab.noise.crosshead_m, random),
+        "force_N": measured(rows["force_N"], lab.noise.force_N, random),
+        "pressure_psi": lab.pressure(rows, CHAMBERS.index(plan.chamber), random),
+    }
 
 
 def _step(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
     plant.mount("step_response", plan.chamber, "vacuum")
     plant.connect(_STEP_UP_S, plan.chamber, "positive")
     plant.connect(_STEP_DOWN_S, plan.chamber, "vacuum")
-    time = np.arange(int(_STEP_END_S * _STEP_HZ) + 1) / _STEP_HZ
+    time = np.arange(int(_STEP_END_S * CAMERA_HZ) + 1) / CAMERA_HZ
     rows = plant.record(time)
     return {
         "time_s": time,
@@ -114,17 +111,9 @@ def _step(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> di
     }
 
 
-def _anchor(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
-    plant.mount("anchor_pull", "head", "positive" if plan.pressure_psi > 0 else "off")
-    plant.move(0.0, _PULL_M, plan.rate_m_s, there_and_back=False)
-    time = np.arange(int(_PULL_M / plan.rate_m_s * _ANCHOR_HZ)) / _ANCHOR_HZ
-    rows = plant.record(time)
-    return lab.machine(time, rows, plan, random)
-
-
 def _walk(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> dict[str, np.ndarray]:
     assert plan.gait is not None
-    time = np.arange(round(plan.cycles * plan.gait.period_s * _WALK_HZ) + 1) / _WALK_HZ
+    time = np.arange(round(plan.cycles * plan.gait.period_s * CAMERA_HZ) + 1) / CAMERA_HZ
     commands = plan.gait.commands(time)
     plant.mount("locomotion")
     for switch in plan.gait.switches(float(time[-1])):
@@ -140,8 +129,8 @@ def _walk(lab: Lab, plant: Plant, plan: Plan, random: np.random.Generator) -> di
 
 
 _RUNS: dict[str, Callable[[Lab, Plant, Plan, np.random.Generator], dict[str, np.ndarray]]] = {
-    "static_loading": _static,
+    "static_loading": _pulled,
     "step_response": _step,
-    "anchor_pull": _anchor,
+    "anchor_pull": _pulled,
     "locomotion": _walk,
 }

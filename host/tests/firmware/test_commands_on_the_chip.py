@@ -5,28 +5,33 @@ import pytest
 from bifa.link import frames
 from bifa.link.errors import LinkError, RefusedError
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS, PROTOCOL_VERSION, TABLE_HASH
-from harness.chip import connected
+from harness.chip import connected, encoded
 
 pytestmark = pytest.mark.uno
-
-
-def code(refused: pytest.ExceptionInfo) -> str:
-    return str(refused.value)
 
 
 def add(uno, time_ms: int, chamber: int, state: int) -> None:
     uno.session.call("schedule_add", time_ms, chamber, state)
 
 
-def test_first_error_spoils_a_schedule_until_it_is_cleared(bench):
-    uno = connected(bench.board)
+TWO = [(0, 0, 2), (1000, 1, 2)]
+SIXTEEN = [(100 * entry, 0, 2) for entry in range(16)]
+
+
+@pytest.mark.parametrize(
+    ("entries", "wrong"),
+    [(TWO, (500, 0, 0)), (TWO, (2000, 3, 2)), (TWO, (2000, 0, 3)), (SIXTEEN, (1600, 0, 0))],
+    ids=["goes backwards", "no chamber", "no state", "seventeenth"],
+)
+def test_entry_that_is_wrong_spoils_a_schedule_until_it_is_cleared(bench, entries, wrong):
+    uno = connected(bench.uno)
     uno.session.call("schedule_clear")
-    add(uno, 0, 0, 2)
-    add(uno, 1000, 1, 2)
-    with pytest.raises(RefusedError, match="backwards"):
-        add(uno, 500, 0, 0)
+    for entry in entries:
+        add(uno, *entry)
+    with pytest.raises(LinkError):
+        add(uno, *wrong)
     with pytest.raises(RefusedError, match="a field was rejected"):
-        add(uno, 2000, 0, 0)
+        add(uno, 3000, 0, 0)
     with pytest.raises(RefusedError, match="a field was rejected"):
         uno.session.call("schedule_start")
     bench.wait(1.5)
@@ -38,33 +43,8 @@ def test_first_error_spoils_a_schedule_until_it_is_cleared(bench):
     assert bench.valves_on
 
 
-@pytest.mark.parametrize("wrong", [(0, 3, 2), (0, 0, 3)], ids=["chamber", "state"])
-def test_entry_that_makes_no_sense_spoils_a_schedule(bench, wrong):
-    uno = connected(bench.board)
-    uno.session.call("schedule_clear")
-    add(uno, 0, 0, 2)
-    with pytest.raises(RefusedError):
-        add(uno, *wrong)
-    with pytest.raises(RefusedError):
-        uno.session.call("schedule_start")
-    bench.wait(0.1)
-    assert not bench.valves_on
-
-
-def test_schedule_of_seventeen_entries_does_not_run_without_its_last(bench):
-    uno = connected(bench.board)
-    uno.session.call("schedule_clear")
-    for entry in range(16):
-        add(uno, 100 * entry, 0, 2)
-    with pytest.raises(LinkError):
-        add(uno, 1600, 0, 0)
-    with pytest.raises(RefusedError):
-        uno.session.call("schedule_start")
-    assert not bench.valves_on
-
-
 def test_walk_is_refused_while_timed_holds_wait_and_none_of_them_is_lost(bench):
-    uno = connected(bench.board)
+    uno = connected(bench.uno)
     uno.schedule([(0.5, "body", "positive"), (1.0, "body", "off")])
     assert "error not in this state" in bench.say("run")
     with pytest.raises(RefusedError, match="not in this state"):
@@ -76,7 +56,7 @@ def test_walk_is_refused_while_timed_holds_wait_and_none_of_them_is_lost(bench):
 
 
 def test_clearing_timed_holds_that_run_vents(bench):
-    uno = connected(bench.board)
+    uno = connected(bench.uno)
     uno.schedule([(0, "body", "positive"), (5.0, "body", "off")])
     bench.wait(0.1)
     assert bench.valves_on == [4]
@@ -85,49 +65,46 @@ def test_clearing_timed_holds_that_run_vents(bench):
 
 
 def test_new_session_ends_the_timed_holds_of_the_one_before(bench):
-    uno = connected(bench.board)
-    first = bench.board.event_count
+    uno = connected(bench.uno)
+    first = bench.uno.event_count
     uno.schedule([(0.5, "body", "positive"), (1.0, "body", "off")])
     uno.connect()
     bench.wait(1.5)
-    assert not [e for e in bench.events_since(first) if e.kind == "pin" and e.index == 4]
+    assert bench.edges(first, [4]) == []
 
 
 def test_holds_that_wait_for_longer_than_the_host_may_be_silent_open_no_valve_even_for_a_moment(bench):
-    uno = connected(bench.board)
+    uno = connected(bench.uno)
     uno.set("host_timeout_s", 0.5)
-    first = bench.board.event_count
+    first = bench.uno.event_count
     uno.schedule([(1.0, "body", "positive"), (2.0, "body", "off")])
     bench.wait(3.0)
-    assert not [e for e in bench.events_since(first) if e.kind == "pin" and e.index == 4]
+    assert bench.edges(first, [4]) == []
     assert "host_silent" in bench.say("status", 0.5)
 
 
 def test_stop_that_is_typed_behind_a_torn_frame_is_carried_out(bench):
     bench.say("run")
     torn = frames.encode(COMMANDS["status"], 0, (), frames.session_seed(1))
-    bench.board.send(torn[:5])
+    bench.uno.send(torn[:5])
     bench.wait(0.03)
-    bench.board.send(torn[5:])
+    bench.uno.send(torn[5:])
     bench.wait(0.03)
     assert bench.say("stop").rstrip().endswith("ok")
     assert not bench.valves_on
 
 
 def test_clear_frame_behind_a_stop_is_carried_out_whatever_waits_before_it(bench):
-    uno = connected(bench.board)
-    seed, sequence = frames.session_seed(uno.session.key), uno.session.sequence
-    status, clear = (
-        frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("status", "clear"))
-    )
+    uno = connected(bench.uno)
+    status, clear = encoded(uno, "status", "clear")
     bench.say("help", 0.001)  # while it prints the others wait
-    bench.board.send(status + b"!" + clear)
+    bench.uno.send(status + b"!" + clear)
     bench.wait(1.0)
     assert "state idle" in bench.say("status", 0.5)
 
 
 def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(bench):
-    uno = connected(bench.board)
+    uno = connected(bench.uno)
     uno.upload({"period_s": 20.0, "host_timeout_s": 60.0})  # nobody talks to it for a cycle
     uno.run()
     bench.wait(1.0)
@@ -135,7 +112,7 @@ def test_set_while_an_upload_waits_for_the_boundary_changes_only_what_was_set(be
     uno.upload({"duty_body": 0.0, "duty_head": 0.0, "duty_tail": 0.0}, wait=False)
     before = bench.valves_on
     assert "ok" in bench.say("set pressure_psi 5", 0.3)
-    assert bench.board.dac_code == 5000 * 4096 // 130_000
+    assert bench.uno.dac_code == 5000 * 4096 // 130_000
     assert bench.valves_on == before, "the waiting set was taken over in mid-cycle"
     bench.wait(20.0)
     assert bench.valves_on == [4, 6, 8], "at the boundary all are positive for good"
@@ -151,7 +128,7 @@ def test_answers_have_units_ranges_and_marks(bench):
         "[duty_body 0.6535 (0 to 1, default 0.5) * power-up 0.5",
     ]
     assert bench.say("save", 1.0).endswith("ok\r\n")
-    bench.board.reset("power-on")
+    bench.uno.reset("power-on")
     bench.wait(0.3)
     assert bench.say("show period_s") == "[period_s 2.72 s (0.5 to 60 s, default 5.7 s)\r\nok\r\n"
 
@@ -172,25 +149,20 @@ def test_help_is_printed_whole_and_with_line_ends_for_bare_terminals(bench):
     assert said.count("\n") == said.count("\r\n") == said.count("\r")
 
 
-@pytest.mark.parametrize("noise", [b"\x9c", b"\n", b"x", b"nonsense\n", b"\x00\x01\x00"])
-def test_what_makes_no_sense_does_not_pass_for_a_host(bench, noise):
+NO_SENSE = [b"", b"\x9c", b"\n", b"x", b"nonsense\n", b"\x00\x01\x00"]
+
+
+@pytest.mark.parametrize(
+    ("sent", "is_host"), [*((sent, False) for sent in NO_SENSE), (b"status\n", True), (b"show period_s\n", True)]
+)
+def test_only_what_makes_sense_passes_for_a_host(bench, sent, is_host):
     bench.say("set host_timeout_s 1.5")
     bench.say("run")
     for _ in range(4):
-        bench.board.send(noise)
+        bench.uno.send(sent)
         bench.wait(0.5)
-    assert not bench.valves_on
-    assert "host_silent" in bench.say("status", 0.5) + bench.say("status", 0.5)
-
-
-@pytest.mark.parametrize("sense", [b"status\n", b"show period_s\n"])
-def test_a_line_that_makes_sense_does(bench, sense):
-    bench.say("set host_timeout_s 1.5")
-    bench.say("run")
-    for _ in range(8):
-        bench.board.send(sense)
-        bench.wait(0.5)
-    assert bench.valves_on
+    assert bool(bench.valves_on) == is_host
+    assert ("host_silent" in bench.say("status", 0.5) + bench.say("status", 0.5)) != is_host
 
 
 def test_zero_is_refused_with_its_reason_and_shows_the_old_and_the_new_offset(bench):
@@ -211,7 +183,7 @@ def test_zero_is_refused_with_its_reason_and_shows_the_old_and_the_new_offset(be
 
 
 def test_set_that_waited_when_the_walk_ended_is_that_of_the_next_walk(bench):
-    uno = connected(bench.board)
+    uno = connected(bench.uno)
     uno.upload({"period_s": 20.0})
     uno.run()
     bench.wait(1.0)
@@ -224,9 +196,9 @@ def test_set_that_waited_when_the_walk_ended_is_that_of_the_next_walk(bench):
 def test_host_that_waits_for_the_eeprom_is_not_silent(bench):
     assert "ok" in bench.say("set host_timeout_s 0.2")
     bench.say("run", 0.01)
-    bench.board.send(b"save night\n")
+    bench.uno.send(b"save night\n")
     bench.wait(0.1)
-    assert bench.board.eeprom_writes > 0
+    assert bench.uno.eeprom_writes > 0
     assert "host_silent" not in bench.wait(0.25)
     assert bench.valves_on
     assert "host_silent" in bench.wait(1.0), "now it is"

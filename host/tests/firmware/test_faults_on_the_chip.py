@@ -5,9 +5,8 @@ import struct
 
 import pytest
 
-from bifa.link import frames
-from bifa.link.table import COMMANDS, PARAMETERS
-from harness.chip import connected
+from bifa.link.table import PARAMETERS
+from harness.chip import connected, encoded
 from virtual_robot.uno import CLOCK_HZ
 
 pytestmark = pytest.mark.uno
@@ -19,27 +18,27 @@ MONITOR = 3  # A3
 def test_dac_follows_the_set_point_and_ends_at_14_psi(bench):
     for value, code in (("8.5", 267), ("0", 0), ("14", COUNT_OF_14_PSI)):
         assert bench.say(f"set pressure_psi {value}", 0.2).endswith("ok\r\n")
-        assert bench.board.dac_code == code
+        assert bench.uno.dac_code == code
     for value in ("14.001", "15", "65535", "-1", "1e9", "nan", "inf", "0x20"):
         assert "error" in bench.say(f"set pressure_psi {value}", 0.1)
-        assert bench.board.dac_code == COUNT_OF_14_PSI
-    assert bench.board.dac_eeprom_writes == 0
+        assert bench.uno.dac_code == COUNT_OF_14_PSI
+    assert bench.uno.dac_eeprom_writes == 0
 
 
 def test_no_eeprom_commands_more_than_14_psi(new_bench, bench):
     bench.say("set pressure_psi 14")
     bench.say("save", 2.0)
-    good = bench.board.eeprom
+    good = bench.uno.eeprom
     at = [i for i in range(len(good) - 1) if good[i : i + 2] == struct.pack("<H", 14000)]
     assert at, "the set is in EEPROM"
     for address, value in itertools.product(at, (14001, 20000, 65535)):
         bad = bytearray(good)
         bad[address : address + 2] = struct.pack("<H", value)
-        board = new_bench(bytes(bad)).board
+        board = new_bench(bytes(bad)).uno
         board.run_for(0.2)
         assert max((e.value for e in board.events if e.kind == "dac"), default=0) <= COUNT_OF_14_PSI
     for fill in (0x00, 0x55, 0xAA, 0xFF):
-        board = new_bench(bytes([fill]) * len(good)).board
+        board = new_bench(bytes([fill]) * len(good)).uno
         board.run_for(0.2)
         assert board.dac_code <= COUNT_OF_14_PSI
 
@@ -50,11 +49,11 @@ def monitor_volts(pressure_psi: float) -> float:
 
 
 def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(bench):
-    bench.board.set_analog(MONITOR, monitor_volts(8.5))
+    bench.uno.set_analog(MONITOR, monitor_volts(8.5))
     bench.say("run")
     bench.wait(1.5)
     assert bench.valves_on
-    bench.board.set_analog(MONITOR, monitor_volts(16.0))  # 7.5 psi off, 6.7 are borne
+    bench.uno.set_analog(MONITOR, monitor_volts(16.0))  # 7.5 psi off, 6.7 are borne
     bench.wait(2.2)
     assert bench.valves_on, "for 2.5 s it may be on its way"
     bench.wait(0.4)
@@ -64,9 +63,9 @@ def test_regulator_that_does_not_follow_its_set_point_vents_and_names_itself(ben
     assert words[1] == "regulator"
     assert int(words[words.index("value") + 1]) == pytest.approx(16_000, abs=160)  # a count is 0.16 psi
     assert int(words[words.index("limit") + 1]) == 8500
-    assert bench.board.dac_code == 0
+    assert bench.uno.dac_code == 0
     assert "error" in bench.say("clear")
-    bench.board.set_analog(MONITOR, monitor_volts(0))
+    bench.uno.set_analog(MONITOR, monitor_volts(0))
     bench.wait(0.1)
     assert bench.say("clear").endswith("ok\r\n")
 
@@ -76,7 +75,7 @@ def test_supply_of_the_board_is_not_taken_for_a_regulator_that_does_not_follow(b
     """The simulated reference is 5 V; the monitor's volts do not follow the board's supply, the DAC does."""
     for set_point_psi in (0, 8.5, 14):
         bench.say(f"set pressure_psi {set_point_psi}")
-        bench.board.set_analog(MONITOR, monitor_volts(set_point_psi * supply_V / 5) * 5 / supply_V)
+        bench.uno.set_analog(MONITOR, monitor_volts(set_point_psi * supply_V / 5) * 5 / supply_V)
         bench.wait(3.5)
         assert "fault" not in bench.say("status", 0.3)
 
@@ -85,19 +84,19 @@ def test_supply_of_the_board_is_not_taken_for_a_regulator_that_does_not_follow(b
 def test_dac_that_does_not_answer_vents_and_names_itself(bench, mode):
     bench.say("run")
     assert bench.valves_on
-    bench.board.set_bus(mode)
+    bench.uno.set_bus(mode)
     bench.wait(0.6)
     assert not bench.valves_on
     assert "supply_control" in bench.say("status", 0.5)
-    assert bench.board.resets == 1, "a stuck bus must not hang the main loop"
+    assert bench.uno.resets == 1, "a stuck bus must not hang the main loop"
     assert "error" in bench.say("clear", 0.3)
-    bench.board.set_bus("dac")
+    bench.uno.set_bus("dac")
     bench.wait(0.5)
     assert bench.say("clear").endswith("ok\r\n")
 
 
 def test_brown_out_is_a_fault(bench):
-    bench.board.reset("brown-out")
+    bench.uno.reset("brown-out")
     bench.wait(0.3)
     assert "brown_out" in bench.say("status", 0.5)
 
@@ -128,16 +127,6 @@ def test_sensor_with_a_loose_wire_vents_whatever_pressure_is_behind_it(bench, be
     assert "[fault sensor_range head" in bench.say("status", 0.5)
 
 
-def test_silent_host_vents(bench):
-    bench.say("set host_timeout_s 0.5")
-    bench.say("run", 0.05)
-    bench.wait(0.35)
-    assert bench.valves_on
-    bench.wait(0.3)
-    assert not bench.valves_on
-    assert "host_silent" in bench.say("status", 0.5)
-
-
 def lose_a_sensor(bench):
     """For an instant, but for long enough."""
     bench.volts[1] = 0.02
@@ -146,9 +135,9 @@ def lose_a_sensor(bench):
 
 
 def lose_the_dac(bench):
-    bench.board.set_bus("absent")
+    bench.uno.set_bus("absent")
     bench.wait(0.3)
-    bench.board.set_bus("dac")
+    bench.uno.set_bus("dac")
 
 
 @pytest.mark.parametrize(
@@ -161,7 +150,7 @@ def lose_the_dac(bench):
     ids=["sensor-saving", "sensor-printing", "dac-saving"],
 )
 def test_what_waits_when_a_fault_comes_does_not_undo_it(bench, first, lose, name):
-    bench.board.send(first + b"clear\nrun\n")
+    bench.uno.send(first + b"clear\nrun\n")
     lose(bench)
     said = bench.wait(2.0)
     assert not bench.valves_on
@@ -172,10 +161,8 @@ def test_what_waits_when_a_fault_comes_does_not_undo_it(bench, first, lose, name
 
 
 def test_clear_frames_that_wait_when_a_fault_comes_do_not_undo_it(bench):
-    uno = connected(bench.board)
-    seed, sequence = frames.session_seed(uno.session.key), uno.session.sequence
-    waiting = [frames.encode(COMMANDS[name], sequence + i, (), seed) for i, name in enumerate(("clear", "run"))]
-    bench.board.send(b"help\n" * 4 + b"".join(waiting))
+    uno = connected(bench.uno)
+    bench.uno.send(b"help\n" * 4 + b"".join(encoded(uno, "clear", "run")))
     lose_a_sensor(bench)
     bench.wait(1.0)
     assert not bench.valves_on
@@ -183,10 +170,10 @@ def test_clear_frames_that_wait_when_a_fault_comes_do_not_undo_it(bench):
 
 
 def test_samples_are_exactly_10_ms_apart_and_their_stamps_are_the_strobe_s(bench):
-    first = bench.board.event_count
+    first = bench.uno.event_count
     bench.say("stream on", 1.0)
     text = bench.wait(1.0)
-    rises = [e.cycle for e in bench.events_since(first) if e.kind == "pin" and e.index == 10 and e.value == 1]
+    rises = [edge.cycle for edge in bench.edges(first, [10]) if edge.value == 1]
     gaps = [b - a for a, b in itertools.pairwise(rises)]
     assert max(gaps) - min(gaps) <= 16
     assert sum(gaps) / len(gaps) == pytest.approx(CLOCK_HZ / 100, abs=0.1)
@@ -200,7 +187,7 @@ def lost_bytes(bench) -> int:
 
 
 def test_bytes_that_arrive_at_another_speed_are_counted_and_carry_out_nothing(bench):
-    bench.board.send(b"run\n" * 20, baud=230_400)
+    bench.uno.send(b"run\n" * 20, baud=230_400)
     bench.wait(0.2)
     bench.say("")
     assert not bench.valves_on
@@ -209,11 +196,11 @@ def test_bytes_that_arrive_at_another_speed_are_counted_and_carry_out_nothing(be
 
 def test_bytes_that_the_receiver_lost_are_counted(bench):
     """As if interrupts were off for 0.3 ms in the middle of a line: without what is lost, it sets another value."""
-    bench.board.send(b"set period_s 41.5\n")
-    bench.board.run_for(15 * 40e-6)
-    bench.board.hold(300e-6)
+    bench.uno.send(b"set period_s 41.5\n")
+    bench.uno.run_for(15 * 40e-6)
+    bench.uno.hold(300e-6)
     assert "error the line arrived damaged" in bench.wait(0.2) + bench.say("")
-    assert bench.board.rx_overruns > 0
+    assert bench.uno.rx_overruns > 0
     assert lost_bytes(bench) > 0
     assert "[period_s 5.7" in bench.say("show period_s")
 

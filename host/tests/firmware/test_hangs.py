@@ -7,7 +7,6 @@ from virtual_robot.uno import CLOCK_HZ, elf
 pytestmark = pytest.mark.uno
 
 LIMIT_S = 0.6
-VALVES = range(4, 10)
 TICK = "__vector_11"  # TIMER1_COMPA
 IN_THE_MIDDLE = 0.3  # of the function: past what it begins with
 BOOTLOADER_S = 1.0
@@ -15,11 +14,11 @@ BOOTLOADER_S = 1.0
 
 def run_into(bench, function: str) -> None:
     """Run until the program is in the middle of a function."""
-    begin, end = bench.board.span(function)
+    begin, end = bench.uno.span(function)
     middle = begin + round(IN_THE_MIDDLE * (end - begin))
     for _ in range(CLOCK_HZ // 10):
-        bench.board.run_until(bench.board.cycle + 1)
-        if middle <= bench.board.program_counter < end:
+        bench.uno.run_until(bench.uno.cycle + 1)
+        if middle <= bench.uno.program_counter < end:
             return
     raise AssertionError(f"the program never came to the middle of {function}")
 
@@ -30,11 +29,9 @@ def cause(bench) -> str:
 
 
 def valves_fell_and_chip_restarted(bench, first: int, begin: int) -> None:
-    resets = [e for e in bench.events_since(first) if e.kind == "reset"]
-    falls = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in VALVES and e.value == 0]
-    assert len(resets) == 1
-    assert bench.board.last_reset_cause == "watchdog"
-    assert max(e.cycle for e in falls) - begin <= LIMIT_S * CLOCK_HZ
+    assert [event.kind for event in bench.uno.iter_events(first)].count("reset") == 1
+    assert bench.uno.last_reset_cause == "watchdog"
+    assert max(bench.fell(first)) - begin <= LIMIT_S * CLOCK_HZ
     assert not bench.valves_on
 
 
@@ -42,15 +39,15 @@ def valves_fell_and_chip_restarted(bench, first: int, begin: int) -> None:
 @pytest.mark.parametrize("interrupts", [True, False], ids=["interrupts on", "interrupts off"])
 @pytest.mark.parametrize("function", ["main", TICK])
 def test_program_that_hangs_vents_and_restarts_into_a_fault_that_says_so(bench, function, interrupts, optiboot):
-    bench.board.use_optiboot(optiboot)
-    bench.board.reset("external", BOOTLOADER_S if optiboot else 0)
+    bench.uno.use_optiboot(optiboot)
+    bench.uno.reset("external", BOOTLOADER_S if optiboot else 0)
     bench.wait(BOOTLOADER_S + 0.2)
     assert cause(bench) == "external"
     bench.say("run")
     assert bench.valves_on
     run_into(bench, function)
-    first, begin = bench.board.event_count, bench.board.cycle
-    bench.board.hang(interrupts)
+    first, begin = bench.uno.event_count, bench.uno.cycle
+    bench.uno.hang(interrupts)
     bench.wait(0.8)
     valves_fell_and_chip_restarted(bench, first, begin)
     hidden = optiboot and not interrupts  # no instruction could leave a mark, and the bootloader clears the flag
@@ -64,9 +61,9 @@ def test_program_that_hangs_vents_and_restarts_into_a_fault_that_says_so(bench, 
 def test_clock_that_stops_restarts_the_chip_though_the_main_loop_goes_on(bench):
     """With bytes coming in all the time the main loop never sleeps; the valves would stay as they are for ever."""
     bench.say("run")
-    first, begin = bench.board.event_count, bench.board.cycle
+    first, begin = bench.uno.event_count, bench.uno.cycle
     no_more_ticks = b"\x00"
-    bench.board.poke(0x6F, no_more_ticks)  # TIMSK1
+    bench.uno.poke(0x6F, no_more_ticks)  # TIMSK1
     for _ in range(80):
         bench.say("", 0.01)
     valves_fell_and_chip_restarted(bench, first, begin)
@@ -76,23 +73,22 @@ def test_clock_that_stops_restarts_the_chip_though_the_main_loop_goes_on(bench):
 def test_count_of_unfed_milliseconds_that_is_past_its_limit_vents_at_once(bench):
     bench.say("run")
     run_into(bench, "main")
-    first, begin = bench.board.event_count, bench.board.cycle
-    counter = next(name for name in elf.symbols(bench.board.firmware) if "unfed_ms" in name)
-    bench.board.poke(counter, bytes([201]))
-    bench.board.hang(interrupts=True)
+    first, begin = bench.uno.event_count, bench.uno.cycle
+    counter = next(name for name in elf.symbols(bench.uno.firmware) if "unfed_ms" in name)
+    bench.uno.poke(counter, bytes([201]))
+    bench.uno.hang(interrupts=True)
     bench.wait(0.8)
-    falls = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in VALVES and e.value == 0]
-    assert max(e.cycle for e in falls) - begin <= 0.002 * CLOCK_HZ
-    assert bench.board.last_reset_cause == "watchdog"
+    assert max(bench.fell(first)) - begin <= 0.002 * CLOCK_HZ
+    assert bench.uno.last_reset_cause == "watchdog"
 
 
 def test_main_loop_and_tick_that_only_take_long_are_no_hang(bench):
     """The longest answers, one after the other with no pause."""
     bench.say("echo on")
     bench.say("run")
-    bench.board.send(b"help\r" * 20)
+    bench.uno.send(b"help\r" * 20)
     bench.wait(2.5)
-    assert bench.board.resets == 1
+    assert bench.uno.resets == 1
     assert bench.valves_on
 
 
@@ -106,21 +102,21 @@ CAUSES = {  # what starts the chip -> what it says without a bootloader, and wit
 @pytest.mark.parametrize("optiboot", [False, True], ids=["no bootloader", "stock bootloader"])
 @pytest.mark.parametrize("event", CAUSES)
 def test_chip_says_why_it_started(bench, event, optiboot):
-    bench.board.use_optiboot(optiboot)
-    bench.board.reset("external", BOOTLOADER_S)  # a port was opened before
+    bench.uno.use_optiboot(optiboot)
+    bench.uno.reset("external", BOOTLOADER_S)  # a port was opened before
     bench.wait(BOOTLOADER_S + 0.2)
-    bench.board.reset(event, BOOTLOADER_S if optiboot and event == "external" else 0)
+    bench.uno.reset(event, BOOTLOADER_S if optiboot and event == "external" else 0)
     bench.wait(BOOTLOADER_S + 0.2)
     assert cause(bench) == CAUSES[event][optiboot]
 
 
 def test_unknown_bootloader_whose_wait_was_never_seen_is_no_reason_for_a_fault(bench):
     """It clears the flags as the stock one does, but leaves the registers alone: what can have been a button is one."""
-    bench.board.use_optiboot()
-    bench.board.reset("power-on")
+    bench.uno.use_optiboot()
+    bench.uno.reset("power-on")
     bench.wait(0.2)
     assert cause(bench) == "power"
-    bench.board.reset("brown-out")
+    bench.uno.reset("brown-out")
     bench.wait(0.2)
     assert cause(bench) == "external"
     assert "state idle" in bench.say("status", 0.3)

@@ -78,46 +78,46 @@ def random_input(chance: random.Random) -> bytes:
 
 def exercise(bench, seconds: float, seed: int) -> None:
     chance = random.Random(seed)
-    host = WildHost(bench.board, chance)
+    host = WildHost(bench.uno, chance)
     state = {"on": set(), "off_since": {}}
-    first = bench.board.event_count
+    first = bench.uno.event_count
     found, edges, strobes = [], 0, 0
-    begin_s = bench.board.time_s
+    begin_s = bench.uno.time_s
     end_s = begin_s + seconds
-    while bench.board.time_s < end_s:
-        bench.board.send(host.session() if chance.random() < 0.4 else b"clear\n" + random_input(chance))
+    while bench.uno.time_s < end_s:
+        bench.uno.send(host.session() if chance.random() < 0.4 else b"clear\n" + random_input(chance))
         host.hear(bench.listen(chance.choice((0.0005, 0.002, 0.01, 0.05, 0.3))))
         if chance.random() < 0.01:
-            bench.board.press_emergency_stop()
+            bench.uno.press_emergency_stop()
             bench.wait(0.01)
-            bench.board.press_emergency_stop(False)
-        new = bench.events_since(first)
+            bench.uno.press_emergency_stop(False)
+        new = list(bench.uno.iter_events(first))
         first += len(new)
         found += breaks(new, state)
         edges += sum(event.kind == "pin" and event.index in range(4, 10) for event in new)
         strobes += sum(event.kind == "pin" and event.index == STROBE_PIN and event.value == 1 for event in new)
     print(
-        f"{seconds:.0f} s, {edges} edges on the pins, {len(found)} violations, {bench.board.resets - 1} resets,"
-        f" {bench.board.untouched_ram} bytes of stack never touched;"
+        f"{seconds:.0f} s, {edges} edges on the pins, {len(found)} violations, {bench.uno.resets - 1} resets,"
+        f" {bench.uno.untouched_ram} bytes of stack never touched;"
         f" commands carried out: {dict(sorted(host.done.items()))}"
     )
-    assert strobes == pytest.approx(STROBES_PER_S * (bench.board.time_s - begin_s), abs=2), "every event was looked at"
+    assert strobes == pytest.approx(STROBES_PER_S * (bench.uno.time_s - begin_s), abs=2), "every event was looked at"
     assert found == []
     assert edges > 5 * seconds, "the valves did move"
     assert {"hold", "run", "stop", "clear", "commit", "schedule_start", "load"} <= set(host.done)
-    assert bench.board.resets == 1
-    assert not bench.board.crashed
-    assert bench.board.untouched_ram > STACK_KEPT_FREE
+    assert bench.uno.resets == 1
+    assert not bench.uno.crashed
+    assert bench.uno.untouched_ram > STACK_KEPT_FREE
 
 
 def test_a_chamber_is_vented_for_the_dead_time_that_recordings_note(bench):
-    bench.board.send(b"clear\nhold body vacuum\n")
+    bench.uno.send(b"clear\nhold body vacuum\n")
     bench.wait(0.2)
-    first = bench.board.event_count
+    first = bench.uno.event_count
     for supply in ("positive", "vacuum") * 3:
-        bench.board.send(f"hold body {supply}\n".encode())
+        bench.uno.send(f"hold body {supply}\n".encode())
         bench.wait(0.1)
-    edges = [e for e in bench.events_since(first) if e.kind == "pin" and e.index in CHAMBERS[0]]
+    edges = bench.edges(first, CHAMBERS[0])
     assert [e.value for e in edges] == [0, 1] * 6
     vented_s = [(on.cycle - off.cycle) / CLOCK_HZ for off, on in zip(edges[::2], edges[1::2], strict=True)]
     assert vented_s == pytest.approx([DEAD_TIME_S] * 6, abs=5e-5)

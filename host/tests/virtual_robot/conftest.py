@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import threading
+from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 
+from harness.waiting import PATIENCE_S
+from virtual_robot.rig import VirtualRig
 from virtual_robot.uno import Uno
 
 HEAD = """
@@ -54,3 +59,26 @@ def board(image: Callable[[str], Path]) -> Iterator[Callable[..., Uno]]:
     yield build
     for uno in made:
         uno.close()
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Iterator[Callable[[VirtualRig], tuple[Path, deque[dict]]]]:
+    """Serve a rig on a pty, in a thread of its own; gives the port and the rig's last status."""
+
+    @contextmanager
+    def served(rig: VirtualRig) -> Iterator[tuple[Path, deque[dict]]]:
+        ready, end, status = threading.Event(), threading.Event(), deque(maxlen=1)
+        link = tmp_path / "uno"
+        arguments = (lambda path: ready.set(), status.append, link, end.is_set)
+        server = threading.Thread(target=rig.serve_pty, args=arguments)
+        server.start()
+        assert ready.wait(PATIENCE_S)
+        yield link, status
+        end.set()
+        server.join(PATIENCE_S)
+        assert not server.is_alive()
+        assert not link.exists()
+        rig.close()
+
+    with ExitStack() as stack:
+        yield lambda rig: stack.enter_context(served(rig))

@@ -8,7 +8,7 @@ import pytest
 from bifa.check import check_dataset
 from bifa.data import read_dataset
 from virtual_robot.gait import BASELINE
-from virtual_robot.instruments.noise import colored, flicker
+from virtual_robot.instruments.sensors import colored, flicker
 from virtual_robot.plant import Curve, Plant
 from virtual_robot.sealed import main
 from virtual_robot.truths.foreign import generate

@@ -6,18 +6,18 @@ import random
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from harness.waiting import PATIENCE_S, until
 from virtual_robot.rig import open_rig
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
 
-PATIENCE_S = 60  # other tests may keep the computer busy
 SETTLED_S = 0.3  # of the rig's time: what was under way has arrived
 RAISING = """
 import sys
@@ -34,23 +34,8 @@ with SerialRig(sys.argv[1]) as rig, Uno(rig.transport, rig.clock) as uno:
 class Bench:
     """The virtual robot on a pty in a thread of its own, watched from outside."""
 
-    def __init__(self, folder: Path, gait: str) -> None:
-        self.port, self.folder, self.gait = str(folder / "uno"), folder, gait
-        self._rig = open_rig(keep_events=False)
-        self._now: dict = {}
-        ready, self._end = threading.Event(), threading.Event()
-        arguments = (lambda path: ready.set(), self._take, Path(self.port), self._end.is_set)
-        self._server = threading.Thread(target=self._rig.serve_pty, args=arguments)
-        self._server.start()
-        assert ready.wait(PATIENCE_S)
-
-    def _take(self, status: dict) -> None:
-        self._now = status
-
-    def close(self) -> None:
-        self._end.set()
-        self._server.join(PATIENCE_S)
-        self._rig.close()
+    def __init__(self, port: Path, status: deque[dict], gait: str) -> None:
+        self.port, self.folder, self.gait, self._status = str(port), port.parent, gait, status
 
     def start(self, *arguments: str, **options) -> subprocess.Popen:
         command = [sys.executable, "-m", "bifa", *arguments, "--port", self.port]
@@ -59,42 +44,23 @@ class Bench:
 
     @property
     def moves(self) -> bool:
-        return bool(self._now) and any(self._now["connected"])
-
-    def until(self, condition: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + PATIENCE_S
-        while not condition():
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        return bool(self._status) and any(self._status[-1]["connected"])
 
     def until_it_walks(self) -> None:
-        self.until(lambda: self.moves and self._now["open"])
+        assert until(lambda: self.moves and self._status[-1]["open"])
 
     def stands(self, program: subprocess.Popen) -> bool:
         """Whether no valve is on once the program has ended and the port is closed."""
         _, errors = program.communicate(timeout=PATIENCE_S)
         assert "MAY STILL BE MOVING" not in (errors or "")
-        ended_s = self._now["time_s"]
-        self.until(lambda: not self._now["open"] and self._now["time_s"] > ended_s + SETTLED_S)
+        settled_s = self._status[-1]["time_s"] + SETTLED_S
+        assert until(lambda: not self._status[-1]["open"] and self._status[-1]["time_s"] > settled_s)
         return not self.moves
 
 
 @pytest.fixture
-def as_from_a_terminal() -> Iterator[None]:
-    """Commands inherit what is ignored: under `nohup`, a closed terminal would end none of them."""
-    ignored = [n for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(n) is signal.SIG_IGN]
-    for number in ignored:
-        signal.signal(number, signal.SIG_DFL)
-    yield
-    for number in ignored:
-        signal.signal(number, signal.SIG_IGN)
-
-
-@pytest.fixture
-def bench(tmp_path, gait, as_from_a_terminal) -> Iterator[Bench]:
-    bench = Bench(tmp_path, gait)
-    yield bench
-    bench.close()
+def bench(serve, gait, signals_as_in_a_terminal) -> Bench:
+    return Bench(*serve(open_rig(keep_events=False)), gait)
 
 
 def by_itself(bench: Bench, rng: random.Random) -> subprocess.Popen:

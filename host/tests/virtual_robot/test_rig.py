@@ -220,3 +220,20 @@ def test_effects_can_be_put_in_or_sealed(bench):
 def test_without_an_image_the_rig_says_what_to_build(tmp_path):
     with pytest.raises(VirtualRobotError, match="pio run -e uno"):
         open_rig(firmware=tmp_path / "none.elf")
+
+
+def test_the_firmwares_image_walks_the_baseline_at_the_papers_speed():
+    with open_rig() as rig:
+        rig.clock.sleep(0.5)
+        rig.instruments.mount("locomotion")
+        rig.instruments.start()
+        rig.transport.write(b"load baseline\nrun\n")
+        rig.clock.sleep(6 * 5.7)
+        record = rig.instruments.stop()
+        time_s, head_mm = record["time_s"] - record["time_s"][0], record["displacement_head_mm"]
+        x = np.interp([2 * 5.7, 5 * 5.7], time_s, head_mm)
+        assert (x[1] - x[0]) / (3 * 5.7) == pytest.approx(10.8, abs=0.2)
+        assert rig.plant.both_valves == 0
+        assert rig.uno.rx_overruns == 0
+        assert rig.uno.dac_eeprom_writes == 0
+        assert rig.uno.asleep_s / rig.uno.time_s > 0.5

@@ -130,8 +130,9 @@ class Instruments:
         return {end: float(1e3 * row[f"{end}_m"]) for end in ("head", "tail")}
 
     def _channels(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        correlation = self._noise.correlation(1.0 / self._rate_hz)
+
         def camera(name: str) -> np.ndarray:
-            correlation = self._noise.correlation(1.0 / CAMERA_HZ)
             return 1e3 * measured(rows[name], self._noise.camera_m, self._random, correlation)
 
         if self._experiment == "locomotion":
@@ -140,9 +141,7 @@ class Instruments:
             return {"displacement_mm": camera("head_m")}
         return {
             "displacement_mm": 1e3 * measured(rows["crosshead_m"], self._noise.crosshead_m, self._random),
-            "force_N": measured(
-                rows["force_N"], self._noise.force_N, self._random, self._noise.correlation(1.0 / MACHINE_HZ)
-            ),
+            "force_N": measured(rows["force_N"], self._noise.force_N, self._random, correlation),
         }
 
     @property

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What instruments make of true values: noise, resolution, the 10-bit converter of the Uno."""
+"""What instruments make of true values: noise, correlated and wandering; resolution; the Uno's 10-bit converter."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-
-from virtual_robot.instruments.noise import colored
 
 PSI_SPAN = 30.0
 _COUNTS_PER_PSI = 0.8 * 1024 / PSI_SPAN  # ABP: 10-90 % of the supply over +-15 psi; the ADC's step is Vcc / 1024
@@ -39,3 +37,23 @@ def converted_psi(pressure_psi: np.ndarray, noise_psi: float, random: np.random.
 def measured(values: np.ndarray, noise: float, random: np.random.Generator, correlation: float = 0.0) -> np.ndarray:
     """`values` with noise of this sd; `correlation` from one sample to the next."""
     return values + colored(noise, correlation, len(values), random)
+
+
+def colored(sd: float, correlation: float, count: int, random: np.random.Generator) -> np.ndarray:
+    """A stationary first-order autoregression with this sd; `correlation` from one sample to the next."""
+    fresh = random.standard_normal(count)
+    if correlation == 0.0 or count == 0:
+        return sd * fresh
+    fresh[1:] *= np.sqrt(1.0 - correlation**2)
+    values = np.empty(count)
+    level = 0.0
+    for i, value in enumerate(fresh):
+        level = correlation * level + value
+        values[i] = level
+    return sd * values
+
+
+def flicker(sd: float, count: int, random: np.random.Generator) -> np.ndarray:
+    """Nearly 1/f over three decades: a sum of autoregressions, each a decade slower (A. van der Ziel, 1950)."""
+    parts = [colored(1.0, float(np.exp(-1.0 / length)), count, random) for length in (3.0, 30.0, 300.0)]
+    return sd / np.sqrt(3.0) * np.sum(parts, axis=0)

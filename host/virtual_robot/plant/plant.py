@@ -42,6 +42,8 @@ SAMPLE = np.dtype(
 class Plant:
     """One robot with its air and stands. `parameters`: names of PlantParameters in plant.h; absent = 0."""
 
+    _plant: Any = None  # until it is made
+
     def __init__(self, parameters: Mapping[str, float] = NOMINAL, curves: tuple[Curve, Curve] | None = None) -> None:
         if lib is None:
             raise NotBuiltError("plant")
@@ -60,9 +62,7 @@ class Plant:
             lib.plant_free(self._plant)
             self._plant = None
 
-    def __del__(self) -> None:
-        if getattr(self, "_plant", None) is not None:
-            self.close()
+    __del__ = close
 
     # --- stand ------------------------------------------------------------------------------------------
 
@@ -71,11 +71,7 @@ class Plant:
         lib.plant_mount(self._plant, EXPERIMENTS.index(experiment), CHAMBERS.index(chamber), STATES.index(start))
 
     def set_trial(
-        self,
-        friction_factor: float = 1.0,
-        inclination_deg: float = 0.0,
-        ripple_phase_rad: float = 0.0,
-        session_share: float = 0.0,
+        self, friction_factor: float, inclination_deg: float, ripple_phase_rad: float, session_share: float
     ) -> None:
         """What differs from trial to trial; takes effect with the next mount."""
         lib.plant_set_trial(self._plant, friction_factor, inclination_deg, ripple_phase_rad, session_share)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from virtual_robot.errors import EventsGoneError, FirmwareError, NotBuiltError, VirtualRobotError
-from virtual_robot.places import check_place
+from virtual_robot.errors import EventsGoneError, FirmwareError, NotBuiltError, VirtualRobotError, check_place
 from virtual_robot.uno import elf
 
 try:
@@ -83,9 +82,7 @@ class Uno:
     def run_for(self, seconds: float) -> None:
         self.run_until(self.cycle + round(seconds * CLOCK_HZ))
 
-    @property
-    def cycle(self) -> int:
-        return self._status().cycle
+    cycle = _of_status("cycle")
 
     @property
     def time_s(self) -> float:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from virtual_robot.gait import Gait
-from virtual_robot.instruments.noise import colored, flicker
-from virtual_robot.instruments.sensors import converted_psi
+from virtual_robot.instruments.sensors import colored, converted_psi, flicker
 from virtual_robot.truths.foreign.trial import CHAMBERS, Edge, Run, run
 
 _STEP_UP_S, _STEP_DOWN_S, _STEP_END_S = 0.4, 4.6, 13.0
