@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 from bifa.cli import app
 from bifa.data import DatasetError, read_dataset
 from bifa.measure.bench_file import BenchFileError, read_bench
+from bifa.measure.propose import look
 from bifa.robot import load_model
 from bifa.robot.gait import GaitError, read_gait_file
 from bifa.robot.model_file import ModelFileError
@@ -43,6 +44,13 @@ def test_a_data_set_consists_of_files(tmp_path, put, name):
     put(tmp_path / name)
     with pytest.raises(DatasetError, match=r"not a regular file|cannot be read|no such file|outside"):
         read_dataset(tmp_path)
+
+
+@pytest.mark.parametrize("put", [a_pipe, a_device])
+def test_an_export_to_be_declared_is_a_file(tmp_path, put):
+    put(tmp_path / "pull.csv")
+    with pytest.raises(DatasetError, match="not a regular file"):
+        look(tmp_path / "pull.csv")
 
 
 def test_the_command_says_so(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 
 from bifa.data import EXPERIMENTS, Dataset, Trial
 from bifa.data.layout import is_command
-from bifa.data.lost import codes, held
+from bifa.data.lost import codes, held, runs
 
 from .finding import Finding
 from .lag import displacement_lag, misfit, shift_of_all
@@ -35,11 +35,14 @@ def _line(row: int) -> int:
     return int(row) + 2
 
 
+def _columns(trial: Trial, *kinds: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Name and values of the columns of these quantities, such as "pressure"."""
+    return ((name, values) for name, values in trial.columns.items() if name.startswith(kinds))
+
+
 def _saturated_pressure(trial: Trial) -> Iterator[Finding]:
-    for name, values in trial.columns.items():
-        if not name.startswith("pressure"):
-            continue
-        low, high = ADC_LIMITS_PSI
+    low, high = ADC_LIMITS_PSI
+    for name, values in _columns(trial, "pressure"):
         rows = np.flatnonzero((values <= low) | (values >= high))
         if rows.size:
             text = f"{rows.size} samples at the ADC's limit of {high:g} psi: saturated, or the sensor is broken"
@@ -54,27 +57,15 @@ def _saturated_pressure(trial: Trial) -> Iterator[Finding]:
 
 def _clipped_instrument(trial: Trial) -> Iterator[Finding]:
     """A flat top in displacement or force: the same extreme value again and again, where noise repeats nothing."""
-    for name, values in trial.columns.items():
-        if not name.startswith(("displacement", "force")):
-            continue
+    for name, values in _columns(trial, "displacement", "force"):
         same = np.diff(values) == 0
         for extreme in (values.max(), values.min()):
             flat = same & (values[1:] == extreme)
-            row, length = _longest_run(flat)
+            row, end = max(runs(flat), key=lambda run: run[1] - run[0], default=(0, 0))
             elsewhere = np.mean(same[~flat]) if (~flat).any() else 1.0
-            if length >= FLAT_SAMPLES and elsewhere < 0.05:
-                text = f"{length + 1} samples in a row read exactly {extreme:g}: the sensor is clipped"
+            if end - row >= FLAT_SAMPLES and elsewhere < 0.05:
+                text = f"{end - row + 1} samples in a row read exactly {extreme:g}: the sensor is clipped"
                 yield Finding("clipped", text, trial.file, _line(row), name)
-
-
-def _longest_run(flags: np.ndarray) -> tuple[int, int]:
-    """First index and length of the longest run of true; (0, 0) where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    starts, ends = edges[::2], edges[1::2]
-    if not starts.size:
-        return 0, 0
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest]), int(ends[longest] - starts[longest])
 
 
 def _stuck_channel(trial: Trial) -> Iterator[Finding]:
@@ -84,9 +75,7 @@ def _stuck_channel(trial: Trial) -> Iterator[Finding]:
 
 
 def _spikes(trial: Trial) -> Iterator[Finding]:
-    for name, values in trial.columns.items():
-        if not name.startswith("displacement"):
-            continue
+    for name, values in _columns(trial, "displacement"):
         step = np.diff(values)
         there, back = step[:-1], step[1:]
         rows = np.flatnonzero((there * back < 0) & (np.minimum(np.abs(there), np.abs(back)) > SPIKE_MM)) + 1
@@ -106,8 +95,8 @@ def _no_value(trial: Trial) -> Iterator[Finding]:
 def _held_marker(trial: Trial) -> Iterator[Finding]:
     if trial.experiment not in ("step_response", "locomotion"):
         return  # a cross-head may well rest
-    for name, values in trial.columns.items():
-        rows = np.flatnonzero(held(values)) if name.startswith("displacement") else np.array([])
+    for name, values in _columns(trial, "displacement"):
+        rows = np.flatnonzero(held(values))
         if rows.size:
             text = f"{rows.size} samples repeat the one before and then jump: a marker was lost, and held or set to 0"
             yield Finding("held", text, trial.file, _line(rows[0]), name)
@@ -136,8 +125,8 @@ def _clock(trial: Trial) -> Iterator[Finding]:
 
 
 def _no_motion(trial: Trial) -> Iterator[Finding]:
-    for name, values in trial.columns.items():
-        if name.startswith("displacement") and np.ptp(values) < MOTION_MM:
+    for name, values in _columns(trial, "displacement"):
+        if np.ptp(values) < MOTION_MM:
             text = f"moves by only {np.ptp(values):.3f} mm: nothing happened in this trial"
             yield Finding("no motion", text, trial.file, column=name)
 
@@ -150,10 +139,10 @@ def _no_command(trial: Trial) -> Iterator[Finding]:
 
 def _start(trial: Trial) -> Iterator[Finding]:
     """Trials begin contracted (displacement 0); a step response begins under vacuum."""
-    for name, values in trial.columns.items():
+    for name, values in _columns(trial, "displacement"):
         # Under vacuum an actuator is drawn in beyond its contracted state: small ones by a sixth of what they move.
         share = 0.25 if trial.experiment == "step_response" else 0.1
-        if name.startswith("displacement") and abs(values[0]) > 2.0 + share * np.ptp(values):
+        if abs(values[0]) > 2.0 + share * np.ptp(values):
             text = f"begins at {values[0]:.2f} mm: displacement is 0 at the contracted state"
             yield Finding("start", text, trial.file, 2, name)
     if trial.experiment == "step_response" and trial.columns["command"][0] != 0:

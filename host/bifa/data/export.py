@@ -264,11 +264,13 @@ def _sync(fields: Fields) -> tuple[str, float]:
     given = fields.take("sync") if "sync" in fields else _SYNC_FILE
     if given in (_SYNC_FILE, _SYNC_FRAMES):
         return given, _THRESHOLD
-    column = given.get("column") if isinstance(given, dict) else None
-    threshold = given.get("threshold", _THRESHOLD) if isinstance(given, dict) else None
-    if not isinstance(column, str) or not isinstance(threshold, int | float):
+    if not isinstance(given, dict):
         raise fields.error("sync", 'must be "file", "frames" or { column = "NAME", threshold = 2.5 }')
-    return column, float(threshold)
+    strobe = fields.inner("sync", given)
+    column = strobe.text("column")
+    threshold = strobe.number("threshold") if "threshold" in strobe else _THRESHOLD
+    strobe.finish(also=("threshold",))
+    return column, threshold
 
 
 def _form(fields: Fields) -> SheetForm:
@@ -303,8 +305,8 @@ def _check_columns(fields: Fields, export: Export) -> None:
 def _check_value(fields: Fields, export: Export, key: str, name: str, value: Any) -> None:
     if key == "columns" and not (isinstance(value, str) and value.strip()):
         raise fields.error(key, f"{name} must be the export's own name of the column, a string")
-    if key in ("factor", "offset") and (isinstance(value, bool) or not isinstance(value, int | float)):
-        raise fields.error(key, f"{name} must be a number")
+    if key in ("factor", "offset"):
+        fields.inner(key, {name: value}).number(name)
     if key == "factor" and not value:
         raise fields.error(key, f"{name} must not be 0")
     if key == "sign" and (value not in (1, -1) or isinstance(value, bool)):

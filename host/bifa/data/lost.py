@@ -21,7 +21,9 @@ def held(values_mm: np.ndarray) -> np.ndarray:
     elsewhere before the run, or after it. A marker at rest may repeat a value without being lost."""
     found = np.zeros(len(values_mm), bool)
     same = np.diff(values_mm) == 0.0
-    for first, last in _runs(same):
+    for first, last in runs(same):  # samples: one more than there are steps between them
+        if last - first + 1 < _HELD:
+            continue
         entry = abs(values_mm[first] - values_mm[first - 1]) if first else 0.0
         leave = abs(values_mm[last + 1] - values_mm[last]) if last + 1 < len(values_mm) else 0.0
         elsewhere = same.sum() - (last - first) <= _RARELY * len(same)
@@ -32,8 +34,7 @@ def held(values_mm: np.ndarray) -> np.ndarray:
     return found
 
 
-def _runs(same: np.ndarray) -> list[tuple[int, int]]:
-    """First and last sample of each run of equal ones, of `_HELD` or more."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], same.astype(np.int8), [0]))))
-    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(first, last) for first, last in runs if last - first + 1 >= _HELD]
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Of each run of true in `flags`, shape (n,), the first index and the one beyond the last."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -180,12 +180,12 @@ def _end_again(lost: "sys.UnraisableHookArgs") -> None:
         _earlier_hook[-1](lost)
 
 
-def stop_until_confirmed(session: Session, ask: Callable[[float], Report], timeout_s: float) -> None:
+def stop_until_confirmed(session: Session, ask: Callable[[float], Report]) -> None:
     """Send the stop until the status that `ask(timeout_s)` gets shows that no valve is on.
 
-    Raises NoAnswerError after `timeout_s`, and a ConnectionError if the port is gone.
+    Raises NoAnswerError after CONFIRMED_WITHIN_S, and a ConnectionError if the port is gone.
     """
-    deadline, attempt_s = session.clock.now() + timeout_s, FIRST_ATTEMPT_S
+    deadline, attempt_s = session.clock.now() + CONFIRMED_WITHIN_S, FIRST_ATTEMPT_S
     reason = NoAnswerError("the Uno acknowledged the stop but still reports open valves")
     while True:
         session.send_stop()
@@ -200,7 +200,7 @@ def stop_until_confirmed(session: Session, ask: Callable[[float], Report], timeo
             raise reason
 
 
-def stop_in_new_session(session: Session, timeout_s: float = CONFIRMED_WITHIN_S) -> None:
+def stop_in_new_session(session: Session) -> None:
     """stop_until_confirmed() in a session of its own: it waits for nothing of an interrupted one, and resends
     nothing."""
     new = session.successor()
@@ -212,4 +212,4 @@ def stop_in_new_session(session: Session, timeout_s: float = CONFIRMED_WITHIN_S)
         except RestartedError as error:  # it greets once more
             raise NoAnswerError(str(error)) from None
 
-    stop_until_confirmed(new, ask, timeout_s)
+    stop_until_confirmed(new, ask)

@@ -273,12 +273,6 @@ class Session:
             raise refused
         return answers
 
-    def _request(self, name: str, values: tuple[Any, ...]) -> _Request:
-        sequence = self.sequence
-        self.sequence = (sequence + 1) % 256
-        data = frames.encode(COMMANDS[name], sequence, values, frames.session_seed(self.key))
-        return _Request(name, data, sequence, self.clock.now())
-
     def _send_due(self, queue: deque[Any]) -> None:
         """Send new commands while the window has room, and the unanswered ones again when they are due."""
         now = self.clock.now()
@@ -292,9 +286,10 @@ class Session:
         self._go_back = False
         while queue and len(self._outstanding) < WINDOW:
             name, values = queue.popleft()
-            request = self._request(name, values)
-            self._outstanding.append(request)
-            self._send(request, now)
+            data = frames.encode(COMMANDS[name], self.sequence, values, frames.session_seed(self.key))
+            self._outstanding.append(_Request(name, data, self.sequence, self.clock.now()))
+            self.sequence = (self.sequence + 1) % 256
+            self._send(self._outstanding[-1], now)
 
     def _send(self, request: _Request, now: float) -> None:
         request.sent_s = now

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from bifa.link import frames, leaving
 from bifa.link.clock_relation import ClockRelation
 from bifa.link.errors import LinkError, NoAnswerError, StillMovingError
-from bifa.link.leaving import CONFIRMED_WITHIN_S
 from bifa.link.session import Counters, Hello, Session, word
 from bifa.link.table import (
     CHAMBER_STATES,
@@ -167,7 +166,7 @@ class Uno:
 
     def parameters(self) -> dict[str, float]:
         """All parameters, read from the Uno."""
-        return {name: from_wire(name, value) for name, value in self._read_set()[0].items()}
+        return self.parameters_and_pending()[0]
 
     def parameters_and_pending(self) -> tuple[dict[str, float], bool]:
         """parameters(), and whether a walking robot adopts them only at its next cycle."""
@@ -223,8 +222,7 @@ class Uno:
 
     def save(self, preset: str) -> None:
         """Keep the parameters in EEPROM; returns after they were read back."""
-        field = _name_field(preset)
-        self.session.call("save", field, timeout_s=EEPROM_TIMEOUT_S)
+        self.session.call("save", _name_field(preset), timeout_s=EEPROM_TIMEOUT_S)
 
     def load(self, preset: str) -> None:
         """Take the parameters of a preset."""
@@ -275,7 +273,7 @@ class Uno:
         """
         try:
             leaving.stop_until_confirmed(
-                self.session, lambda attempt_s: self.session.call("status", timeout_s=attempt_s), CONFIRMED_WITHIN_S
+                self.session, lambda attempt_s: self.session.call("status", timeout_s=attempt_s)
             )
         except (ConnectionError, NoAnswerError) as reason:
             raise StillMovingError(reason) from reason

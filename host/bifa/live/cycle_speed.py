@@ -6,8 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from bifa.gait.measured import speed_of_cycles
-from bifa.gait.settling import LEAST, MOST_CYCLES
+from bifa.gait.settling import LEAST, MOST_CYCLES, speed_of_cycles
 
 
 class CycleSpeed:

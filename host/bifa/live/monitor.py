@@ -1,7 +1,9 @@
 """A live picture of the robot in the terminal: pressures with their last seconds, valves, phases, the link."""
 
 import math
+from collections import deque
 from collections.abc import Callable
+from itertools import pairwise
 
 from rich.console import Group
 from rich.live import Live
@@ -12,18 +14,74 @@ from rich.text import Text
 from bifa.link import Clock, Sample, Uno
 from bifa.link.table import CHAMBERS
 from bifa.live.rounds import Latest, Pace
-from bifa.live.trace import Trace
 from bifa.screen import Console
 
 REFRESH_S = 0.1
 _WIDEST, _NARROWEST, _BESIDE = 72, 8, 50  # characters of the trace, and of what stands beside it
 COLORS = {"positive": "red", "vacuum": "blue", "off": "", "both": "bold white on red"}
 
+SHORTEST_S = 2.4  # of the trace
+_MOST = 1200  # samples: two minutes of pictures, twice the longest cycle
+BLOCKS = " ▁▂▃▄▅▆▇█"
+LOWEST_PSI, HIGHEST_PSI = -15.0, 15.0
+
 
 def dial(phase_rad: float) -> str:
     """Where in its cycle an oscillator is, in tenths."""
     at = int(phase_rad / (2 * math.pi) * 10) % 10
     return "·" * at + "●" + "·" * (9 - at)
+
+
+class Trace:
+    """The pressures of the last cycle of the body's oscillator, at least of some seconds, drawn in whatever room there
+    is."""
+
+    def __init__(self) -> None:
+        self._kept: deque[tuple[Sample, float]] = deque(maxlen=_MOST)  # with the cycles done until then
+
+    def take(self, sample: Sample) -> None:
+        """The newest; what came before a restart of the Uno, whose clock begins again, is dropped."""
+        if self._kept and sample.time_us < self._kept[-1][0].time_us:
+            self._kept.clear()
+        done = self._kept[-1][1] + _cycles(self._kept[-1][0], sample) if self._kept else 0.0
+        self._kept.append((sample, done))
+        while self._spare():
+            self._kept.popleft()
+
+    def _spare(self) -> bool:
+        """Whether the oldest is needed neither for a cycle nor for the shortest time."""
+        if len(self._kept) < 3:
+            return False
+        second, done = self._kept[1]
+        newest, by_now = self._kept[-1]
+        long = newest.time_us - second.time_us >= 1e6 * SHORTEST_S
+        return long and (by_now - done > 0.999 or newest.state != "running")
+
+    @property
+    def seconds(self) -> float:
+        """How long ago the oldest was."""
+        return (self._kept[-1][0].time_us - self._kept[0][0].time_us) / 1e6 if self._kept else 0.0
+
+    def sparkline(self, chamber: int, width: int) -> str:
+        """A chamber's pressure as `width` blocks at most, from LOWEST_PSI to HIGHEST_PSI."""
+        values = [sample.pressure_psi[chamber] for sample, _ in self._kept]
+        count = min(width, len(values))
+        bounds = [round(i * len(values) / count) for i in range(count + 1)] if count else []
+        usual = sum(values) / max(len(values), 1)
+        # of each stretch the most unusual value: a short pulse is seen at any width
+        return "".join(_block(max(values[a:b], key=lambda v: abs(v - usual))) for a, b in pairwise(bounds))
+
+
+def _cycles(before: Sample, after: Sample) -> float:
+    """By how much the body's oscillator went on; a little back in a transient."""
+    turned = (after.phase_rad[0] - before.phase_rad[0]) / (2 * math.pi)
+    return turned - round(turned)
+
+
+def _block(pressure_psi: float) -> str:
+    steps = len(BLOCKS) - 1
+    share = (pressure_psi - LOWEST_PSI) / (HIGHEST_PSI - LOWEST_PSI)
+    return BLOCKS[min(steps, max(0, round(share * steps)))]
 
 
 class Monitor:
@@ -36,10 +94,9 @@ class Monitor:
 
     def take(self, samples: list[Sample]) -> None:
         """The samples since the last picture; the last one is shown."""
-        if not samples:
-            return
         self._latest.take(samples)
-        self._trace.take(samples[-1])
+        if samples:
+            self._trace.take(samples[-1])
 
     def draw(self, columns: int) -> Panel:
         """The picture as it is now, so many characters wide: in fewer the last cycle is drawn more coarsely."""

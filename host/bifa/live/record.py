@@ -47,8 +47,7 @@ def record_walks(
     rig: Rig, port: str | None, out: Path, gait_file: Path | None, cycles: int, repeats: int, console: Console
 ) -> None:
     """Walk `repeats` times into the data set `out`; an interrupted session goes on where it was."""
-    from bifa.gait.measured import measured_speed
-    from bifa.gait.settling import LEAST, Walking
+    from bifa.gait.settling import LEAST, Walking, measured_speed
     from bifa.measure.bench_file import known_of
     from bifa.measure.plan import walks
     from bifa.measure.session import Event, provenance, run_session

@@ -26,7 +26,7 @@ from bifa.errors import BifaError
 from bifa.files import read_text, write_text
 from bifa.measure.desk import Desk
 from bifa.rig import Rig
-from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError, check_bounds
+from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError
 from bifa.toml import parse_toml
 
 ASKED = {
@@ -115,12 +115,11 @@ def parse_known(given: Iterable[str]) -> dict[str, float]:
             raise ModelParameterError(f"{text!r}: write it as NAME=VALUE, for example head_mass_kg=0.182")
         if name not in BASE_PARAMETERS:
             raise ModelParameterError(f"the model has no parameter {name!r}; it has {', '.join(BASE_PARAMETERS)}")
-        parameter = BASE_PARAMETERS[name]
         try:
             known[name] = float(value)
         except ValueError:
             raise ModelParameterError(f"{name} must be a number, not {value!r}") from None
-        check_bounds(name, known[name], parameter.lower, parameter.upper, parameter.unit)
+        BASE_PARAMETERS[name].check(known[name])
     return known
 
 

@@ -19,6 +19,7 @@ from bifa.data.errors import DatasetError
 from bifa.data.export import ROLES, Export, parse_exports, presets, unit_in, unit_in_file, units_for
 from bifa.data.fields import Fields, Source
 from bifa.data.sheet import SEPARATORS, Sheet, SheetForm, workbook
+from bifa.files import read_bytes
 from bifa.measure.instruments import CHANNELS
 from lacuna.decimals import number
 
@@ -128,7 +129,7 @@ def _refuse_short(path: Path, run: int) -> None:
 
 def _decoded(path: Path) -> tuple[str, list[str]]:
     try:
-        raw = path.read_bytes()[:_MOST_BYTES]
+        raw = read_bytes(path)[:_MOST_BYTES]
     except OSError as error:
         raise DatasetError(f"cannot be read ({error.strerror})", file=str(path)) from None
     marked = raw.startswith((b"\xff\xfe", b"\xfe\xff"))

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Protocol
 
 import bifa
@@ -125,9 +124,7 @@ def _settings(provenance: Mapping[str, Any]) -> dict[str, Any]:
     return {"virtual": provenance.get("port") == "virtual"} | dict(provenance.get("options", {}))
 
 
-def provenance(
-    command: str, port: str | None = None, options: Mapping[str, Any] = MappingProxyType({})
-) -> dict[str, Any]:
+def provenance(command: str, port: str | None, options: Mapping[str, Any]) -> dict[str, Any]:
     """Who made a data set, with what: for the reader of the file."""
     return {
         "recorded_by": f"{command} {bifa.__version__}",

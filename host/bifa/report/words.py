@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from math import floor, log10
 
 from bifa.effects import library
 from bifa.robot.parameters import BASE_PARAMETERS
@@ -50,8 +51,6 @@ def plain(value: float, digits: int = 3) -> str:
     """At least so many significant digits, and never an exponent where people would not write one."""
     if value == 0.0 or not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits}g}"
-    from math import floor, log10
-
     decimals = max(0, digits - 1 - floor(log10(abs(value))))
     return f"{value:.{decimals}f}"
 

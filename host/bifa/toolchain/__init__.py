@@ -1,8 +1,7 @@
 """The tools around the firmware, as the host uses them: PlatformIO, the built image, the board's port."""
 
 from bifa.toolchain.flash import build_image, choose_port, upload_image, write_with_avrdude
-from bifa.toolchain.project import find_project, project_folder
-from bifa.toolchain.run import ToolchainError
+from bifa.toolchain.project import ToolchainError, find_project, project_folder
 
 __all__ = [
     "ToolchainError",

@@ -1,17 +1,20 @@
 """Build the image and write it to the board, through PlatformIO; or write the package's image with avrdude alone: no
-checkout, no PlatformIO, no compiler."""
+checkout, no PlatformIO, no compiler. What these tools say when they fail becomes a sentence."""
 
+import re
 import shutil
+import subprocess
 import sys
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import serial
 
+from bifa.computer import PORT_BUSY, PORT_REFUSED
 from bifa.rig import find_port
 from bifa.rig.unopened import why_unopened
-from bifa.toolchain.project import ENVIRONMENT, image_path, platformio_program
-from bifa.toolchain.run import ToolchainError, run
+from bifa.toolchain.project import ENVIRONMENT, ToolchainError, image_path, platformio_program
 
 BAUD = "115200"  # of optiboot, the Uno's bootloader
 INSTALL = {  # avrdude, by the system
@@ -19,6 +22,16 @@ INSTALL = {  # avrdude, by the system
     "darwin": "brew install avrdude",
     "win32": "winget install AVRDudes.AVRDUDE, then open a new terminal",
 }
+LINES_KEPT = 12
+
+# What PlatformIO, avrdude or the system say -> what to do about it; `{port}` is filled in.
+REMEDIES = (
+    (r"not in sync|not responding", "no bootloader answers on {port}: is it the Uno? Close other programs that use "
+     "the port, press its reset button just as the upload begins, or try another cable"),
+    (r"permission denied|access is denied", PORT_REFUSED),
+    (r"device or resource busy", PORT_BUSY),
+    (r"HTTPClientError|InternetConnectionError", "PlatformIO lacks a package and cannot download it: run `make setup`"),
+)  # fmt: skip
 
 
 def choose_port(port: str | None) -> str:
@@ -34,14 +47,14 @@ def choose_port(port: str | None) -> str:
 
 def build_image(project: Path, on_line: Callable[[str], None]) -> Path:
     """Build the image for the Uno; return its path. `on_line` gets PlatformIO's output as it comes."""
-    run([platformio_program(), "run", "--environment", ENVIRONMENT], project, "", on_line, name="PlatformIO")
+    _run("PlatformIO", [platformio_program(), "run", "--environment", ENVIRONMENT], project, "", on_line)
     return image_path(project)
 
 
 def upload_image(project: Path, port: str, on_line: Callable[[str], None]) -> None:
     """Build if needed and write the image to the Uno at `port`; the upload itself resets the board."""
     arguments = ["run", "--environment", ENVIRONMENT, "--target", "upload", "--upload-port", port]
-    run([platformio_program(), *arguments], project, port, on_line, name="PlatformIO")
+    _run("PlatformIO", [platformio_program(), *arguments], project, port, on_line)
 
 
 def avrdude_program() -> Path:
@@ -56,4 +69,35 @@ def write_with_avrdude(image: Path, port: str, on_line: Callable[[str], None]) -
     """Write `image` to the Uno at `port` and verify it; avrdude resets the board."""
     chip = ["-p", "atmega328p", "-c", "arduino", "-P", port, "-b", BAUD, "-D"]
     # By its name alone: in `flash:w:FILE:i` a colon parts the fields, and a path of Windows has one.
-    run([avrdude_program(), *chip, "-U", f"flash:w:{image.name}:i"], image.parent, port, on_line)
+    _run("avrdude", [avrdude_program(), *chip, "-U", f"flash:w:{image.name}:i"], image.parent, port, on_line)
+
+
+def _run(name: str, command: Sequence[str | Path], folder: Path, port: str, on_line: Callable[[str], None]) -> None:
+    """Run PlatformIO or avrdude in `folder`; `on_line` gets its output as it comes."""
+    last: deque[str] = deque(maxlen=LINES_KEPT)
+    with subprocess.Popen(
+        command,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    ) as process:
+        try:
+            for line in process.stdout or ():
+                last.append(line.rstrip())
+                on_line(line.rstrip())
+        except KeyboardInterrupt:
+            process.wait()
+            raise
+    if process.returncode:
+        raise ToolchainError(_sentence(name, list(last), port))
+
+
+def _sentence(name: str, lines: list[str], port: str) -> str:
+    output = "\n".join(lines)
+    for pattern, remedy in REMEDIES:
+        if re.search(pattern, output, re.IGNORECASE):
+            return remedy.format(port=port or "the port")
+    return f"{name} failed; its last lines:\n{output}"

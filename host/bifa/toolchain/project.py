@@ -5,9 +5,13 @@ import sys
 from pathlib import Path
 
 import bifa
-from bifa.toolchain.run import ToolchainError
+from bifa.errors import BifaError
 
 ENVIRONMENT = "uno"
+
+
+class ToolchainError(BifaError):
+    """A tool is missing, a build failed, or the board could not be written; it says what to do."""
 
 
 def find_project() -> Path | None:

@@ -23,14 +23,17 @@ def assert_nothing_is_found(day):
     assert [str(found) for found in check_plausibility(day)] == []
 
 
-@pytest.mark.parametrize("effect", STRONG)
-def test_a_strong_effect_is_no_mistake(tmp_path, effect):
-    assert_nothing_is_found(drawn(tmp_path, STRONG.index(effect) + 21, effect=effect))
-
-
-@pytest.mark.parametrize("effect", ["warm_air", "converter_crosstalk"])
-def test_a_foreign_robot_is_no_mistake(tmp_path, effect):
-    assert_nothing_is_found(drawn(tmp_path, 31, "foreign", effect))
+@pytest.mark.parametrize(
+    ("truth", "effect", "seed"),
+    [
+        *(("own", effect, seed) for seed, effect in enumerate(STRONG, start=21)),
+        *(("foreign", effect, 31) for effect in ("warm_air", "converter_crosstalk")),
+        *(pytest.param("own", effect, 200, marks=pytest.mark.soak) for effect in EFFECTS),
+        *(pytest.param("foreign", effect, 200, marks=pytest.mark.soak) for effect in FOREIGN_EFFECTS),
+    ],
+)
+def test_a_strong_effect_and_a_foreign_robot_are_no_mistake(tmp_path, truth, effect, seed):
+    assert_nothing_is_found(drawn(tmp_path, seed, truth, effect))
 
 
 def test_another_laboratory_with_colored_noise_makes_none(tmp_path):
@@ -66,25 +69,9 @@ def any_walk(seed: int) -> Trial:
     return Trial("walk_1.csv", columns=columns, **plan.entry())
 
 
-def assert_walks_have_none(seeds):
-    for seed in seeds:
+@pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.soak)])
+def test_no_gait_is_a_mistake(count):
+    for seed in range(count):
         walk = any_walk(seed)
         for seen in (walk, head_only(walk)):
             assert [(seed, str(found)) for found in check_trial_plausibility(seen)] == []
-
-
-def test_no_gait_is_a_mistake():
-    assert_walks_have_none(range(40))
-
-
-@pytest.mark.soak
-def test_no_gait_of_a_thousand_is_a_mistake():
-    assert_walks_have_none(range(1000))
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize(
-    ("truth", "effect"), [*(("own", name) for name in EFFECTS), *(("foreign", name) for name in FOREIGN_EFFECTS)]
-)
-def test_no_effect_is_a_mistake(tmp_path, truth, effect):
-    assert_nothing_is_found(drawn(tmp_path, 200, truth, effect))

@@ -11,6 +11,8 @@ from bifa.data import Dataset, Trial
 
 from .days import mistaken, said, with_columns
 
+ENDS = ("displacement_head_mm", "displacement_tail_mm")
+
 
 def recorded_as(day, other: str):
     """Another trial's record under this one's name."""
@@ -37,7 +39,7 @@ def test_what_was_mounted_or_set_otherwise_is_named(day, file, other):
 
 def test_another_scale_of_the_camera_is_named_with_how_much_it_makes(any_day):
     file = "walk_baseline_2.csv"
-    (found,) = check_plausibility(mistaken(any_day, file, scaled(1.3, "displacement_head_mm", "displacement_tail_mm")))
+    (found,) = check_plausibility(mistaken(any_day, file, scaled(1.3, *ENDS)))
     assert (found.kind, found.file) == ("repeat", file)
     assert "repeat 2 of walk, period 5.7 s differs from the others by 1" in str(found)
     assert "mm (RMS)" in str(found)
@@ -73,13 +75,10 @@ def test_a_lab_with_much_scatter_has_no_odd_repeats(day):
     assert said(replace(day, trials=tuple(trials))) == []
 
 
-def slid(trial: Trial) -> Trial:
-    way_mm = 20.0 * trial.time_s
-    ends = ("displacement_head_mm", "displacement_tail_mm")
-    return with_columns(trial, **{name: trial.columns[name] - way_mm for name in ends})
-
-
 def test_a_walk_that_ends_elsewhere_is_no_odd_repeat(day):
+    def slid(trial):
+        return with_columns(trial, **{end: trial.columns[end] - 20.0 * trial.time_s for end in ENDS})
+
     assert said(mistaken(day, "walk_easy_2.csv", slid)) == []
 
 

@@ -24,12 +24,15 @@ def units_found(day):
     return [(found.file, found.column, str(found)) for found in check_plausibility(day) if found.kind == "unit"]
 
 
-@pytest.mark.parametrize("unit", LENGTHS)
-def test_a_length_in_another_unit_is_named(any_day, unit):
-    for trial in any_day.trials:
-        (found,) = units_found(mistaken(any_day, trial.file, in_unit("displacement_mm", LENGTHS[unit])))
-        assert found[:2] == (trial.file, next(n for n in trial.columns if n.startswith("displacement")))
-        assert f"is it in {unit}?" in found[2]
+@pytest.mark.parametrize(
+    ("column", "unit"), [*(("displacement_mm", unit) for unit in LENGTHS), *(("force_N", unit) for unit in FORCES)]
+)
+def test_a_length_or_a_force_in_another_unit_is_named(any_day, column, unit):
+    quantity = column.partition("_")[0]
+    for trial in any_day.of("static_loading") if quantity == "force" else any_day.trials:
+        ((file, name, said),) = units_found(mistaken(any_day, trial.file, in_unit(column, (LENGTHS | FORCES)[unit])))
+        assert (file, name) == (trial.file, next(n for n in trial.columns if n.startswith(quantity)))
+        assert f"is it in {unit}?" in said or unit in ("lbf", "kgf")
 
 
 @pytest.mark.parametrize("rows", [2, 5])
@@ -40,14 +43,6 @@ def test_a_walk_of_a_few_rows_is_no_traceback(day, rows):
         return with_columns(trial, **{name: values[:rows] for name, values in trial.columns.items()})
 
     assert not [file for file, _, _ in units_found(mistaken(day, walk.file, cut)) if file != walk.file]
-
-
-@pytest.mark.parametrize("unit", FORCES)
-def test_a_force_in_another_unit_is_named(any_day, unit):
-    for trial in any_day.of("static_loading"):
-        (found,) = units_found(mistaken(any_day, trial.file, in_unit("force_N", FORCES[unit])))
-        assert found[:2] == (trial.file, "force_N")
-        assert f"is it in {unit}?" in found[2] or unit in ("lbf", "kgf")
 
 
 def test_a_pull_in_kilonewtons_is_named(any_day):

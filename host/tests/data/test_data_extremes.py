@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from bifa.cli import app
 from bifa.data import DatasetError, read_dataset, write_dataset
-from bifa.robot.gait import GaitError, load_gait, read_gait_file
+from bifa.robot.gait import GaitError, load_gait
 from harness.data_sets import make_dataset
 
 WALK = "locomotion_1.csv"
@@ -20,30 +20,13 @@ HARD_TO_SEARCH = ['x = "' + '\\"' * 200_000 + '"', "'" * 200_001, '"' * 200_001,
 
 
 def put(folder, file: str, row: int, column: int, text: str) -> None:
-    path = folder / file
-    lines = path.read_text().split("\n")
-    fields = lines[row].split(",")
-    fields[column] = text
-    lines[row] = ",".join(fields)
-    path.write_text("\n".join(lines))
+    rows = [line.split(",") for line in (folder / file).read_text().split("\n")]
+    rows[row][column] = text
+    (folder / file).write_text("\n".join(map(",".join, rows)))
 
 
 def check(folder):
     return CliRunner().invoke(app, ["check", str(folder)])
-
-
-@pytest.mark.parametrize("text", ["1e308", "-1.1e12"])
-def test_a_number_beyond_any_measurement_is_refused_with_its_place(folder, text):
-    put(folder, WALK, 7, 4, text)
-    with pytest.raises(DatasetError, match=f"{WALK}, line 8, column displacement_head_mm: .* beyond any measurement"):
-        read_dataset(folder)
-
-
-def test_a_time_that_hardly_advances_is_refused_with_its_place(folder):
-    put(folder, WALK, 1, 0, "0")
-    put(folder, WALK, 2, 0, "5e-324")
-    with pytest.raises(DatasetError, match=f"{WALK}, line 3, column time_s: time advances by 4.94066e-324 s, less"):
-        read_dataset(folder)
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +71,6 @@ def test_a_key_of_kilobytes_is_refused_at_little_cost(tmp_path, key, form):
     with pytest.raises(DatasetError, match=r"dataset\.toml: is not valid TOML: A key of over 100 parts \(at line 2\)"):
         read_dataset(tmp_path)
     with pytest.raises(GaitError, match="at line 1"):
-        read_gait_file(tmp_path / "gait.toml")
-    with pytest.raises(GaitError, match="at line 1"):
         load_gait(tmp_path / "gait.toml")
     assert tracemalloc.get_traced_memory()[1] < 10e6  # one of them took 1.6 GB, and 18 s to fill them
     tracemalloc.stop()
@@ -106,8 +87,6 @@ def test_a_file_nested_too_deep_is_refused(tmp_path):
     (tmp_path / "gait.toml").write_text("x = " + "[" * 5000)
     with pytest.raises(GaitError, match="Nested too deep"):
         load_gait(tmp_path / "gait.toml")
-    with pytest.raises(GaitError, match="Nested too deep"):
-        read_gait_file(tmp_path / "gait.toml")
 
 
 @pytest.mark.parametrize("escape", [TITLE, CLIPBOARD, "\x9b2J", "\u202e", "\r"], ids=ascii)
@@ -129,9 +108,8 @@ def test_no_escape_sequence_reaches_the_terminal_through_an_error(folder, escape
 
 def test_no_escape_sequence_reaches_the_terminal_through_what_is_shown(folder):
     description = folder / "dataset.toml"
-    text = description.read_text()
     known = '[known]\n"head\\u001b]0;owned\\u0007" = 1.0\n'
-    description.write_text(text.replace("[known]\n", known, 1) if "[known]" in text else known + text)
+    description.write_text(description.read_text().replace("[known]\n", known))
     shown = check(folder)
     assert shown.exit_code == 0
     assert "owned" in shown.output

@@ -6,7 +6,6 @@ import random
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -14,31 +13,27 @@ import pytest
 from bifa.link import Uno
 from harness.board import Board
 from harness.pty_uno import STEP_S, PtyUno
+from harness.waiting import until
 
 pytestmark = pytest.mark.real_time
+
+HOST = Path(__file__).with_name("dying_host.py")
 
 
 class Mortal:
     """A transport that goes dead after so many bytes, wherever in a frame that is."""
 
     def __init__(self, board: Board, lives: int) -> None:
-        self.board, self.left, self.died_s = board, lives, None
+        self.board, self.left = board, lives
 
     def write(self, data: bytes) -> None:
         self.board.write(data[: self.left])
         self.left -= len(data)
         if self.left <= 0:
-            self.died_s = self.board.now()
             raise ConnectionError
 
     def __getattr__(self, name: str):
         return getattr(self.board, name)
-
-
-def talk_until_death(uno: Uno) -> None:
-    with contextlib.suppress(ConnectionError):
-        while True:
-            uno.status()
 
 
 @pytest.mark.parametrize("timeout_s", [0.2, 1.0])
@@ -50,9 +45,10 @@ def test_death_at_any_byte(timeout_s):
         uno.upload({"host_timeout_s": timeout_s})
         uno.run()
         uno.stream(True)
-        mortal = Mortal(board, lives)
-        uno.session.transport = mortal
-        talk_until_death(uno)
+        uno.session.transport = Mortal(board, lives)
+        with contextlib.suppress(ConnectionError):
+            while True:
+                uno.status()
         # The bytes on the line still arrive, within a millisecond; the Uno counts whole ones.
         board.sleep(timeout_s + 0.003)
         assert board.valves == 0, lives
@@ -64,9 +60,8 @@ def test_sigkill(kills, figure):
     rng, longest_s = random.Random(kills), 0.0
     for _ in range(kills):
         uno = PtyUno()
-        command = [sys.executable, Path(__file__).with_name("dying_host.py"), uno.device, "0.3"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as host:
-            assert host.stdout.readline() == "walking\n"
+        with subprocess.Popen([sys.executable, HOST, uno.device, "0.3"], stdout=subprocess.PIPE, text=True) as host:
+            assert int(host.stdout.readline()) == host.pid
             uno.wait(rng.random() * 0.5)
             host.kill()
         uno.wait(0.5)
@@ -78,22 +73,11 @@ def test_sigkill(kills, figure):
         figure(f"{kills} SIGKILLs: vented at most {longest_s * 1000:.0f} ms after the last byte; time-out 300 ms")
 
 
-WALKS = """
-import os, sys
-from bifa.link import Uno
-from bifa.rig import SerialRig
-with SerialRig(sys.argv[1]) as rig, Uno(rig.transport, rig.clock) as uno:
-    uno.connect()
-    uno.run()
-    print(os.getpid(), flush=True)
-    while True:
-        uno.samples(0.02)
-"""
-# Starts what walks, from its main thread or from another that ends; argv: port, program, what SIGHUP does, which.
+# Starts what walks, from its main thread or from another that ends; argv: port, what walks, what SIGHUP does, which.
 STARTS = """
 import signal, subprocess, sys, threading, time
 signal.signal(signal.SIGHUP, getattr(signal, sys.argv[3]))
-start = lambda: subprocess.Popen([sys.executable, "-c", sys.argv[2], sys.argv[1]])
+start = lambda: subprocess.Popen([sys.executable, sys.argv[2], sys.argv[1], "60"])
 if sys.argv[4] == "thread":
     thread = threading.Thread(target=lambda: (start(), time.sleep(2)))
     thread.start()
@@ -108,7 +92,7 @@ time.sleep(60)
 @contextlib.contextmanager
 def started_by_another(uno: PtyUno, hang_up: str, where: str):
     """The program between, once what it started walks and the thread that started it has come to its end."""
-    command = [sys.executable, "-c", STARTS, uno.device, WALKS, hang_up, where]
+    command = [sys.executable, "-c", STARTS, uno.device, HOST, hang_up, where]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, text=True, **pipes) as between:
         walking = int(between.stdout.readline())
@@ -120,13 +104,6 @@ def started_by_another(uno: PtyUno, hang_up: str, where: str):
             between.kill()
             with contextlib.suppress(ProcessLookupError):
                 os.kill(walking, signal.SIGKILL)
-
-
-def is_stopped(uno: PtyUno, within_s: float) -> bool:
-    deadline = time.monotonic() + within_s
-    while uno.board.state == "running" and time.monotonic() < deadline:
-        time.sleep(0.02)
-    return (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="prctl is Linux's")
@@ -142,4 +119,5 @@ def test_the_end_of_whoever_started_it(uno, hang_up, where, is_killed, stops):
     with started_by_another(uno, hang_up, where) as between:
         if is_killed:
             between.kill()
-        assert is_stopped(uno, 20 if stops else 1.0) == stops
+        assert until(lambda: uno.board.state == "stopped", 20 if stops else 1.0) == stops
+        assert not stops or uno.board.valves == 0

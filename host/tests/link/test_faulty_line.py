@@ -108,31 +108,25 @@ def upload_many(board, rate: float, uploads: int, seed: int, restarts: float = 0
     }
 
 
-@pytest.mark.parametrize("rate", RATES)
-def test_uploads_over_a_faulty_line(rate):
-    result = upload_many(Board(), rate, uploads=40, seed=round(1 / rate))
+@pytest.mark.parametrize(
+    ("board", "rate", "uploads", "restarts"),
+    [
+        *((Board, rate, 40, 0.0) for rate in RATES),
+        *((Board, rate, 60, 0.01) for rate in (0.0, 1e-3, 1e-2)),
+        *(pytest.param(Chip, rate, 12, 0.0, marks=pytest.mark.uno) for rate in (1e-3, 1e-2)),
+    ],
+)
+def test_uploads_over_a_faulty_line_and_restarts_in_the_middle(board, rate, uploads, restarts):
+    result = upload_many(board(), rate, uploads, seed=7, restarts=restarts)
     if rate <= 1e-2:
-        assert result["done"] == 40
-
-
-@pytest.mark.parametrize("rate", [0.0, 1e-3, 1e-2])
-def test_restarts_in_the_middle(rate):
-    result = upload_many(Board(), rate, uploads=60, seed=round(rate * 1e4) + 7, restarts=0.01)
-    assert result["done"] == 60
-
-
-@pytest.mark.uno
-@pytest.mark.parametrize("rate", [1e-3, 1e-2])
-def test_uploads_to_the_image_over_a_faulty_line(rate):
-    assert upload_many(Chip(), rate, uploads=12, seed=3)["done"] == 12
+        assert result["done"] == uploads
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize(("board", "rate"), [("native", rate) for rate in RATES] + [("image", r) for r in RATES])
+@pytest.mark.parametrize("board", [Board, Chip], ids=["native", "image"])
+@pytest.mark.parametrize("rate", RATES)
 def test_a_thousand_uploads(board, rate, figure):
-    result = upload_many(
-        {"native": Board, "image": Chip}[board](), rate, uploads=1000, seed=11, restarts=RESTARTS[rate]
-    )
-    figure(f"{board} {rate:g}: " + ", ".join(f"{name} {value:.4g}" for name, value in result.items()))
+    result = upload_many(board(), rate, uploads=1000, seed=11, restarts=RESTARTS[rate])
+    figure(f"{board.__name__} {rate:g}: " + ", ".join(f"{name} {value:.4g}" for name, value in result.items()))
     if rate <= 1e-2:
         assert result["done"] == 1000

@@ -3,7 +3,6 @@
 20 seconds a target here, five minutes in `make soak`. Needs clang++ with libFuzzer (`tools/system-packages.sh fuzz`).
 """
 
-import hashlib
 import os
 import random
 import shutil
@@ -14,27 +13,21 @@ import pytest
 
 from bifa.link import frames
 from bifa.link.table import COMMANDS, CONSOLE_COMMANDS, PARAMETERS
-from harness.native import BUILD, ROOT
+from harness.native import ROOT, compiled
 
-FUZZ = Path(__file__).with_name("fuzz")
+FUZZ, BOARD = Path(__file__).with_name("fuzz"), ROOT / "host/harness/board_harness.cpp"
 TARGETS = ("frames", "console", "eeprom")
 FLAGS = ["-std=gnu++11", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=undefined"]
 
 
 def build(target: str) -> Path:
     sources = [FUZZ / f"{target}_fuzz.cpp", *sorted((ROOT / "lib").glob("*/*.cpp"))]
-    includes = [f"-I{folder}" for folder in [FUZZ, *sorted((ROOT / "lib").iterdir())]]
-    headers = sorted([*(ROOT / "lib").glob("*/*.h"), FUZZ / "fuzz_board.h"])
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in [*sources, *headers])).hexdigest()[:16]
-    binary = BUILD / f"{target}_fuzz-{digest}"
-    if binary.exists():
-        return binary
-    BUILD.mkdir(parents=True, exist_ok=True)
-    done = subprocess.run(["clang++", *FLAGS, *includes, *sources, "-o", binary], capture_output=True, text=True)
-    if done.returncode and "libclang_rt" in done.stderr:
-        pytest.skip("clang has no libFuzzer here: tools/system-packages.sh fuzz")
-    assert done.returncode == 0, done.stderr
-    return binary
+    try:
+        return compiled(f"{target}_fuzz", ["clang++", *FLAGS, f"-I{BOARD.parent}"], sources, [BOARD])
+    except RuntimeError as error:
+        if "libclang_rt" in str(error):
+            pytest.skip("clang has no libFuzzer here: tools/system-packages.sh fuzz")
+        raise
 
 
 def seeds(folder: Path) -> Path:

@@ -7,24 +7,10 @@ import sys
 
 import pytest
 
-from bifa.link import Uno
 from bifa.link.table import SESSION_TIMEOUT_MS
 from bifa.link.terminal import type_line
-from harness.board import Board
 
 GUARD_S = 1e-3 * SESSION_TIMEOUT_MS
-
-
-@pytest.fixture
-def board():
-    return Board()
-
-
-@pytest.fixture
-def connected(board):
-    uno = Uno(board, board, seed=1)
-    uno.connect()
-    return uno
 
 
 MOVES = {

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from bifa.link import RefusedError, RestartedError, Uno
+from bifa.link import RestartedError, Uno
 from bifa.link.frames import STOP_FRAME, encode, session_seed
 from bifa.link.table import COMMANDS
 from harness.chip import Chip
@@ -91,8 +91,6 @@ def test_timed_holds_happen_on_their_ticks():
     assert [valves for _, valves in seen] == [0b0001, 0b1001, 0b1000, 0]
     gaps = [round((b - a) * 1000) for (a, _), (b, _) in itertools.pairwise(seen)]
     assert gaps == [100, 150, 1]
-    with pytest.raises(RefusedError):
-        uno.schedule([(2.0, "body", "positive"), (1.0, "body", "off")])
 
 
 def test_a_set_takes_over_at_the_cycle_boundary():

@@ -15,48 +15,32 @@ from harness.board import Board
 from harness.faulty_line import FaultyLine
 
 
-class Line:
-    """A transport in front of a board whose ways can be cut: `swallow` takes what is written, `gone` ends all."""
+class Line(Board):
+    """A board whose line can be cut: `swallow` takes what is written, `gone` ends all."""
 
-    def __init__(self, board: Board) -> None:
-        self.board = board
-        self.gone = False
-        self.swallow = lambda data: False
+    gone = False
+    swallow = staticmethod(lambda data: False)
 
     def write(self, data: bytes) -> None:
         if self.gone:
             raise PortGoneError("/dev/robot is gone")
         if not self.swallow(data):
-            self.board.write(data)
+            super().write(data)
 
     def read(self, timeout_s: float) -> bytes:
         if self.gone:
             raise PortGoneError("/dev/robot is gone")
-        return self.board.read(timeout_s)
-
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGUSR2)
+        return super().read(timeout_s)
 
 
 @pytest.fixture(autouse=True)
-def in_a_terminal():
-    """Signals as they are there: a shell ignores some on behalf of what it starts in the background."""
-    before = [(number, signal.getsignal(number)) for number in SIGNALS]
-    for number in SIGNALS:
-        signal.signal(number, signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL)
-    yield
-    for number, handler in before:
-        signal.signal(number, handler)
+def signals(signals_as_in_a_terminal):
+    return signals_as_in_a_terminal
 
 
 @pytest.fixture
-def board() -> Board:
-    return Board()
-
-
-@pytest.fixture
-def line(board) -> Line:
-    return Line(board)
+def board() -> Line:
+    return Line()
 
 
 def walk(uno: Uno, board: Board) -> None:
@@ -64,6 +48,13 @@ def walk(uno: Uno, board: Board) -> None:
     uno.run()
     board.sleep(0.1)
     assert board.valves != 0
+
+
+def walk_until(board: Board, end) -> None:
+    """Walk; then comes `end(uno)`, and one leaves."""
+    with Uno(board, board) as uno:
+        walk(uno, board)
+        end(uno)
 
 
 def talk(board: Board) -> None:
@@ -75,33 +66,25 @@ def talk(board: Board) -> None:
         uno.status()
 
 
-class CtrlC:
-    """Sends SIGINT at the calls and lines of bifa.link whose numbers are given; counts them."""
+def press_ctrl_c(board: Board, *moments: int) -> int:
+    """Talk, with Ctrl-C at those calls and lines of bifa.link; returns how many there were."""
+    passed = 0
 
-    def __init__(self, *moments: int) -> None:
-        self._moments, self.passed = set(moments), 0
-
-    def _trace(self, frame, event, _):
+    def trace(frame, event, _):
+        nonlocal passed
         if "bifa/link/" not in frame.f_code.co_filename:
             return None
-        self.passed += 1
-        if self.passed in self._moments:
+        passed += 1
+        if passed in moments:
             signal.raise_signal(signal.SIGINT)
-        return self._trace
+        return trace
 
-    def __enter__(self) -> "CtrlC":
-        sys.settrace(self._trace)
-        return self
-
-    def __exit__(self, *_) -> None:
-        sys.settrace(None)
-
-
-def press_ctrl_c(board: Board, *moments: int) -> int:
-    """Talk, with Ctrl-C at those moments; returns how many moments there were."""
-    with CtrlC(*moments) as pressed:
+    sys.settrace(trace)
+    try:
         talk(board)
-    return pressed.passed
+    finally:
+        sys.settrace(None)
+    return passed
 
 
 @pytest.mark.parametrize("presses", [120, pytest.param(3000, marks=pytest.mark.soak)])
@@ -126,10 +109,10 @@ def test_ctrl_c_while_the_robot_is_being_stopped_is_not_lost(board):
     assert (board.valves, board.state) == (0, "stopped")
 
 
-def test_signals_mean_afterwards_what_they_meant_before(board):
-    before = [signal.getsignal(number) for number in SIGNALS]
+def test_signals_mean_afterwards_what_they_meant_before(board, signals):
+    before = [signal.getsignal(number) for number in signals]
     talk(board)
-    assert [signal.getsignal(number) for number in SIGNALS] == before
+    assert [signal.getsignal(number) for number in signals] == before
     assert leaving.death_signal() in (0, None)
 
 
@@ -141,45 +124,39 @@ class Dying:
 
 
 def test_ctrl_c_that_python_drops_comes_again(board):
-    def interrupted() -> None:
-        with Uno(board, board) as uno:
-            walk(uno, board)
-            Dying()
-            time.sleep(10)
+    def interrupted(uno: Uno) -> None:
+        Dying()
+        time.sleep(10)
 
     with pytest.raises(KeyboardInterrupt):
-        interrupted()
+        walk_until(board, interrupted)
     assert (board.valves, board.state) == (0, "stopped")
 
 
 def test_ctrl_c_that_waits_to_come_again_does_not_come_after_another(board, monkeypatch):
     monkeypatch.setattr(leaving, "AGAIN_AFTER_S", 0.3)
 
-    def interrupted() -> None:
-        with Uno(board, board) as uno:
-            walk(uno, board)
-            Dying()
-            signal.raise_signal(signal.SIGINT)
+    def interrupted(uno: Uno) -> None:
+        Dying()
+        signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        interrupted()
+        walk_until(board, interrupted)
     time.sleep(0.4)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGQUIT])
 def test_kill_stops_before_anything_is_tidied_up(board, number):
-    def interrupted() -> None:
-        with Uno(board, board) as uno:
-            walk(uno, board)
-            try:
-                signal.raise_signal(number)
-            finally:
-                board.sleep(0.002)
-                seen.append(board.valves)
+    def killed(uno: Uno) -> None:
+        try:
+            signal.raise_signal(number)
+        finally:
+            board.sleep(0.002)
+            seen.append(board.valves)
 
     seen = []
     with pytest.raises(KeyboardInterrupt):
-        interrupted()
+        walk_until(board, killed)
     assert seen == [0]
 
 
@@ -188,31 +165,30 @@ def test_ctrl_z_stops_the_robot_before_it_suspends(board, monkeypatch):
         board.sleep(0.002)
         seen.append((number, board.valves))
 
-    def interrupted() -> None:
-        with Uno(board, board) as uno:
-            walk(uno, board)
-            pressed = signal.raise_signal
-            monkeypatch.setattr(signal, "raise_signal", suspend)
-            pressed(signal.SIGTSTP)
+    def pressed(uno: Uno) -> None:
+        press = signal.raise_signal
+        monkeypatch.setattr(signal, "raise_signal", suspend)
+        press(signal.SIGTSTP)
 
     seen = []
     with pytest.raises(KeyboardInterrupt):
-        interrupted()
+        walk_until(board, pressed)
     assert seen == [(signal.SIGSTOP, 0)]
 
 
 @pytest.mark.parametrize("ending", [KeyboardInterrupt, ValueError, SystemExit, None])
 def test_every_end_waits_for_the_confirmation(board, ending):
-    ended = pytest.raises(ending) if ending else contextlib.nullcontext()
-    with ended, Uno(board, board) as uno:
-        walk(uno, board)
+    def end(uno: Uno) -> None:
         if ending:
             raise ending
+
+    with pytest.raises(ending) if ending else contextlib.nullcontext():
+        walk_until(board, end)
     assert (board.valves, board.state) == (0, "stopped")  # without a moment's waiting
 
 
 @pytest.mark.parametrize("lost", [1, 3])
-def test_a_stop_that_is_lost_is_repeated(board, line, lost):
+def test_a_stop_that_is_lost_is_repeated(board, lost):
     swallowed = []
 
     def swallow(data: bytes) -> bool:
@@ -221,8 +197,8 @@ def test_a_stop_that_is_lost_is_repeated(board, line, lost):
             return True
         return False
 
-    line.swallow = swallow
-    with Uno(line, board) as uno:
+    board.swallow = swallow
+    with Uno(board, board) as uno:
         walk(uno, board)
         uno.stop()
         assert (len(swallowed), board.valves, board.state) == (lost, 0, "stopped")
@@ -241,21 +217,17 @@ def test_a_bad_cable_does_not_keep_the_robot_moving(board, seed):
     assert (board.valves, board.state) == (0, "stopped")
 
 
-def test_a_stop_that_nobody_confirms_is_said_aloud(board, line):
-    def cut_off() -> None:
-        with Uno(line, board) as uno:
-            walk(uno, board)
-            line.swallow = lambda data: True
+def test_a_stop_that_nobody_confirms_is_said_aloud(board):
+    def cut_off(uno: Uno) -> None:
+        board.swallow = lambda data: True
 
     with pytest.raises(StillMovingError, match=r"THE ROBOT MAY STILL BE MOVING.*emergency stop"):
-        cut_off()
+        walk_until(board, cut_off)
 
 
-def test_ctrl_c_while_a_stop_is_not_confirmed_is_not_lost_either(board, line):
-    def cut_off() -> None:
-        with Uno(line, board) as uno:
-            walk(uno, board)
-            line.swallow = press
+def test_ctrl_c_while_a_stop_is_not_confirmed_is_not_lost_either(board):
+    def cut_off(uno: Uno) -> None:
+        board.swallow = press
 
     def press(data: bytes) -> bool:
         if data == STOP:
@@ -263,44 +235,41 @@ def test_ctrl_c_while_a_stop_is_not_confirmed_is_not_lost_either(board, line):
         return True
 
     with pytest.raises(StillMovingError) as told:
-        cut_off()
+        walk_until(board, cut_off)
     assert isinstance(told.value.__cause__, KeyboardInterrupt), "whoever tries again must not"
 
 
-def test_a_robot_that_walked_before_one_came_is_said_aloud(board, line):
-    def unplugged() -> None:
-        with Uno(line, board) as uno:
-            uno.connect()
-            line.gone = True
-            uno.status()
-
-    board.write(b"run\n")
-    board.sleep(0.1)
-    assert board.valves != 0
-    with pytest.raises(StillMovingError):
-        unplugged()
-
-
-def test_a_port_that_vanishes_from_a_walking_robot_is_said_aloud(board, line):
-    def unplugged() -> None:
-        with Uno(line, board) as uno:
-            walk(uno, board)
-            line.gone = True
-            uno.status()
+def test_a_port_that_vanishes_from_a_walking_robot_is_said_aloud(board):
+    def unplugged(uno: Uno) -> None:
+        board.gone = True
+        uno.status()
 
     with pytest.raises(StillMovingError, match="is gone\nTHE ROBOT MAY STILL BE MOVING") as told:
-        unplugged()
+        walk_until(board, unplugged)
     assert isinstance(told.value.__cause__, PortGoneError)
 
 
-@pytest.mark.parametrize("typed", ["show", "run", "hold body vacuum"])
-def test_a_robot_that_was_never_moved_gives_no_alarm(board, line, typed):
+@pytest.mark.parametrize(
+    ("before", "typed", "error"),
+    [
+        (b"", "show", PortGoneError),
+        (b"", "run", StillMovingError),
+        (b"", "hold body vacuum", StillMovingError),
+        (b"run\n", "show", StillMovingError),
+    ],
+    ids=["never moved", "walks", "is held", "walked before one came"],
+)
+def test_only_a_robot_that_was_moved_gives_an_alarm_where_the_port_vanishes(board, before, typed, error):
     def unplugged() -> None:
-        with Uno(line, board) as uno:
+        with Uno(board, board) as uno:
             uno.connect()
             type_line(uno, typed, board)
-            line.gone = True
+            board.gone = True
             uno.status()
 
-    with pytest.raises(PortGoneError if typed == "show" else StillMovingError):
+    board.write(before)
+    board.sleep(0.1)
+    assert (board.valves != 0) == bool(before)
+    with pytest.raises(error) as told:
         unplugged()
+    assert type(told.value) is error

@@ -18,11 +18,10 @@ from bifa.live.record import HEADER, telemetry_row
 from bifa.printable import printable
 from bifa.screen import Console
 from harness.board import Board
-from harness.pty_uno import PtyUno
 
 
 class Scripted(Board):
-    """A board whose frames pass through `alter(name, values)`; `interrupt_at` raises in so many reads from now."""
+    """A board whose frames pass through `alter(name, values)`; `interrupt_in`: raises in so many reads from now."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -65,13 +64,10 @@ def with_field(name: str, field: str, value: int):
     return alter
 
 
-def test_an_unknown_start_cause_of_the_same_table_is_shown(board):
-    board.alter = with_field("hello", "start_cause", 200)
-    assert Uno(board, board).connect().start_cause == "unknown (200)"
-
-
-def test_an_unknown_start_cause_of_another_version_is_a_mismatch(board):
+def test_an_unknown_start_cause_is_shown_of_the_same_table_and_a_mismatch_of_another(board):
     cause, table = with_field("hello", "start_cause", 200), with_field("hello", "table_hash", 0x12345678)
+    board.alter = cause
+    assert Uno(board, board).connect().start_cause == "unknown (200)"
     board.alter = lambda name, values: table(name, cause(name, values))
     with pytest.raises(MismatchError, match=r"12345678.*bifa flash"):
         Uno(board, board).connect()
@@ -83,17 +79,15 @@ def test_any_hello_can_be_read(raw):
 
 
 @pytest.fixture(scope="module")
-def connected() -> Uno:
+def lasting() -> Uno:
     board = Board()
-    uno = Uno(board, board)
-    uno.connect()
-    return uno
+    return Uno(board, board)
 
 
 @given(raw=st.binary(min_size=21, max_size=21))
 @settings(max_examples=30)
-def test_any_sample_can_be_shown_and_recorded(connected, raw):
-    uno = connected
+def test_any_sample_can_be_shown_and_recorded(lasting, raw):
+    uno = lasting
     uno.connect()  # no sample came before
     uno.session.on_sample(Report("sample", 0, frames.unpack(REPORTS["sample"], raw)))
     (sample,) = uno.taken_samples()
@@ -105,7 +99,7 @@ def test_any_sample_can_be_shown_and_recorded(connected, raw):
     assert len(telemetry_row(uno, sample, 0)) == len(HEADER)
 
 
-@given(st.binary(min_size=43, max_size=43))
+@given(raw=st.binary(min_size=43, max_size=43))
 def test_any_status_can_be_read(raw):
     board = Board()
     uno = Uno(board, board)
@@ -113,54 +107,42 @@ def test_any_status_can_be_read(raw):
     assert asdict(uno.status())["valves"] == raw[29]
 
 
-def test_two_valves_of_a_chamber_on_are_never_shown_as_off(board):
-    uno = Uno(board, board)
-    uno.connect()
+def test_two_valves_of_a_chamber_on_are_never_shown_as_off(board, connected):
     board.alter = with_field("sample", "valves", 0b000011)
-    uno.stream(True)
-    assert uno.samples(1.0)[-1].connected == ("both", "off", "off")
+    connected.stream(True)
+    assert connected.samples(1.0)[-1].connected == ("both", "off", "off")
 
 
 @pytest.mark.parametrize("interrupt_in", range(1, 5))
-def test_an_interrupted_call_does_not_leave_its_answer_to_the_next(board, interrupt_in):
-    uno = Uno(board, board, seed=1)
-    uno.connect()
-    uno.stream(True)
+def test_an_interrupted_call_does_not_leave_its_answer_to_the_next(board, connected, interrupt_in):
+    connected.stream(True)
     board.interrupt_in = interrupt_in
     with pytest.raises(KeyboardInterrupt):
-        uno.session.call_all([("read_set", ())] * 20)
-    assert uno.status().state == "idle"
-    assert uno.parameters()["period_s"] == 5.7
-    assert uno.samples(1.0)  # telemetry goes on
+        connected.session.call_all([("read_set", ())] * 20)
+    assert connected.status().state == "idle"
+    assert connected.parameters()["period_s"] == 5.7
+    assert connected.samples(1.0)  # telemetry goes on
 
 
-def test_an_interrupted_run_is_not_carried_out_later():
-    class Cut(Scripted):
-        def write(self, data: bytes) -> None:
-            if self.interrupt_in == 1:
-                raise KeyboardInterrupt  # before anything has left
-            super().write(data)
+def test_an_interrupted_run_is_not_carried_out_later(board, connected):
+    def cut(data: bytes) -> None:
+        raise KeyboardInterrupt  # before anything has left
 
-    cut = Cut()
-    uno = Uno(cut, cut, seed=1)
-    uno.connect()
-    cut.interrupt_in = 1
+    write, board.write = board.write, cut
     with pytest.raises(KeyboardInterrupt):
-        uno.run()
-    cut.interrupt_in = -1
+        connected.run()
+    board.write = write
     for _ in range(20):
-        assert uno.status().state == "idle"
+        assert connected.status().state == "idle"
 
 
-def test_a_restart_during_an_interruption_is_told(board):
-    uno = Uno(board, board, seed=1)
-    uno.connect()
+def test_a_restart_during_an_interruption_is_told(board, connected):
     board.interrupt_in = 1
     with pytest.raises(KeyboardInterrupt):
-        uno.status()
+        connected.status()
     board.reset()
     with pytest.raises(RestartedError):
-        uno.status()
+        connected.status()
 
 
 @given(st.text())
@@ -172,30 +154,26 @@ def test_what_is_shown_is_printable_and_says_what_it_was(text):
         assert shown.encode("latin1", "backslashreplace").decode("unicode_escape") == text
 
 
-def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(tmp_path):
-    uno = PtyUno()
+def test_escape_sequences_from_the_uno_do_not_reach_a_piped_console(uno):
     served = uno.board.receive
     uno.board.receive = lambda: served().replace(b"ok\r\n", b"[\x1b]0;owned\x07 \x9b2J\r\nok\r\n")
     done = CliRunner().invoke(app, ["console", "--port", uno.device], input="show period_s\n" * 3)
-    uno.unplug()
     assert done.exit_code == 0, done.output
     assert done.output.count("\\x1b]0;owned\\x07") == 3
     assert done.output.replace("\n", "").isprintable()
 
 
 @pytest.mark.parametrize("ask", [Uno.status, Uno.parameters, Uno.presets, Uno.exchange_clocks])
-def test_an_answer_of_another_kind_is_none(board, ask):
+def test_an_answer_of_another_kind_is_none(connected, ask):
     """Each is asked again, and then said not to have been answered."""
-    uno = Uno(board, board)
-    uno.connect()
-    take = uno.session.take
+    take = connected.session.take
 
     def another(report, now_s):
         take(Report("done", report.sequence, {"result": 0}) if report.name.endswith("_report") else report, now_s)
 
-    uno.session.take = another
+    connected.session.take = another
     with pytest.raises(NoAnswerError, match=r"[1-9]\d* bad frames"):
-        ask(uno)
+        ask(connected)
 
 
 def test_a_session_with_the_key_of_the_one_before_is_another(board):
@@ -206,10 +184,8 @@ def test_a_session_with_the_key_of_the_one_before_is_another(board):
         assert uno.status().state == "idle"
 
 
-def test_an_uno_that_greets_before_any_session_is_said_to_have_restarted():
+def test_an_uno_that_greets_before_any_session_is_said_to_have_restarted(board, connected):
     """Another program has a session with it; this one has not connected yet."""
-    board = Board()
-    Uno(board, board).connect()
     session = Session(board, board)
     board.write(frames.encode(COMMANDS["version"], 0, (), frames.OPEN_SEED))
     session.poll(0.1)

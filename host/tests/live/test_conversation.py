@@ -8,37 +8,35 @@ import pytest
 from bifa.link import Uno
 from bifa.live.conversation import Conversation
 from harness.board import Board
+from harness.waiting import PATIENCE_S
 
-PATIENCE_S = 30.0
 
+class Held(Board):
+    """Keeps back a line that begins with `held` until `release` is set."""
 
-class Held:
-    """A board as transport that keeps back a line that begins with `held` until `release` is set."""
-
-    def __init__(self, board: Board, held: bytes) -> None:
-        self._board, self._held = board, held
+    def __init__(self, held: bytes) -> None:
+        super().__init__()
+        self._held = held
         self.reached, self.release = threading.Event(), threading.Event()
-        self.read = board.read
 
     def write(self, data: bytes) -> None:
         if data.startswith(self._held):
             self.reached.set()
             assert self.release.wait(PATIENCE_S)
-        self._board.write(data)
+        super().write(data)
 
 
 @pytest.mark.parametrize("held", [b"save one", b"version"])
 def test_a_stop_drops_what_was_typed_and_has_not_begun(held, capsys):
-    board = Board()
-    line = Held(board, held)
-    with Uno(line, board, seed=1) as uno:
+    board = Held(held)
+    with Uno(board, board, seed=1) as uno:
         uno.connect()
         uno.send_stop()
         conversation = Conversation(uno, SimpleNamespace(clock=board))
         conversation.type(f"{held.decode()}\nclear\nrun\n")
-        assert line.reached.wait(PATIENCE_S)
+        assert board.reached.wait(PATIENCE_S)
         conversation.stop()
-        line.release.set()
+        board.release.set()
         conversation.leave()
         assert conversation.error is None
         printed = capsys.readouterr().out

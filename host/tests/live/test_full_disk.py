@@ -20,35 +20,33 @@ def bifa(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "bifa", *arguments]
 
 
-@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
-@pytest.mark.parametrize("command", ["console", "upload", "monitor"])
-def test_output_onto_a_full_disk_ends_in_a_sentence_with_valves_off(uno, gait, command):
-    arguments = {"console": ["console"], "upload": ["upload", gait, "--run"], "monitor": ["monitor", "--run"]}[command]
-    for_long = [] if command == "console" else ["--seconds", "1"]
-    with FULL.open("w", encoding="utf-8") as full:
-        ended = subprocess.run(
-            bifa(*arguments, *for_long, "--port", uno.device),
-            input="run\nshow\n",
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            timeout=60,
-        )
-    assert ended.returncode == 2
-    assert ended.stderr.startswith("error: the output cannot be written (No space left on device)")
-    assert ended.stderr.count("\n") == 1
+@pytest.fixture
+def onto_a_full_disk():
+    """Runs a command whose output goes there, and which ends in a sentence."""
+    if not FULL.exists():
+        pytest.skip("no /dev/full here")
+
+    def run(*arguments: str) -> None:
+        with FULL.open("w", encoding="utf-8") as full:
+            options = {"stdout": full, "stderr": subprocess.PIPE, "text": True, "timeout": 60}
+            ended = subprocess.run(bifa(*arguments), input="run\nshow\n", **options)
+        assert ended.returncode == 2
+        assert ended.stderr.startswith("error: the output cannot be written (No space left on device)")
+        assert ended.stderr.count("\n") == 1
+
+    return run
+
+
+@pytest.mark.parametrize("command", [["console"], ["upload", "{gait}", "--run"], ["monitor", "--run"]])
+def test_output_onto_a_full_disk_ends_in_a_sentence_with_valves_off(onto_a_full_disk, uno, gait, command):
+    for_long = [] if command == ["console"] else ["--seconds", "1"]
+    onto_a_full_disk(*(word.format(gait=gait) for word in command), *for_long, "--port", uno.device)
     assert (uno.board.valves, uno.board.state) == (0, "stopped")
 
 
-@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("command", [["gaits"], ["record", "--out", "{out}", "--port", "virtual"]])
-def test_so_does_that_of_a_command_that_moves_nothing_or_has_not_yet(command, tmp_path):
-    arguments = [word.format(out=tmp_path / "walks") for word in command]
-    with FULL.open("w", encoding="utf-8") as full:
-        ended = subprocess.run(bifa(*arguments), stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
-    assert ended.returncode == 2
-    assert ended.stderr.startswith("error: the output cannot be written (No space left on device)")
-    assert ended.stderr.count("\n") == 1
+def test_so_does_that_of_a_command_that_moves_nothing_or_has_not_yet(onto_a_full_disk, command, tmp_path):
+    onto_a_full_disk(*(word.format(out=tmp_path / "walks") for word in command))
 
 
 @pytest.mark.parametrize("names", [("out/walks.partial",), ("records/walk.csv", None, "out/walks.partial")])

@@ -1,7 +1,6 @@
 """`bifa monitor --web` in a real browser, against the Uno's own code: slider, apply, stop, robot gone, page closed."""
 
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -37,6 +36,14 @@ def monitor():
 
 
 @pytest.fixture
+def walking(monitor):
+    """A monitor whose robot walks."""
+    bifa = monitor("--run")
+    assert bifa.until("running")
+    return bifa
+
+
+@pytest.fixture
 def tab(browser):
     contexts = []
 
@@ -55,37 +62,39 @@ def tab(browser):
         context.close()
 
 
-def test_a_slider_predicts_apply_changes_the_robot_and_stop_says_when_it_has(monitor, tab):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
-    assert bifa.until("running") == "running"
+def stop_on(page):
+    """Press its stop, until it says that the robot stands."""
+    page.get_by_role("button", name="Stop", exact=True).click()
+    page.get_by_text("the Uno confirms that all valves are off").wait_for()
+
+
+def test_a_slider_predicts_apply_changes_the_robot_and_stop_says_when_it_has(walking, tab):
+    page = tab(walking.url)
     predicted = page.locator("#predicted")
     expect(predicted).to_contain_text("10.8", timeout=PATIENCE_MS)
     page.locator("input[name=period_s]").fill("4.5")
     expect(predicted).not_to_contain_text("10.8")
     expect(predicted).to_have_text(re.compile(r"predicts \d+\.\d\d mm/s.*; \d+\.\d\d mm of slip"), timeout=PATIENCE_MS)
-    assert bifa.gait()["period_s"] == pytest.approx(5.7), "nothing changes before it is applied"
+    assert walking.gait()["period_s"] == pytest.approx(5.7), "nothing changes before it is applied"
     page.get_by_role("button", name="Apply").click()
     page.get_by_text("applied;").wait_for()
-    assert bifa.gait()["period_s"] == pytest.approx(4.5)
+    assert walking.gait()["period_s"] == pytest.approx(4.5)
     page.get_by_label("name of the preset").fill("slow-1")
     page.get_by_role("button", name="Save as preset").click()
     page.get_by_text("saved as slow-1").wait_for()
 
-    page.get_by_role("button", name="Stop", exact=True).click()
-    page.get_by_text("the Uno confirms that all valves are off").wait_for()
-    assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
+    stop_on(page)
+    assert (walking.uno.board.state, walking.uno.board.valves) == ("stopped", 0)
     expect(page.locator("#alarm")).to_contain_text("Stopped by this page at")
     expect(page.get_by_role("button", name="Walk")).to_be_disabled()
     page.get_by_role("button", name="Release the stop").click()
     page.get_by_text("released").wait_for()
     page.get_by_role("button", name="Walk").click()
-    assert bifa.until("running") == "running"
+    assert walking.until("running")
     assert page.complaints == []
 
-    bifa.process.send_signal(signal.SIGINT)
-    assert bifa.process.wait(15) == 0
-    assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
+    assert walking.interrupt() == 0
+    assert (walking.uno.board.state, walking.uno.board.valves) == ("stopped", 0)
 
 
 def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(monitor, tab, tmp_path):
@@ -108,10 +117,9 @@ def test_a_robot_that_is_gone_is_said_and_waited_for_and_never_walks_by_itself(m
     assert second.driven_s == 0
     page.get_by_role("button", name="Walk").click()
     bifa.uno = second
-    assert bifa.until("running") == "running"
+    assert bifa.until("running")
     assert bifa.process.poll() is None
-    bifa.process.send_signal(signal.SIGINT)
-    bifa.process.wait(15)
+    bifa.interrupt()
     assert second.board.valves == 0
 
 
@@ -126,12 +134,10 @@ def test_a_server_that_ends_while_the_robot_is_gone_leaves_no_page_that_waits_fo
     expect(page.locator("#alarm")).to_contain_text("is gone; plug the Uno in again")
 
 
-def test_a_robot_that_is_gone_while_nobody_watches_ends_the_command(monitor):
-    bifa = monitor("--run")
-    assert bifa.until("running") == "running"
-    bifa.uno.unplug()
-    assert bifa.process.wait(30) == 2
-    said = bifa.process.stdout.read()
+def test_a_robot_that_is_gone_while_nobody_watches_ends_the_command(walking):
+    walking.uno.unplug()
+    assert walking.process.wait(30) == 2
+    said = walking.process.stdout.read()
     assert "is gone" in said
     assert "MAY STILL BE MOVING" in said
 
@@ -153,61 +159,51 @@ def test_a_closed_page_stops_the_robot_or_not_as_the_person_chose(monitor, tab):
     time.sleep(4.5)
     assert bifa.uno.board.state == "running", "a page that is loaded anew was not closed"
     page.close()
-    assert bifa.until("stopped") == "stopped"
+    assert bifa.until("stopped")
     assert bifa.uno.board.valves == 0
 
 
-def test_who_has_no_token_may_look_and_stop_and_nothing_else(monitor, tab):
-    bifa = monitor("--run")
-    bifa.until("running")
-    page = tab(bifa.origin)
+def test_who_has_no_token_may_look_and_stop_and_nothing_else(walking, tab):
+    page = tab(walking.origin)
     page.get_by_text("View and stop only").wait_for()
     for name in ("Walk", "Apply", "Load", "Save as preset", "Release the stop"):
         assert page.get_by_role("button", name=name, exact=True).is_disabled()
     page.close()
     time.sleep(4.5)
-    assert bifa.uno.board.state == "running", "who has no token comes and goes, and changes nothing"
-    page = tab(bifa.origin)
-    page.get_by_role("button", name="Stop", exact=True).click()
-    page.get_by_text("the Uno confirms that all valves are off").wait_for()
-    assert (bifa.uno.board.state, bifa.uno.board.valves) == ("stopped", 0)
+    assert walking.uno.board.state == "running", "who has no token comes and goes, and changes nothing"
+    page = tab(walking.origin)
+    stop_on(page)
+    assert (walking.uno.board.state, walking.uno.board.valves) == ("stopped", 0)
 
 
-def test_a_stranger_does_not_keep_it_walking(monitor, tab):
-    bifa = monitor("--run")
-    bifa.until("running")
-    stranger = WebSocket(int(bifa.origin.rpartition(":")[2]))
-    tab(bifa.url).close()
-    assert bifa.until("stopped") == "stopped"
+def test_a_stranger_does_not_keep_it_walking(walking, tab):
+    stranger = WebSocket(walking.port)
+    tab(walking.url).close()
+    assert walking.until("stopped")
     stranger.close()
 
 
 @pytest.mark.parametrize("key", ["Escape", "!"])
-def test_keys_stop(monitor, tab, key):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
-    assert bifa.until("running") == "running"
+def test_keys_stop(walking, tab, key):
+    page = tab(walking.url)
     page.locator("input[name=period_s]").focus()
     page.keyboard.press(key)
     page.get_by_text("the Uno confirms that all valves are off").wait_for()
-    assert bifa.uno.board.valves == 0
+    assert walking.uno.board.valves == 0
 
 
 def test_a_page_of_an_earlier_server_says_so_and_still_stops(monitor, tab):
     earlier = monitor()
-    port = earlier.origin.rpartition(":")[2]
     page = tab(earlier.url)
-    earlier.process.send_signal(signal.SIGINT)
-    earlier.process.wait(15)
+    earlier.interrupt()
     expect(page.locator("#alarm")).to_contain_text("the data shown are old")
     assert page.get_by_role("button", name="Walk").is_disabled()
-    bifa = monitor("--run", "--web-port", port)
-    assert bifa.until("running") == "running"
+    bifa = monitor("--run", "--web-port", str(earlier.port))
+    assert bifa.until("running")
     expect(page.locator("#alarm")).to_contain_text("This page belongs to an earlier bifa monitor")
     assert page.get_by_role("button", name="Walk").is_disabled()
     assert float(page.locator("#alarm").evaluate("box => parseFloat(getComputedStyle(box).fontSize)")) > 20
-    page.get_by_role("button", name="Stop", exact=True).click()
-    page.get_by_text("the Uno confirms that all valves are off").wait_for()
+    stop_on(page)
     assert bifa.uno.board.valves == 0
 
 
@@ -244,23 +240,6 @@ def test_closing_the_last_page_of_a_robot_that_stands_does_nothing(monitor, tab)
     assert bifa.uno.board.state == "idle"
 
 
-def test_a_page_from_elsewhere_is_not_heard(monitor, tab, tmp_path):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
-    elsewhere = tmp_path / "elsewhere.html"
-    elsewhere.write_text("<!doctype html><title>elsewhere</title>")
-    page.goto(elsewhere.as_uri())
-    heard = page.evaluate(
-        """url => new Promise((done) => {
-            const socket = new WebSocket(url);
-            socket.onmessage = () => done("heard");
-            socket.onerror = socket.onclose = () => done("refused");
-        })""",
-        f"{bifa.origin.replace('http', 'ws')}/live",
-    )
-    assert heard == "refused"
-
-
 def test_the_page_is_legible_wide_and_narrow_light_and_dark(monitor, tab):
     page = tab(monitor("--run").url)
     for width in (1280, 390):
@@ -274,10 +253,8 @@ def test_the_page_is_legible_wide_and_narrow_light_and_dark(monitor, tab):
 CONTROLS = r"- (?:button|slider|spinbutton|combobox|textbox|checkbox|progressbar)\b.*"
 
 
-def test_who_hears_the_page_is_told_what_every_control_is(monitor, tab):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
-    bifa.until("running")
+def test_who_hears_the_page_is_told_what_every_control_is(walking, tab):
+    page = tab(walking.url)
     heard = page.locator("body").aria_snapshot()
     controls = re.findall(CONTROLS, heard)
     assert len(controls) >= 6 + 6 + 3 + 8
@@ -286,10 +263,8 @@ def test_who_hears_the_page_is_told_what_every_control_is(monitor, tab):
     assert not re.search(r"\d\.\d{5}", heard), "no phase of fifteen digits"
 
 
-def test_the_keyboard_alone_sets_a_gait_and_stops(monitor, tab):
-    bifa = monitor("--run")
-    page = tab(bifa.url)
-    assert bifa.until("running") == "running"
+def test_the_keyboard_alone_sets_a_gait_and_stops(walking, tab):
+    page = tab(walking.url)
     expect(page.locator("input[name=period_s]")).to_be_enabled()
     focused = "document.activeElement.id || document.activeElement.name || document.activeElement.dataset.do"
     reached = []
@@ -303,12 +278,12 @@ def test_the_keyboard_alone_sets_a_gait_and_stops(monitor, tab):
     assert reached[:2] == ["stop", "period_s"], "to stop is first"
     page.keyboard.press("Enter")
     page.get_by_text("applied;").wait_for()
-    assert bifa.gait()["period_s"] > 5.7
+    assert walking.gait()["period_s"] > 5.7
     for _ in reached[1:]:
         page.keyboard.press("Shift+Tab")
     assert page.evaluate(focused) == "stop"
     page.keyboard.press("Space")
-    assert bifa.until("stopped") == "stopped"
+    assert walking.until("stopped")
     assert page.complaints == []
 
 
@@ -317,15 +292,10 @@ def test_what_is_drawn_begins_when_the_uno_does(monitor, tab):
     assert page.evaluate("Chart.getChart(document.querySelector('#plot canvas')).scales.x.min") >= 0.0
 
 
-def test_a_port_that_is_taken_is_refused_with_what_to_do(monitor):
-    bifa = monitor()
-    port = bifa.origin.rpartition(":")[2]
-    other = PtyUno()
-    try:
-        command = [sys.executable, "-m", "bifa", "monitor", "--web", "--web-port", port, "--port", other.device]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=30)
-    finally:
-        other.unplug()
+def test_a_port_that_is_taken_is_refused_with_what_to_do(monitor, uno):
+    taken = str(monitor().port)
+    command = [sys.executable, "-m", "bifa", "monitor", "--web", "--web-port", taken, "--port", uno.device]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=30)
     assert ended.returncode == 2
     assert "--web-port" in ended.stderr
 
@@ -339,5 +309,4 @@ def test_on_the_virtual_rig_the_page_shows_position_and_speed(monitor, tab, tmp_
     expect(shown).to_contain_text("mm/s over the last cycle", timeout=60_000)
     page.wait_for_timeout(6_000)
     assert 15 < float(shown.inner_text().split()[0]) < 30
-    page.get_by_role("button", name="Stop", exact=True).click()
-    page.get_by_text("the Uno confirms that all valves are off").wait_for()
+    stop_on(page)

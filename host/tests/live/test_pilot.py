@@ -156,36 +156,33 @@ def test_a_stop_waits_for_nobody_who_writes():
     assert sent.is_set()
 
 
-class Deaf:
-    """A board as transport to which no stop comes through, and whose valves stay on."""
+class Deaf(Board):
+    """No stop comes through to it while it is deaf, and its valves stay on."""
 
-    def __init__(self, board: Board) -> None:
-        self._board, self.is_deaf = board, False
-        self.read = board.read
+    is_deaf = False
 
     def write(self, data: bytes) -> None:
         if not (self.is_deaf and data == frames.STOP):
-            self._board.write(data)
+            super().write(data)
 
 
 @pytest.mark.parametrize("is_watched", [True, False])
 def test_a_stop_that_is_not_confirmed_ends_the_flight_loudly_where_nobody_watches(is_watched):
-    board, asked, reports = Board(), [], []
-    line = Deaf(board)
+    board, asked, reports = Deaf(), [], []
     pilot = Pilot()
     pilot.is_watched = lambda: is_watched
 
     def tell(report, samples):
         reports.append(report)
         if report.get("robot") == "running" and not asked:
-            line.is_deaf = True
+            board.is_deaf = True
             asked.append(pilot.stop("the last page was closed"))
         if is_watched and report.get("stopped") and report["stopped"]["is_confirmed"] is False:
-            line.is_deaf = False  # its deafness has been told, and it can be landed
+            board.is_deaf = False  # its deafness has been told, and it can be landed
 
     flying = nullcontext() if is_watched else pytest.raises(StillMovingError, match="MAY STILL BE MOVING")
     with flying:
-        pilot.fly(Uno(line, board), board, tell, 12.0, lambda uno: uno.run())
+        pilot.fly(Uno(board, board), board, tell, 12.0, lambda uno: uno.run())
     assert isinstance(asked[0].exception(0), StillMovingError)
     if is_watched:
         assert any(report.get("stopped") and report["stopped"]["is_confirmed"] is False for report in reports)

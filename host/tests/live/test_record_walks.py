@@ -9,37 +9,30 @@ from bifa.cli import app
 from bifa.data import read_dataset
 from bifa.live.record import record_walks
 from bifa.lock import LockedError, locked
-from bifa.rig import open_rig
 from bifa.screen import Console
 
 pytestmark = pytest.mark.uno
 
 
-def test_a_recording_is_resumed_on_another_day(tmp_path, monkeypatch):
+def test_a_recording_is_resumed_on_another_day(rig, tmp_path, monkeypatch):
     out = tmp_path / "walks"
-    with open_rig("virtual", profile="ideal", seed=3) as rig:
-        monkeypatch.setattr("time.strftime", lambda *form: "2026-11-25")
-        record_walks(rig, "virtual", out, None, 1, 1, Console(quiet=True))
-        out.rename(out.with_name("walks.partial"))  # as where the second of two walks was interrupted
-        monkeypatch.setattr("time.strftime", lambda *form: "2026-11-26")
-        record_walks(rig, "virtual", out, None, 1, 2, Console(quiet=True))
+    monkeypatch.setattr("time.strftime", lambda *form: "2026-11-25")
+    record_walks(rig, "virtual", out, None, 1, 1, Console(quiet=True))
+    out.rename(out.with_name("walks.partial"))  # as where the second of two walks was interrupted
+    monkeypatch.setattr("time.strftime", lambda *form: "2026-11-26")
+    record_walks(rig, "virtual", out, None, 1, 2, Console(quiet=True))
     dataset = read_dataset(out)
     assert [trial.file for trial in dataset.trials] == ["walk_1.csv", "walk_2.csv"]
     assert dataset.provenance["recorded_at"].startswith("20")
 
 
-def test_two_recordings_do_not_go_into_one_data_set(tmp_path):
-    with (
-        open_rig("virtual", profile="ideal", seed=3) as rig,
-        locked(tmp_path / "walks"),
-        pytest.raises(LockedError, match="is being written by"),
-    ):
+def test_two_recordings_do_not_go_into_one_data_set(rig, tmp_path):
+    with locked(tmp_path / "walks"), pytest.raises(LockedError, match="is being written by"):
         record_walks(rig, "virtual", tmp_path / "walks", None, 1, 1, Console(quiet=True))
 
 
-def test_a_recording_says_the_speed_of_the_settled_cycles(tmp_path, capsys):
-    with open_rig("virtual", profile="ideal", seed=3) as rig:
-        record_walks(rig, "virtual", tmp_path / "walks", None, 5, 1, Console())
+def test_a_recording_says_the_speed_of_the_settled_cycles(rig, tmp_path, capsys):
+    record_walks(rig, "virtual", tmp_path / "walks", None, 5, 1, Console())
     said = capsys.readouterr().out
     assert re.search(r"walk 1: 10\.8\d mm/s over [3-5] settled cycles", said)
 

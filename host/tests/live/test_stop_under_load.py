@@ -10,6 +10,7 @@ import pytest
 from bifa.link import frames
 from bifa.robot import BASELINE
 from harness.pty_uno import PtyUno
+from harness.waiting import until
 from harness.web_monitor import WebMonitor
 from harness.web_socket import WebSocket
 
@@ -89,10 +90,9 @@ def bifa():
 
 @pytest.mark.parametrize("flood", FLOODS)
 def test_a_stop_is_at_the_port_within_a_tenth_of_a_second(bifa, flood, figure):
-    port = int(bifa.origin.rpartition(":")[2])
-    owner = WebSocket(port, bifa.token)
-    assert bifa.until("running") == "running"
-    crowd = Flood(port, FLOODS[flood])
+    owner = WebSocket(bifa.port, bifa.token)
+    assert bifa.until("running")
+    crowd = Flood(bifa.port, FLOODS[flood])
     try:
         taken = _stops(bifa, owner)
     finally:
@@ -104,8 +104,8 @@ def test_a_stop_is_at_the_port_within_a_tenth_of_a_second(bifa, flood, figure):
 
 
 def test_a_stop_does_not_wait_for_what_is_predicted_of_the_sliders(bifa, figure):
-    owner = WebSocket(int(bifa.origin.rpartition(":")[2]), bifa.token)
-    assert bifa.until("running") == "running"
+    owner = WebSocket(bifa.port, bifa.token)
+    assert bifa.until("running")
     drafts = itertools.count()
 
     def slide() -> None:
@@ -130,8 +130,7 @@ def _stops(bifa, owner, meanwhile=lambda: None) -> list[float]:
         time.sleep(0.1)
         bifa.uno.stopped_s, asked_s = None, time.monotonic()
         number = owner.ask("stop")
-        while bifa.uno.stopped_s is None and time.monotonic() < asked_s + 5:
-            time.sleep(0.001)
+        until(lambda: bifa.uno.stopped_s, within_s=5)
         taken.append((bifa.uno.stopped_s or asked_s + 5) - asked_s)
         assert "confirms" in owner.answer(number)["said"]
     return taken

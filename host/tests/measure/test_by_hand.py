@@ -8,16 +8,12 @@ from bifa.data import read_dataset
 from bifa.data.layout import RAW
 from bifa.measure.by_hand import ByHand
 from bifa.measure.desk import Desk
-from bifa.measure.plan import BRISK, PlannedTrial
+from bifa.measure.plan import BRISK
 from bifa.measure.session import run_session
 from bifa.rig import open_rig
-from harness.lab import Lab
+from harness.lab import PLAN, PULL, STATIC, Lab
 
 pytestmark = pytest.mark.uno
-
-STATIC = PlannedTrial("static_loading", "small", 4.0, 20.0)
-PULL = PlannedTrial("anchor_pull", None, 8.5, 40.0)
-PLAN = (STATIC, PlannedTrial("step_response", "small", 8.5), PULL, PlannedTrial("locomotion", gait=BRISK, cycles=1))
 
 
 class Bench:
@@ -65,10 +61,9 @@ def bench(tmp_path):
         each.rig.close()
 
 
-def test_files_give_the_same_trials_as_instruments_that_are_driven(bench, tmp_path):
+def test_files_give_the_same_trials_as_instruments_that_are_driven(bench, rig, tmp_path):
     by_hand = bench().run(tmp_path / "day", PLAN)
-    with open_rig("virtual", seed=3) as rig:
-        driven = run_session(rig, tmp_path / "driven", PLAN, name="a day", known={}, provenance={})
+    driven = run_session(rig, tmp_path / "driven", PLAN, name="a day", known={}, provenance={})
     for ours, theirs in zip(by_hand.trials, driven.trials, strict=True):
         assert ours.condition == theirs.condition
         assert set(ours.columns) == set(theirs.columns)

@@ -5,15 +5,13 @@ import sys
 import time
 import tomllib
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from bifa.measure.desk import Desk, NobodyError
 from bifa.measure.own_instruments import OwnInstruments, Turn
-from bifa.measure.plan import PlannedTrial
-
-PULL = PlannedTrial("anchor_pull", None, 8.5, 40.0)
+from harness.lab import PULL
+from harness.waiting import until
 
 
 @pytest.fixture
@@ -37,14 +35,6 @@ def typed(monkeypatch):
     stdin.close()
 
 
-def waited(answer):
-    """What `answer()` gives once it gives anything."""
-    end_s = time.monotonic() + 10
-    while (said := answer()) is None and time.monotonic() < end_s:
-        time.sleep(0.01)
-    return said
-
-
 def mounting(say=lambda text: None, watch=None):
     """A desk that has asked its first question."""
     desk = Desk(say, watch)
@@ -65,16 +55,16 @@ def test_lines_answer_one_question_each(typed):
     desk = mounting(shown.append)
     assert desk.answer() is None
     typed(b" r \n\n")
-    assert waited(desk.answer) == "r"
+    assert until(desk.answer) == "r"
     desk.ask("start", "Start it.")
-    assert waited(desk.answer) == ""
+    assert until(desk.answer) == ""
     assert shown == ["Mount it.", "Start it."]
 
 
 def test_an_input_that_has_ended_is_nobody_unless_a_folder_is_watched(typed, tmp_path):
     typed(b"")
     with pytest.raises(NobodyError, match="no one can answer"):
-        waited(mounting().answer)
+        until(mounting().answer)
     watching = Desk(lambda text: None, tmp_path)
     watching.ask("mount", "Mount it.", {"trial": 3})
     time.sleep(0.1)
@@ -91,7 +81,7 @@ def test_a_program_without_an_input_is_answered_by_the_folder_alone(monkeypatch,
     (tmp_path / "answer").write_text("r\n")
     assert watching.answer() == "r"
     with pytest.raises(NobodyError, match="no one can answer"):
-        waited(mounting().answer)
+        until(mounting().answer)
 
 
 def test_an_answer_to_an_earlier_question_does_not_count(typed, tmp_path):
@@ -107,12 +97,12 @@ def test_without_a_watched_folder_the_path_of_the_record_is_typed(typed, tmp_pat
     said = []
     instruments = of_a_pull(said.append)
     typed(b"\n")
-    assert waited(lambda: instruments.ready or None)
+    assert until(lambda: instruments.ready)
     instruments.save()
     typed(b"nothing.csv\n")
-    assert waited(lambda: "There is no file 'nothing.csv'" in said[-1] or instruments.ready or None)
+    assert until(lambda: "There is no file 'nothing.csv'" in said[-1] or instruments.ready)
     typed(f"'{tmp_path / 'my pull.csv'}'\n".encode())
-    assert waited(lambda: instruments.ready or None)
+    assert until(lambda: instruments.ready)
     record = instruments.stop()
     assert list(record["force_N"]) == [0.0, 3.0]
     assert list(record["sync_time_s"]) == [0.1, 0.2]
@@ -127,14 +117,14 @@ def test_stopping_is_an_answer_to_every_question(typed):
     instruments = of_a_pull()
     typed(b"q\n")
     with pytest.raises(KeyboardInterrupt):
-        waited(lambda: SimpleNamespace() if instruments.ready else None)
+        until(lambda: instruments.ready)
 
 
 @pytest.mark.parametrize("word", ["q", "Quit", "stop", "!"])
 def test_a_stop_that_was_typed_while_the_next_question_was_prepared_stops(terminal, word):
     desk = mounting()
     terminal(f"\n{word}\nr\n".encode())
-    assert waited(desk.answer) == ""
+    assert until(desk.answer) == ""
     desk.ask("start", "Start it.")
     with pytest.raises(KeyboardInterrupt):
         desk.answer()
@@ -143,7 +133,7 @@ def test_a_stop_that_was_typed_while_the_next_question_was_prepared_stops(termin
 def test_what_else_was_typed_ahead_starts_nothing(terminal):
     desk = mounting()
     terminal(b"\n\nr\n")
-    assert waited(desk.answer) == ""
+    assert until(desk.answer) == ""
     desk.ask("start", "Start it.")
     assert desk.answer() is None
 
@@ -153,7 +143,7 @@ def test_a_stop_while_nothing_is_asked_counts_at_once(terminal, tmp_path):
     desk.attend()
     desk.ask("mount", "Mount it.")
     terminal(b"\n")
-    assert waited(desk.answer) == ""
+    assert until(desk.answer) == ""
     desk.attend()
     terminal(b"q\n")
     with pytest.raises(KeyboardInterrupt):
@@ -177,8 +167,8 @@ def test_a_word_that_is_no_answer_starts_nothing_and_is_asked_again(typed, word)
     said = []
     instruments = of_a_pull(said.append)
     typed(f"{word}\n".encode())
-    assert waited(lambda: instruments.ready or (len(said) > 1 or None))
+    assert until(lambda: instruments.ready or len(said) > 1)
     assert not instruments.ready
     assert f"{word!r} is not an answer here: press Enter once it is done, q stops." in said[-1]
     typed(b"\n")
-    assert waited(lambda: instruments.ready or None)
+    assert until(lambda: instruments.ready)

@@ -44,7 +44,7 @@ def files(tmp_path, request):
     if request.param == "marked":
         numbers = numbers[has_strobe(numbers)]
     edges = np.concatenate([np.arange(-3.0 - RESTART_S, -RESTART_S, 0.01), numbers * 0.01])
-    (tmp_path / "pull.sync.csv").write_text("sync_time_s\n" + "\n".join(f"{t:.6f}" for t in own(edges)))
+    write(tmp_path / "pull.sync.csv", {"sync_time_s": own(edges)})
     machine = np.arange(-2.0, 7.5, 0.02)
     pulled = 20.0 * np.clip(machine - 4.0, 0.0, 2.0)
     force = np.minimum(5.0 * pulled, 28.0)
@@ -103,8 +103,11 @@ def test_what_is_refused_when_it_is_added_changes_nothing(files):
     assert not folder.exists()
     import_trial(files / "pull.csv", files, PULL, folder)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(DatasetError, match=r"already, as anchor_8\.5psi_20mm_s_1\.csv"):
-        import_trial(files / "pull.csv", files, PULL, folder, add=True)
+    telemetry = (files / "telemetry_1.csv").read_text()
+    for other_pressure in ("8.500000", "8.400000"):
+        (files / "telemetry_1.csv").write_text(telemetry.replace("8.500000", other_pressure))
+        with pytest.raises(DatasetError, match=r"already, as anchor_8\.5psi_20mm_s_1\.csv"):
+            import_trial(files / "pull.csv", files, PULL, folder, add=True)
     second = another(files, "second", 0.1)
     with pytest.raises(BifaError, match=r"dataset\.toml.*--known"):
         import_trial(second, files, PULL, folder, {"supply_positive_psi": 8.0}, add=True)
@@ -162,20 +165,43 @@ def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
     return f"{header}\n" + "".join(f"{t},1,2{end}\n" for t in times)
 
 
+def sync(edges_s):
+    return "sync_time_s\n" + "\n".join(f"{t:.6f}" for t in edges_s)
+
+
+def with_cell(cell):
+    """The displacement in line 41 replaced."""
+
+    def spoil(text):
+        lines = text.splitlines()
+        time_s, _, force = lines[40].split(",")
+        return "\n".join([*lines[:40], f"{time_s},{cell},{force}", *lines[41:]])
+
+    return spoil
+
+
+def with_a_hole(text):
+    header, *rows = text.splitlines()
+    return "\n".join([header, *(row for row in rows if not 4.5 < float(row.split(",")[0]) < 6.5)])
+
+
+SCATTERED_S = np.sort(np.arange(1, 800) * 0.01 + 0.008 * np.random.default_rng(0).random(799))
+LINE_41 = r"pull\.csv, line 41, column displacement_mm: "
+
+
 @pytest.mark.parametrize(
-    ("file", "text", "message"),
+    ("file", "spoilt", "message"),
     [
         ("pull.csv", "time_s,displacement_mm\n1,2\n2,3\n3,4\n", "force_N"),
         ("pull.csv", "time_s,displacement_mm,force_N\n1,2,3\n2,x,4\n3,4,5\n", "line 3, column displacement_mm"),
         ("pull.csv", "", "lacks the column time_s"),
         ("pull.csv", "time_s,displacement_mm,force_N\n", "0 samples"),
         ("pull.csv", "time_s,displacement_mm,force_N\n1,2,3\n2,3,4\n", "do not overlap"),
-        (
-            "pull.sync.csv",
-            "sync_time_s\n" + "\n".join(f"{0.01 * i:.2f}" for i in range(300)),
-            "(no|not show the) pause",
-        ),
+        ("pull.sync.csv", sync(0.01 * np.arange(300)), "(no|not show the) pause"),
+        ("pull.sync.csv", sync(own([*np.arange(-5.0, -2.0, 0.01), *SCATTERED_S])), r"pull\.sync\.csv"),
         ("telemetry_1.csv", "time_s,sequence\n1,2\n2,3\n", "pressure_body_psi"),
+        ("telemetry_1.csv", lambda text: text.replace(",200.000000,", ",,"), "column sequence: no value"),
+        ("telemetry_1.csv", with_a_hole, r"the telemetry has a hole of 2\.00 s at 4\.50 s"),
         ("pull.csv", table((1, 2, 2, 3)), "line 4, column time_s: not later"),
         ("pull.sync.csv", "sync_time_s\n1\n3\n2\n", "line 4, column sync_time_s: not later"),
         ("pull.csv", table().replace(",", ";"), "separated by semicolons"),
@@ -183,10 +209,14 @@ def table(times=(1, 2, 3, 4), header="time_s,displacement_mm,force_N", end=""):
         ("pull.csv", table(end=",5"), "line 2: 4 fields, but 3 columns.*decimal points"),
         ("pull.csv", table(header="time_s,displacement_mm,force_N,force_N", end=",5"), "force_N more than once"),
         ("pull.csv", table(end="x" * 140_000), "cannot be read as a CSV"),
+        ("pull.csv", with_cell(""), LINE_41 + "no value"),
+        ("pull.csv", with_cell("-999"), LINE_41 + "-999 is a code for a missing value"),
+        ("pull.csv", with_cell("9999.0"), LINE_41 + "9999 is a code for a missing value"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_named_with_what_to_do(files, file, text, message):
-    (files / file).write_text(text)
+def test_a_file_that_cannot_be_used_is_named_with_what_to_do(files, file, spoilt, message):
+    path = files / file
+    path.write_text(spoilt if isinstance(spoilt, str) else spoilt(path.read_text()))
     with pytest.raises(DatasetError, match=message):
         import_trial(files / "pull.csv", files, PULL, files / "out")
     assert not (files / "out").exists()
@@ -227,32 +257,6 @@ def test_samples_lost_about_the_mark_ask_for_another_recording(files):
         import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
-def test_edges_that_do_not_fit_the_uno_are_refused(files):
-    rng = np.random.default_rng(0)
-    edges = np.concatenate([np.arange(-5.0, -2.0, 0.01), np.sort(np.arange(1, 800) * 0.01 + 0.008 * rng.random(799))])
-    (files / "pull.sync.csv").write_text("sync_time_s\n" + "\n".join(f"{t:.6f}" for t in own(edges)))
-    with pytest.raises(DatasetError, match=r"pull\.sync\.csv"):
-        import_trial(files / "pull.csv", files, PULL, files / "out")
-
-
-@pytest.mark.parametrize(
-    ("cell", "told"),
-    [
-        ("", "no value"),
-        ("-999", "-999 is a code for a missing value"),
-        ("9999.0", "9999 is a code for a missing value"),
-    ],
-)
-def test_a_lost_marker_is_named_by_file_line_and_column_and_leaves_nothing_behind(files, cell, told):
-    lines = (files / "pull.csv").read_text().splitlines()
-    time_s, _, force = lines[40].split(",")
-    (files / "pull.csv").write_text("\n".join([*lines[:40], f"{time_s},{cell},{force}", *lines[41:]]))
-    with pytest.raises(DatasetError, match=rf"pull\.csv, line 41, column displacement_mm: {told}"):
-        import_trial(files / "pull.csv", files, PULL, files / "out")
-    (files / "pull.csv").write_text("\n".join(lines))
-    import_trial(files / "pull.csv", files, PULL, files / "out")
-
-
 def test_what_a_spreadsheet_adds_does_not_matter(files):
     header, *rows = (files / "pull.csv").read_text().splitlines()
     table = [f"{header},remark", *(f"{row},good" for row in rows), ",,,"]
@@ -271,29 +275,9 @@ def test_a_tail_with_gaps_is_refused_and_one_never_tracked_is_absent(tmp_path):
     assert "displacement_tail_mm" not in read_instrument(path, ("displacement_head_mm",))[0]
 
 
-def test_telemetry_without_commands_or_with_a_gap_is_refused(files):
+def test_telemetry_without_commands_is_no_steps(files):
     with pytest.raises(DatasetError, match="lacks the column command_body"):
         import_trial(files / "pull.csv", files, STEP, files / "out")
-    path = files / "telemetry_1.csv"
-    path.write_text(path.read_text().replace(",200.000000,", ",,"))
-    with pytest.raises(DatasetError, match="column sequence: no value"):
-        import_trial(files / "pull.csv", files, PULL, files / "out")
-
-
-def test_a_record_is_not_added_again_with_other_pressures(files):
-    import_trial(files / "pull.csv", files, PULL, files / "out")
-    path = files / "telemetry_1.csv"
-    path.write_text(path.read_text().replace("8.500000", "8.400000"))
-    with pytest.raises(DatasetError, match="already"):
-        import_trial(files / "pull.csv", files, PULL, files / "out", add=True)
-
-
-def test_a_hole_in_the_telemetry_is_not_filled(files):
-    lines = (files / "telemetry_1.csv").read_text().splitlines()
-    kept = [line for line in lines if not line[0].isdigit() or not 4.5 < float(line.split(",")[0]) < 6.5]
-    (files / "telemetry_1.csv").write_text("\n".join(kept))
-    with pytest.raises(DatasetError, match=r"the telemetry has a hole of 2\.00 s at 4\.50 s"):
-        import_trial(files / "pull.csv", files, PULL, files / "out")
 
 
 @pytest.mark.parametrize("files", ["marked"], indirect=True)

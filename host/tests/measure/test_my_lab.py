@@ -9,18 +9,12 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 import bifa.rig.rig
-from bifa.measure.plan import BRISK, PlannedTrial
 from bifa.measure.session import run_session
 from bifa.rig import is_offered, open_rig
+from harness.lab import PLAN
 
 pytestmark = pytest.mark.uno
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "my_lab"
-PLAN = (
-    PlannedTrial("static_loading", "small", 4.0, 20.0),
-    PlannedTrial("step_response", "small", 8.5),
-    PlannedTrial("anchor_pull", None, 8.5, 40.0),
-    PlannedTrial("locomotion", gait=BRISK, cycles=1),
-)
 
 
 def vendor(stand) -> ModuleType:
@@ -65,7 +59,7 @@ def vendor(stand) -> ModuleType:
 
 
 @pytest.fixture
-def installed(tmp_path, monkeypatch):
+def installed(rig, tmp_path, monkeypatch):
     """The example as pip leaves it, on a bench whose serial port is the virtual Uno's."""
     project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
     shutil.copy(EXAMPLE / "my_lab.py", tmp_path)
@@ -75,11 +69,10 @@ def installed(tmp_path, monkeypatch):
     named = "\n".join(f"{name} = {target}" for name, target in project["entry-points"]["bifa.rigs"].items())
     (info / "entry_points.txt").write_text(f"[bifa.rigs]\n{named}\n")
     monkeypatch.syspath_prepend(tmp_path)
-    with open_rig("virtual", seed=3) as virtual:
-        monkeypatch.setitem(sys.modules, "acme", vendor(virtual.instruments))
-        monkeypatch.setattr(bifa.rig.rig, "SerialTransport", lambda device: virtual.transport)
-        monkeypatch.setattr(bifa.rig.rig, "WallClock", lambda: virtual.clock)
-        yield
+    monkeypatch.setitem(sys.modules, "acme", vendor(rig.instruments))
+    monkeypatch.setattr(bifa.rig.rig, "SerialTransport", lambda device: rig.transport)
+    monkeypatch.setattr(bifa.rig.rig, "WallClock", lambda: rig.clock)
+    yield
     sys.modules.pop("my_lab", None)
 
 

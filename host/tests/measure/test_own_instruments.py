@@ -1,7 +1,6 @@
 """What is typed or saved at the bench and is not this trial's record: said, and asked for again."""
 
 import re
-import time
 from functools import partial
 
 import numpy as np
@@ -12,6 +11,7 @@ from bifa.measure.desk import Desk
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from harness.exports import EXPORTS
+from harness.waiting import until
 
 
 class Typing(Desk):
@@ -77,14 +77,9 @@ def watching(said, tmp_path):
     return begin
 
 
-def looked(own, until=lambda: False, seconds=2.0):
+def looked(own, condition=lambda: False, seconds=2.0):
     """Look as a session does, until there is a record or something is so; False if it is not in time."""
-    ends = time.monotonic() + seconds
-    while time.monotonic() < ends:
-        if own.ready or until():
-            return True
-        time.sleep(0.1)
-    return False
+    return until(lambda: own.ready or bool(condition()), seconds)
 
 
 @pytest.mark.parametrize("name", ["bluehill-french", "testxpert", "walter-bai", "labview", "trapezium"])

@@ -1,5 +1,6 @@
 """Sessions on the virtual bench: the real firmware, instruments with clocks of their own, interruptions."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,21 +12,15 @@ from bifa.link import Uno
 from bifa.link.uno import PRESSURES_AFTER_S
 from bifa.lock import LockedError, locked
 from bifa.measure.experiments import STEP_DOWN_S, STEP_UP_S, record_trial
-from bifa.measure.plan import BRISK, EXPERIMENTS, PlannedTrial, session
+from bifa.measure.plan import EXPERIMENTS, PlannedTrial, session
 from bifa.measure.recording import Recording, bench_of
 from bifa.measure.session import provenance, run_session
 from bifa.problem.spare import spare
 from bifa.problem.switches import seconds_per_uno_s, valves_of, walk_timeline
 from bifa.rig import open_rig
 from bifa.robot.gait import Gait
+from harness.lab import PLAN, PULL, STATIC, WALK
 from virtual_robot.uno import CLOCK_HZ
-
-PLAN = (
-    PlannedTrial("step_response", "small", 8.5),
-    PlannedTrial("static_loading", "small", 4.0, 20.0),
-    PlannedTrial("anchor_pull", None, 8.5, 40.0),
-    PlannedTrial("locomotion", gait=BRISK, cycles=1),
-)
 
 VALVE_PINS, STROBE_PIN = range(4, 10), 10
 
@@ -37,7 +32,7 @@ def run(rig, folder, trials=PLAN, **more):
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench") / "day"
-    with open_rig("virtual", profile="ideal", seed=3) as rig:
+    with open_rig("virtual", seed=3) as rig:
         run(rig, folder)
         return read_dataset(folder), dict(rig.truth)
 
@@ -80,23 +75,18 @@ def test_clocks_are_lined_up_so_that_pressure_and_displacement_belong_together(r
 
 
 @pytest.mark.uno
-def test_a_stand_that_cannot_pull_backward_is_not_taken_to_have_done_so():
-    backward = PlannedTrial("anchor_pull", None, 8.5, 40.0, settings={"direction": "backward"})
-    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
-        uno.connect()
-        with pytest.raises(ValueError, match="anchor_pull has no setting direction"):
-            record_trial(bench_of(rig), uno, backward)
+def test_a_stand_that_cannot_pull_backward_is_not_taken_to_have_done_so(rig, uno):
+    with pytest.raises(ValueError, match="anchor_pull has no setting direction"):
+        record_trial(bench_of(rig), uno, replace(PULL, settings={"direction": "backward"}))
 
 
 @pytest.mark.uno
-def test_valves_switch_when_the_record_of_a_walk_has_them_switch():
+def test_valves_switch_when_the_record_of_a_walk_has_them_switch(rig, uno):
     """Held against the edges of the pins in the simulated chip. The Uno switches at whole ticks, so that single edges
     are off by half a tick either way, and on the average none."""
     planned = PlannedTrial("locomotion", gait=Gait(3.1234, 263.3, 97.7, 0.47, 0.53, 0.61), cycles=4)
-    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
-        uno.connect()
-        trial = record_trial(bench_of(rig), uno, planned)
-        pins = [event for event in rig.uno.iter_events() if event.kind == "pin"]
+    trial = record_trial(bench_of(rig), uno, planned)
+    pins = [event for event in rig.uno.iter_events() if event.kind == "pin"]
     edges_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index in VALVE_PINS])
     strobes_s = np.array([event.cycle / CLOCK_HZ for event in pins if event.index == STROBE_PIN and event.value])
     seen_s = strobes_s[strobes_s > edges_s[0]][0]  # the strobe of the first sample that knows of the run
@@ -123,7 +113,7 @@ def test_a_static_loading_is_the_spring_less_the_pressure_force(recorded):
 def test_the_same_seed_gives_the_same_bytes(tmp_path):
     for folder in ("once", "again"):
         with open_rig("virtual", profile="realistic", seed=5) as rig:
-            run(rig, tmp_path / folder, PLAN[2:])
+            run(rig, tmp_path / folder, (PULL, WALK))
     names = sorted(path.name for path in (tmp_path / "once").iterdir())
     assert len(names) == 3
     for name in names:
@@ -131,25 +121,24 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path):
 
 
 @pytest.mark.uno
-def test_an_interrupted_session_goes_on_and_is_never_written_over(tmp_path):
-    plan = PLAN[1:3]
-    with open_rig("virtual", profile="ideal", seed=4) as rig:
+def test_an_interrupted_session_goes_on_and_is_never_written_over(rig, tmp_path):
+    plan = (STATIC, PULL)
 
-        def interrupt(event):
-            if event.number == 2 and event.share > 0.3:
-                raise KeyboardInterrupt
+    def interrupt(event):
+        if event.number == 2 and event.share > 0.3:
+            raise KeyboardInterrupt
 
-        with pytest.raises(KeyboardInterrupt):
-            run(rig, tmp_path / "day", plan, on_event=interrupt)
-        rig.clock.sleep(0.01)
-        assert not any(rig.uno.pin(pin) for pin in range(4, 10))  # all six valves
-        assert len(read_dataset(tmp_path / "day.partial").trials) == 1
-        seen = []
-        dataset = run(rig, tmp_path / "day", plan, on_event=seen.append)
-        assert seen[0].number == 2
-        assert len(dataset.trials) == 2
-        with pytest.raises(DatasetError, match="never overwritten"):
-            run(rig, tmp_path / "day", plan)
+    with pytest.raises(KeyboardInterrupt):
+        run(rig, tmp_path / "day", plan, on_event=interrupt)
+    rig.clock.sleep(0.01)
+    assert not any(rig.uno.pin(pin) for pin in VALVE_PINS)
+    assert len(read_dataset(tmp_path / "day.partial").trials) == 1
+    seen = []
+    dataset = run(rig, tmp_path / "day", plan, on_event=seen.append)
+    assert seen[0].number == 2
+    assert len(dataset.trials) == 2
+    with pytest.raises(DatasetError, match="never overwritten"):
+        run(rig, tmp_path / "day", plan)
 
 
 def test_a_rig_without_instruments_says_what_to_do():
@@ -180,11 +169,9 @@ def test_walks_are_at_the_pressures_asked_for():
 
 
 @pytest.mark.uno
-def test_a_walk_at_a_pressure_is_fed_with_it():
+def test_a_walk_at_a_pressure_is_fed_with_it(rig, uno):
     (walk, *_) = session(["locomotion"], pressures_psi=(5.0,), cycles=1)
-    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
-        uno.connect()
-        trial = record_trial(bench_of(rig), uno, walk)
+    trial = record_trial(bench_of(rig), uno, walk)
     assert trial.pressure_psi == 5.0
     assert 4.0 < trial.columns["pressure_body_psi"].max() < 5.2
 
@@ -233,55 +220,50 @@ def test_every_edge_is_the_sample_that_the_uno_says(seed):
 
 
 @pytest.mark.uno
-def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_said():
-    with open_rig("virtual", seed=3) as rig, Uno(rig.transport, rig.clock) as uno:
-        stop, tries = rig.instruments.stop, []
+def test_an_instrument_that_misses_the_mark_is_asked_to_repeat_and_then_it_is_said(rig, uno):
+    stop, tries = rig.instruments.stop, []
 
-        def deaf():
-            record = stop()
-            tries.append(len(record["sync_time_s"]))
-            return record | {"sync_time_s": record["sync_time_s"][30:]}
+    def deaf():
+        record = stop()
+        tries.append(len(record["sync_time_s"]))
+        return record | {"sync_time_s": record["sync_time_s"][30:]}
 
-        rig.instruments.stop = deaf
-        uno.connect()
-        with pytest.raises(
-            BifaError, match=r"anchor pull, 8\.5 psi.*3 times over: the sync edges do not show the pause.*repeat"
-        ):
-            record_trial(bench_of(rig), uno, PLAN[2])
-        assert len(tries) == 3
+    rig.instruments.stop = deaf
+    said = r"anchor pull, 8\.5 psi.*3 times over: the sync edges do not show the pause.*repeat"
+    with pytest.raises(BifaError, match=said):
+        record_trial(bench_of(rig), uno, PULL)
+    assert len(tries) == 3
 
 
 @pytest.mark.uno
 @pytest.mark.parametrize("change", [{"seed": 4}, {"profile": "worn"}, {"cycles": 2}, {}])
-def test_a_session_is_resumed_with_the_same_settings_only(tmp_path, change):
+def test_a_session_is_resumed_with_the_same_settings_only(rig, tmp_path, change):
     options = {"seed": 3, "profile": "ideal", "cycles": 1}
 
-    def begin(rig, options, port="virtual", **more):
+    def begin(options, port="virtual", **more):
         made = provenance("bifa experiment", port, options)
-        return run(rig, tmp_path / "day", PLAN[1:3], provenance=made, **more)
+        return run(rig, tmp_path / "day", (STATIC, PULL), provenance=made, **more)
 
     def interrupt(event):
         if event.number == 2:
             raise KeyboardInterrupt
 
-    with open_rig("virtual", profile="ideal", seed=3) as rig:
-        with pytest.raises(KeyboardInterrupt):
-            begin(rig, options, on_event=interrupt)
-        if not change:
-            assert len(begin(rig, options).trials) == 2
-            return
-        [(name, value)] = change.items()
-        with pytest.raises(DatasetError, match=f"1 trial made with {name} = {options[name]}, not {value}"):
-            begin(rig, options | change)
-        with pytest.raises(DatasetError, match="virtual = True, not False"):
-            begin(rig, options, "/dev/ttyACM0")
+    with pytest.raises(KeyboardInterrupt):
+        begin(options, on_event=interrupt)
+    if not change:
+        assert len(begin(options).trials) == 2
+        return
+    [(name, value)] = change.items()
+    with pytest.raises(DatasetError, match=f"1 trial made with {name} = {options[name]}, not {value}"):
+        begin(options | change)
+    with pytest.raises(DatasetError, match="virtual = True, not False"):
+        begin(options, "/dev/ttyACM0")
 
 
 @pytest.mark.uno
-def test_two_sessions_do_not_record_into_one_data_set(tmp_path):
+def test_two_sessions_do_not_record_into_one_data_set(rig, tmp_path):
     """The second is told who the first is, before anything moves."""
-    with open_rig("virtual", profile="ideal", seed=3) as rig, locked(tmp_path / "day"):
-        with pytest.raises(LockedError, match="is being written by"):
-            run(rig, tmp_path / "day")
-        assert rig.uno.time_s < 0.1
+    with locked(tmp_path / "day"), pytest.raises(LockedError, match="is being written by"):
+        run(rig, tmp_path / "day")
+    assert rig.uno.time_s < 0.1
     assert not list(tmp_path.iterdir())

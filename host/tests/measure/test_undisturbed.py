@@ -1,33 +1,28 @@
 """A trial within which the robot was stopped, or tripped, is refused; on the real firmware and bench."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from bifa.link import RefusedError, Uno
+from bifa.link import RefusedError
 from bifa.link.uno import Sample
 from bifa.measure.experiments import record_trial
-from bifa.measure.plan import BRISK, PlannedTrial
+from bifa.measure.plan import PlannedTrial
 from bifa.measure.recording import bench_of
 from bifa.measure.session import run_session
 from bifa.measure.undisturbed import DisturbedError, refuse_disturbed
-from bifa.rig import open_rig
 from bifa.robot.gait import Gait
+from harness.lab import PULL, STATIC, STEP, WALK
 
-STEP = PlannedTrial("step_response", "small", 8.5)
-TRIALS = (
-    PlannedTrial("static_loading", "small", 4.0, 20.0),
-    PlannedTrial("static_loading", "small", 0.0, 20.0),
-    PlannedTrial("anchor_pull", None, 8.5, 40.0),
-    STEP,
-    PlannedTrial("locomotion", gait=BRISK, cycles=2),
-)
+TRIALS = (STATIC, replace(STATIC, pressure_psi=0.0), PULL, STEP, replace(WALK, cycles=2))
 
 
-def recorded(disturb, planned, at):
+@pytest.fixture
+def recorded(rig, uno):
     """Record a trial; `disturb(rig, uno)` is called once a share `at` of it is done."""
-    with open_rig("virtual", profile="ideal", seed=3) as rig, Uno(rig.transport, rig.clock, 1) as uno:
-        uno.connect()
+
+    def record(disturb, planned, at):
         due = [disturb]
 
         def on_progress(share):
@@ -36,11 +31,13 @@ def recorded(disturb, planned, at):
 
         return record_trial(bench_of(rig), uno, planned, on_progress, attempts=1)
 
+    return record
+
 
 @pytest.mark.uno
 @pytest.mark.parametrize("planned", TRIALS, ids=lambda planned: planned.title)
 @pytest.mark.parametrize("at", [0.3, 0.85])
-def test_a_trial_within_which_somebody_stopped_the_robot_is_refused(planned, at):
+def test_a_trial_within_which_somebody_stopped_the_robot_is_refused(recorded, planned, at):
     at *= 0.55 if planned.experiment == "static_loading" else 1.0  # the share that its cross-head's motion ends at
     with pytest.raises((DisturbedError, RefusedError), match="stopped"):
         recorded(lambda rig, uno: uno.send_stop(), planned, at)
@@ -48,28 +45,26 @@ def test_a_trial_within_which_somebody_stopped_the_robot_is_refused(planned, at)
 
 @pytest.mark.uno
 @pytest.mark.parametrize("planned", TRIALS[2:], ids=lambda planned: planned.title)
-def test_a_trial_within_which_a_fault_tripped_is_refused(planned):
+def test_a_trial_within_which_a_fault_tripped_is_refused(recorded, planned):
     with pytest.raises(DisturbedError, match="fault"):
         recorded(lambda rig, uno: rig.break_sensor("head", 5.0), planned, 0.8)
 
 
 @pytest.mark.uno
-def test_a_walk_that_was_ended_and_vented_is_refused():
+def test_a_walk_that_was_ended_and_vented_is_refused(recorded):
     with pytest.raises(DisturbedError, match="idle"):
         recorded(lambda rig, uno: uno.session.transport.write(b"stop\n"), TRIALS[-1], 0.85)
 
 
 @pytest.mark.uno
-def test_the_last_trial_of_a_session_counts_as_any(tmp_path):
-    with open_rig("virtual", profile="ideal", seed=3) as rig:
+def test_the_last_trial_of_a_session_counts_as_any(rig, tmp_path):
+    def stop_in_the_second(event):
+        if event.number == 2 and event.share > 0.85:
+            rig.transport.write(b"!")
 
-        def stop_in_the_second(event):
-            if event.number == 2 and event.share > 0.85:
-                rig.transport.write(b"!")
-
-        plan = (STEP, TRIALS[-1])
-        with pytest.raises(DisturbedError):
-            run_session(rig, tmp_path / "day", plan, name="a day", known={}, provenance={}, on_event=stop_in_the_second)
+    plan, more = (STEP, TRIALS[-1]), {"name": "a day", "known": {}, "provenance": {}}
+    with pytest.raises(DisturbedError):
+        run_session(rig, tmp_path / "day", plan, on_event=stop_in_the_second, **more)
     assert not (tmp_path / "day").exists()
     assert len(list((tmp_path / "day.partial").glob("*.csv"))) == 1
 
@@ -105,7 +100,7 @@ def test_a_gait_may_switch_before_its_first_sample():
 
 
 @pytest.mark.uno
-def test_a_gait_whose_tail_switches_at_once_is_recorded():
+def test_a_gait_whose_tail_switches_at_once_is_recorded(recorded):
     gait = Gait(
         2.6197221237725294, 222.68581756593449, 359.5612358226553, 0.649377312597962, *2 * (0.4600540371539032,)
     )

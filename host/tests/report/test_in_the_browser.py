@@ -11,7 +11,7 @@ from bifa.report.diagnosis import diagnosis_page
 from bifa.report.page import write_page
 from bifa.report.style import LIGHT
 from lacuna.report import page as engine_page
-from lacuna.report.evidence import draw_errors
+from lacuna.report.figures import draw_errors
 from tests.report import sample
 
 pytestmark = pytest.mark.real_time

@@ -70,7 +70,8 @@ class _Asked:
 
 
 class Pilot:
-    """`fly` runs in the main thread, which signals reach; `ask` and `stop` are for all others."""
+    """`fly` runs in the main thread, which signals reach; `ask` and `stop` are for all others. `stopped`: by whom, when
+    and why the robot was stopped, and whether it has confirmed; None: it was not."""
 
     def __init__(self) -> None:
         self._asked: deque[_Asked] = deque()
@@ -79,7 +80,7 @@ class Pilot:
         self._stopper: Stopper | None = None
         self._is_flying = False
         self._ended = "the robot has not answered yet"
-        self._stopped: dict[str, Any] | None = None
+        self.stopped: dict[str, Any] | None = None
         self.is_watched: Callable[[], bool] = lambda: True  # whether anybody would see that a stop failed
 
     def ask(self, what: Callable[[Uno], Any], changes: bool = False) -> Future[Any]:
@@ -108,7 +109,7 @@ class Pilot:
                 future.set_exception(NobodyThereError(self._ended))
             elif self._stop is None:
                 self._stop = future
-                self._stopped = {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
+                self.stopped = {"by": by, "at": wall_clock(), "is_confirmed": None, "why": ""}
         for one in dropped:
             one.cancel()
         return future
@@ -157,7 +158,7 @@ class Pilot:
     def _take_off(self, came_back: str) -> None:
         with self._lock:
             self._is_flying = True
-            self._stopped = _by_itself(came_back) if came_back else None
+            self.stopped = _by_itself(came_back) if came_back else None
             self._ended = "bifa monitor has ended; the robot was stopped"
 
     def _land(self) -> None:
@@ -192,24 +193,19 @@ class Pilot:
         finally:
             with self._lock:
                 self._stop = None
-                self._stopped = {**(self._stopped or {}), "is_confirmed": confirmed, "at": wall_clock()}
-
-    @property
-    def stopped(self) -> dict[str, Any] | None:
-        """By whom, when and why the robot was stopped, and whether it has confirmed; None: it was not."""
-        return self._stopped
+                self.stopped = {**(self.stopped or {}), "is_confirmed": confirmed, "at": wall_clock()}
 
     def stopped_by_itself(self, why: str) -> None:
         """The robot stopped, and nobody here had asked it to."""
         with self._lock:
             if self._stop is None:
-                self._stopped = _by_itself(why)
+                self.stopped = _by_itself(why)
 
     def moves(self) -> None:
         """The robot moves: what had stopped it is over."""
         with self._lock:
             if self._stop is None:
-                self._stopped = None
+                self.stopped = None
 
 
 class _Flight:

@@ -17,7 +17,8 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -37,7 +38,6 @@ from bifa.link import Uno
 from bifa.live.web.gate import ACCEPTED_AT_ONCE, LARGEST_HEADERS, LARGEST_MESSAGE, Gate
 from bifa.live.web.pilot import MOVING, BusyError, NobodyThereError, Pilot, wall_clock
 from bifa.live.web.predicting import GaitPrediction, step_back
-from bifa.live.web.state import LiveState
 from bifa.ranges import RANGES
 from bifa.robot import Model
 from bifa.robot.gait import GAIT_NAMES, Gait
@@ -49,6 +49,7 @@ _BACK_WITHIN_S = 3.0  # a page that is reloaded has not been closed
 _HANDED_OVER_S = 0.05
 _WAITING = 64  # messages that a slow page may be behind
 _PIECE = 64 * 1024
+SHOWN_S = 20.0
 
 
 class ServerError(BifaError):
@@ -85,6 +86,32 @@ class OpenPage:
         if self.messages.full():
             self.messages.get_nowait()
         self.messages.put_nowait(message if isinstance(message, str) else json.dumps(message))
+
+
+class LiveState:
+    """What every page shows, with a version that grows with every change: `content` is all there is to show, as plain
+    types; `samples` are those of the last SHOWN_S."""
+
+    def __init__(self, **content: Any) -> None:
+        self.version = 0
+        self.content: dict[str, Any] = content
+        self.samples: deque[dict[str, Any]] = deque()
+
+    def change(self, changes: Mapping[str, Any], samples: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
+        """Take over `changes`; the message that tells the pages, with the samples that are new."""
+        self.version += 1
+        self.content |= changes
+        for sample in samples:
+            if self.samples and sample["t"] < self.samples[-1]["t"]:  # the Uno has restarted
+                self.samples.clear()
+            self.samples.append(sample)
+        while self.samples and self.samples[-1]["t"] - self.samples[0]["t"] > SHOWN_S:
+            self.samples.popleft()
+        return {"version": self.version, "state": self.content, "samples": list(samples)}
+
+    def whole(self) -> dict[str, Any]:
+        """The message for a page that knows nothing yet, or whose samples are void."""
+        return {"version": self.version, "state": self.content, "samples": list(self.samples), "whole": True}
 
 
 class LivePage:
@@ -148,7 +175,7 @@ class LivePage:
         if self.state.content["draft"] is None and "parameters" in changes:
             self._draft(_of_gait(changes["parameters"]), by=0)
 
-    def _change(self, changes: Mapping[str, Any], samples: list[dict[str, Any]] | None = None) -> None:
+    def _change(self, changes: Mapping[str, Any], samples: Sequence[dict[str, Any]] = ()) -> None:
         message = json.dumps(self.state.change(changes, samples))
         for page in self.pages:
             page.tell(message)

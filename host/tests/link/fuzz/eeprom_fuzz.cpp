@@ -1,11 +1,13 @@
 // Any bytes in the EEPROM at start: the parameters are within their ranges, and a save works afterwards.
 #include <stdlib.h>
 
-#include "fuzz_board.h"
+#include "board_harness.cpp"
+#include "crc.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  memset(cells, 0xFF, sizeof cells);
-  memcpy(cells, data, size < sizeof cells ? size : sizeof cells);
+  Board board;
+  uint8_t* cells = board.cells;
+  memcpy(cells, data, size < sizeof board.cells ? size : sizeof board.cells);
   // Half of the records get a right CRC, so that what comes after it is tried as well.
   for (uint8_t slot = 0; slot < bifa::kSlotCount; ++slot) {
     uint8_t* record = cells + bifa::slot_address(slot);
@@ -17,6 +19,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     memcpy(record + 1 + bytes, &check, sizeof check);
   }
   bifa::Store store;
+  const auto poll = [&] {
+    for (uint32_t i = 0; i < 5000; ++i) {
+      board.cells_busy_ms = 0;
+      store.poll();
+    }
+  };
   store.begin();
   const uint8_t names = store.count();
   for (uint8_t i = 0; i < names; ++i) {
@@ -25,12 +33,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (!store.name_at(i, name) || !bifa::is_name(name)) abort();
     if (store.load(name, set) && !bifa::is_valid(set)) abort();
   }
-  for (uint32_t i = 0; i < 5000; ++i) store.poll();
+  poll();
   const char name[bifa::kNameSize + 1] = "fuzz";
   bifa::ParameterSet set = bifa::factory_preset(1);
   set.period_us = 1234567;
   if (store.save(name, set) != bifa::Result::kOk) return 0;  // no room: presets, or records of a later firmware
-  for (uint32_t i = 0; i < 5000; ++i) store.poll();
+  poll();
   if (store.busy()) abort();
   if (store.result() != bifa::Result::kOk) return 0;
   bifa::ParameterSet read;

@@ -2,28 +2,29 @@
 // is stopped by `!` and never by anything else, and after a pause the Uno answers as ever.
 #include <stdlib.h>
 
-#include <initializer_list>
+#include <string>
 
-#include "fuzz_board.h"
+#include "board_harness.cpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  FuzzBoard board;
+  Board board;
   for (size_t i = 0; i < size; ++i) {
     if (data[i] == 0x80 && i + 1 < size) {
-      board.run_ms(data[++i] % 40);
+      board_run(&board, 1 + data[++i] % 40, 0);
     } else {
-      board.send(data[i]);
+      board_send(&board, data + i, 1);
     }
   }
-  board.run_ms(30);
-  board.send('\n');
-  board.run_ms(5);
+  const uint8_t end = '\n', question[] = "version\n";
+  board_run(&board, 30 + size / kBytesPerMs, 0);
+  board_send(&board, &end, 1);
+  board_run(&board, 5, 0);
   // Saves among the bytes keep it busy for 0.3 s each; a line that comes meanwhile may be answered as damaged.
   for (int patience = 0; patience < 10; ++patience) {
-    text.clear();
-    for (const char c : {'v', 'e', 'r', 's', 'i', 'o', 'n', '\n'}) board.send(static_cast<uint8_t>(c));
-    board.run_ms(900);
-    if (text.find("ok\r\n") != std::string::npos) return 0;
+    board.output.clear();
+    board_send(&board, question, sizeof question - 1);
+    board_run(&board, 900, 0);
+    if (std::string(board.output.begin(), board.output.end()).find("ok\r\n") != std::string::npos) return 0;
   }
   abort();
 }

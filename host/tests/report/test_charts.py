@@ -1,7 +1,9 @@
-"""The figure of walks side by side."""
+"""Charts of walks side by side and of a data set's trials: words, units, and one color for one chamber."""
 
 import numpy as np
 
+from bifa.data import Trial
+from bifa.report.datasets import condition_chart
 from bifa.report.walks import MEASURED, SIMULATED, Walk, draw_walks, walks_chart
 from tests.report.sample import columns
 
@@ -34,3 +36,25 @@ def test_predicted_pressures_are_drawn_too_and_nothing_simulated_is_called_measu
     alone = walks_chart([Walk("a", 2.0, {SIMULATED: columns(2.0)})])
     assert "measured" not in {key.label for key in alone.keys}
     assert np.all(np.isfinite(alone.columns[0].panels[2].y.range))
+
+
+def test_a_walk_s_chambers_have_their_colors_and_commands_rows_of_their_own():
+    gait = {"period_s": 2.0}
+    group = [Trial(f"{n}.csv", "locomotion", columns(2.0), gait=gait, repeat=n) for n in (1, 2)]
+    chart = condition_chart(group)
+    assert chart.title == "walk, period 2 s (2 runs)"
+    assert {key.label: key.color for key in chart.keys} == {"body": "body", "head": "head", "tail": "tail"}
+    (column,) = chart.columns
+    assert [panel.y.label for panel in column.panels] == ["displacement, mm", "command", "pressure, psi"]
+    commands = column.panels[1]
+    assert list(commands.y.ticks) == ["body", "head", "tail"]
+    assert len({float(series.y.min()) for series in commands.series}) == 3
+
+
+def test_repeats_of_a_test_stand_are_told_apart():
+    record = {"time_s": np.arange(3.0), "displacement_mm": np.arange(3.0), "force_N": np.arange(3.0)}
+    group = [Trial(f"{n}.csv", "static_loading", record, actuator="large", repeat=n) for n in (1, 2)]
+    chart = condition_chart(group)
+    assert [key.label for key in chart.keys] == ["run 1", "run 2"]
+    assert chart.columns[0].panels[0].x.label == "displacement, mm"
+    assert chart.columns[0].panels[0].y.label == "force, N"

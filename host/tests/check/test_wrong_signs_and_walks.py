@@ -1,4 +1,4 @@
-"""Mirrored cameras, exchanged tubes and columns, and gaits that were not walked."""
+"""Signs against the convention, mirrored cameras, exchanged tubes and columns, and gaits that were not walked."""
 
 import pytest
 
@@ -30,11 +30,36 @@ def test_pressures_of_the_wrong_sign(any_day, chambers):
         assert (found.kind, found.file, found.column) == ("sign", trial.file, ", ".join(columns))
 
 
-def test_commands_written_the_other_way_round(any_day):
-    for trial in any_day.of("locomotion"):
+@pytest.mark.parametrize(("experiment", "where"), [("step_response", ""), ("locomotion", " in all three columns")])
+def test_commands_written_the_other_way_round(any_day, experiment, where):
+    for trial in any_day.of(experiment):
         (found,) = check_plausibility(mistaken(any_day, trial.file, inverted))
-        assert (found.kind, found.file) == ("sign", trial.file)
-        assert "1 is positive pressure, 0 vacuum; exchange them in all three columns" in str(found)
+        first = next(name for name in trial.columns if name.startswith("command"))
+        assert (found.kind, found.file, found.column) == ("sign", trial.file, first)
+        assert f"1 is positive pressure, 0 vacuum; exchange them{where}" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "column"),
+    [
+        ("static_loading", "force_N"),
+        ("static_loading", "displacement_mm"),
+        ("anchor_pull", "force_N"),
+        ("step_response", "displacement_mm"),
+        ("step_response", "pressure_psi"),
+    ],
+)
+def test_a_column_of_the_wrong_sign(any_day, experiment, column):
+    for trial in any_day.of(experiment):
+        (found,) = check_plausibility(mistaken(any_day, trial.file, turned(column)))
+        assert (found.kind, found.file, found.column) == ("sign", trial.file, column)
+
+
+def test_of_a_wrong_sign_the_number_the_convention_and_what_to_do_are_said(day):
+    (found,) = check_plausibility(mistaken(day, "anchor_8.5psi_2.csv", turned("force_N")))
+    assert str(found).startswith("anchor_8.5psi_2.csv, force_N: -")
+    assert "N in the middle (median), where a resistance is positive" in str(found)
+    assert str(found).endswith("Reverse the sign")
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=str)

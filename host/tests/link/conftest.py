@@ -1,0 +1,18 @@
+"""The Uno's own code, and the host's end of its link."""
+
+import pytest
+
+from bifa.link import Uno
+from harness.board import Board
+
+
+@pytest.fixture
+def board() -> Board:
+    return Board()
+
+
+@pytest.fixture
+def connected(board) -> Uno:
+    uno = Uno(board, board, seed=1)
+    uno.connect()
+    return uno
