@@ -8,3 +8,10 @@ class BifaError(Exception):
 
     def __str__(self) -> str:
         return printable(super().__str__())
+
+
+def check_range(error: type[BifaError], name: str, value: float, lower: float, upper: float, unit: str = "") -> None:
+    """Raise `error`, naming the range, unless `value` is a finite number within it."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not lower <= value <= upper:  # NaN is not; and an integer may be too long for a float
+        raise error(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())

@@ -31,6 +31,19 @@ def browser():
 
 
 @pytest.fixture
+def signals_as_in_a_terminal():
+    """A shell ignores some on behalf of what it starts in the background, and so would what the tests start."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGUSR2)
+    before = {
+        number: signal.signal(number, signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL)
+        for number in numbers
+    }
+    yield numbers
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
 def uno():
     """An Uno behind a serial port."""
     from harness.pty_uno import PtyUno  # not on Windows
@@ -38,6 +51,15 @@ def uno():
     uno = PtyUno()
     yield uno
     uno.unplug()
+
+
+@pytest.fixture
+def rig():
+    """The virtual bench, with an ideal robot."""
+    from bifa.rig import open_rig
+
+    with open_rig("virtual", seed=3) as rig:
+        yield rig
 
 
 @pytest.fixture

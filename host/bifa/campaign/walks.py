@@ -9,9 +9,8 @@ import numpy as np
 
 from bifa.campaign.stages import OnProgress
 from bifa.data import Dataset, Trial
-from bifa.gait.measured import MeasuredSpeed, complete_cycles, measured_speed
 from bifa.gait.prediction import Prediction, predict_speed, settles
-from bifa.gait.settling import LEAST, MOST_CYCLES, Walking
+from bifa.gait.settling import LEAST, MOST_CYCLES, MeasuredSpeed, Walking, complete_cycles, measured_speed
 from bifa.gait.uncertainty import spread_of
 from bifa.link import Uno
 from bifa.measure.plan import PlannedTrial, walks

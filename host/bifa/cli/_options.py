@@ -80,7 +80,6 @@ BENCH = file_option(f"File that declares how your instruments write theirs (bifa
 QUICK = typer.Option("--quick", help="Quick run: two repeats of each condition instead of three.")
 PROFILE = typer.Option(help="Profile of a virtual robot; ideal: the paper's equations and white noise.")
 PICTURES = typer.Option("--pictures", help="Folder for the pictures.")
-NO_PICTURES = typer.Option("--no-pictures", help="Draw nothing.")
 
 
 def requires(needed: str, **options: object) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bifa import cluster
-from bifa.cli._options import NO_PICTURES, PICTURES, Method, file_option
+from bifa.cli._options import PICTURES, Method, file_option
 from bifa.files import named
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def optimize(
     dask_cert: Annotated[Path | None, typer.Option(help=cluster.CERT_HELP)] = None,
     dask_key: Annotated[Path | None, typer.Option(help=cluster.KEY_HELP)] = None,
     pictures: Annotated[Path | None, PICTURES] = None,
-    no_pictures: Annotated[bool, NO_PICTURES] = False,
+    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw nothing.")] = False,
 ) -> None:
     """Find the gait that maximises the settled speed, verified with a finer step.
 
@@ -172,7 +172,7 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
     from bifa.gait.explain import anatomy, reasons
     from bifa.gait.objectives import distribution
     from bifa.gait.prediction import FINE_M
-    from bifa.gait.search import verifying_robots
+    from bifa.gait.search import SearchRun
     from bifa.gait.sensitivity import front, sensitivity
     from bifa.report.gaits import distribution_chart, front_chart, sensitivity_chart
     from bifa.report.picture import draw_chart
@@ -182,7 +182,7 @@ def draw_pictures(robot: "Model", pool: "Simulations", optimum: "Optimum", folde
 
     flat, settings = plant(robot), optimum.settings
     # Judged alike: at a cliff other robots tell another story.
-    robots = verifying_robots(robot, pool, optimum.spread, settings)
+    robots = SearchRun(robot, pool, optimum.spread, settings).verifying_robots()
     metric = replace(settings.rules.in_full(), tolerance_m=FINE_M)
     before, after = anatomy(robot, BASELINE), anatomy(robot, optimum.gait)
     walks = [

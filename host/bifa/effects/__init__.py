@@ -9,6 +9,7 @@ from functools import cache
 from types import MappingProxyType, ModuleType
 
 from bifa.effects.effect import EffectError, EffectParameter, PhysicalEffect
+from bifa.errors import check_range
 
 __all__ = ["EffectError", "EffectParameter", "PhysicalEffect", "complete", "library", "modules"]
 
@@ -39,8 +40,5 @@ def complete(name: str, values: Mapping[str, float]) -> dict[str, float]:
         raise EffectError(f"{name} has no parameter {', '.join(unknown)}; it has {', '.join(known)}")
     full = {key: values.get(key, p.typical if p.omitted is None else p.omitted) for key, p in known.items()}
     for key, value in full.items():
-        lower, upper, unit = known[key].lower, known[key].upper, known[key].unit
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not lower <= value <= upper:  # NaN is not
-            raise EffectError(f"{name}.{key} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
+        check_range(EffectError, f"{name}.{key}", value, known[key].lower, known[key].upper, known[key].unit)
     return {key: float(value) for key, value in full.items()}

@@ -11,25 +11,16 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 _PLACES = {
-    "Metric": "metric",
-    "Knowledge": "uncertainty",
-    "Optimum": "search",
-    "Passage": "metric",
-    "Prediction": "prediction",
-    "SearchError": "search",
-    "SearchSpace": "space",
-    "Settings": "search",
-    "SpaceError": "space",
-    "UncertaintyError": "uncertainty",
-    "optimize": "search",
-    "measured_speed": "measured",
-    "paper_space": "space",
-    "predict_speed": "prediction",
-    "simulations": "pool",
-    "spread_of": "uncertainty",
+    "metric": ("Metric", "Passage"),
+    "pool": ("simulations",),
+    "prediction": ("Prediction", "predict_speed"),
+    "search": ("Optimum", "SearchError", "Settings", "optimize"),
+    "settling": ("measured_speed",),
+    "space": ("SearchSpace", "SpaceError", "paper_space"),
+    "uncertainty": ("Knowledge", "UncertaintyError", "spread_of"),
 }
 
-__all__ = list(_PLACES)
+__all__ = [name for names in _PLACES.values() for name in names]
 
 if TYPE_CHECKING:
     from bifa.gait.metric import Metric as Metric
@@ -47,6 +38,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)
+    for place, names in _PLACES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{place}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

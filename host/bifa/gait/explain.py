@@ -27,7 +27,6 @@ class Anatomy:
     speed_mm_s: float
     extension_s: float
     contraction_s: float
-    contraction_share: float
     tail_lead_s: float
     head_lead_s: float
     extended_psi: float
@@ -52,7 +51,6 @@ def anatomy(model: Model, gait: Gait) -> Anatomy:
         speed_mm_s=advance / gait.period_s,
         extension_s=_first_after(time, record["body_m"] - unstable, _late(on, gait)),
         contraction_s=_first_after(time, unstable - record["body_m"], _late(off, gait)),
-        contraction_share=gait.duty_body,
         tail_lead_s=_wrapped(on - _switch(gait, "tail", to_positive=True), gait.period_s),
         head_lead_s=_wrapped(off - _switch(gait, "head", to_positive=True), gait.period_s),
         extended_psi=float(np.interp(_late(off, gait) - 1e-3, time, body_psi)),
@@ -67,8 +65,8 @@ def reasons(before: Anatomy, after: Anatomy) -> list[str]:
         f"Speed {before.speed_mm_s:.1f} to {after.speed_mm_s:.1f} mm/s: the cycle takes {after.gait.period_s:.2f} s "
         f"in place of {before.gait.period_s:.2f} s and advances {after.advance_mm:.1f} mm "
         f"in place of {before.advance_mm:.1f} mm.",
-        f"The body has {100 * after.contraction_share:.0f} % of the cycle to contract, previously "
-        f"{100 * before.contraction_share:.0f} %: it snaps {_seconds(after.contraction_s)} after the command when "
+        f"The body has {100 * after.gait.duty_body:.0f} % of the cycle to contract, previously "
+        f"{100 * before.gait.duty_body:.0f} %: it snaps {_seconds(after.contraction_s)} after the command when "
         f"contracting, {_seconds(after.extension_s)} when extending, since the bulging fabric empties slowly.",
         f"The tail is commanded to anchor {_lead(after.tail_lead_s)} the body's extension, previously "
         f"{_lead(before.tail_lead_s)}; the head {_lead(after.head_lead_s)} its contraction, previously "

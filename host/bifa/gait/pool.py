@@ -4,47 +4,36 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from bifa.cluster import Tls, cluster
 from bifa.gait.metric import Judged, Metric, Passage
-from bifa.simulate import Advance, Plant, cores, full_lanes, speeds
-
-_PIECES_PER_WORKER = 8  # gaits differ in cost
+from bifa.simulate import Plant, cores, speeds
 
 
 class Simulations:
-    """Runs walks in pieces on `executor`. The simulator releases the GIL, so threads do on one machine."""
+    """Runs walks on `executor`. The simulator releases the GIL, so threads do on one machine."""
 
     def __init__(self, executor: Executor, workers: int):
-        self._executor, self._pieces = executor, workers * _PIECES_PER_WORKER
+        self._executor, self._workers = executor, workers
         self.count = 0
 
     def judged(self, plants: Sequence[Plant], which: np.ndarray, gaits: np.ndarray, metric: Metric | Passage) -> Judged:
         """Judge walks of `gaits` (n, 6), row k with the model `plants[which[k]]`."""
         self.count += len(gaits)
-        pieces = min(self._pieces, -(-len(gaits) // full_lanes()))
-        rows = [piece for piece in np.array_split(np.arange(len(gaits)), pieces) if piece.size]
-        futures = [
-            self._executor.submit(_walks, [plants[i] for i in which[piece]], gaits[piece], metric) for piece in rows
-        ]
-        parts = [future.result() for future in futures]
-        progress = Advance(
-            np.concatenate([part.advance_m for part in parts]),
-            np.concatenate([part.slip_m for part in parts]),
-            np.concatenate([part.period_s for part in parts]),
+        progress = speeds(
+            [plants[i] for i in which],
+            gaits * np.array([metric.clock, 1.0, 1.0, 1.0, 1.0, 1.0]),
+            metric.cycles,
+            metric.tolerance_m,
+            inclination_deg=metric.inclination_deg,
+            terrain=metric.terrain,
+            dead_time_s=metric.dead_time_s * metric.clock,
+            workers=self._workers,
+            executor=self._executor,
         )
-        return metric.judge(progress)
-
-
-def _walks(plants: list[Plant], gaits: np.ndarray, metric: Metric | Passage) -> Advance:
-    place: dict[str, Any] = {"inclination_deg": metric.inclination_deg, "terrain": metric.terrain}
-    real = gaits * np.array([metric.clock, 1.0, 1.0, 1.0, 1.0, 1.0])
-    dead_time_s = metric.dead_time_s * metric.clock
-    progress = speeds(plants, real, metric.cycles, metric.tolerance_m, **place, dead_time_s=dead_time_s, workers=1)
-    return replace(progress, period_s=gaits[:, 0])
+        return metric.judge(replace(progress, period_s=gaits[:, 0]))
 
 
 @contextmanager

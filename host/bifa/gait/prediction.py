@@ -118,7 +118,8 @@ class Predictor:
         found = [settling(one) for one in advance_mm]
         means = np.array([one[f.begins :].mean() for one, f in zip(advance_mm, found, strict=True)]) / gait.period_s
         noise = np.random.default_rng([self._seed, 5]).standard_normal((2, draws))
-        means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s(gait)
+        camera_mm_s = np.sqrt(2.0) * CAMERA_MM / (LEAST * gait.period_s)  # of a speed that is measured over so many
+        means = means * (1.0 + self._noise_share * noise[0]) + noise[1] * camera_mm_s
         means = np.nan_to_num(means)
         backward = bool(np.mean(means) < -STANDING_MM_S)
         along = np.fmax(-means if backward else means, 0.0)
@@ -152,11 +153,6 @@ def predict_speed(
 def settles(model: Model) -> bool:
     """Whether the model's walks come to be periodic, not one of its effects making each cycle unlike the one before."""
     return not any(library()[effect].unlike_cycles for effect in model.effects)
-
-
-def camera_mm_s(gait: Gait, cycles: int = LEAST) -> float:
-    """Standard deviation of a speed that is measured over `cycles` cycles."""
-    return float(np.sqrt(2.0) * CAMERA_MM / (cycles * gait.period_s))
 
 
 def _most(begins: Iterable[int]) -> int:

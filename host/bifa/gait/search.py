@@ -8,8 +8,8 @@ import numpy as np
 from bifa.errors import BifaError
 from bifa.gait.families import FAMILIES, PERIODS
 from bifa.gait.methods import METHODS, Evaluated
-from bifa.gait.methods.cma_es import APART, basins, climb_basins, climb_together
-from bifa.gait.methods.common import Objective, RecordedObjective
+from bifa.gait.methods.cma_es import APART, POPULATION, basins, climb_basins, climb_together
+from bifa.gait.methods.common import Objective, OnEvaluated, RecordedObjective
 from bifa.gait.metric import Metric, Passage
 from bifa.gait.objectives import QUANTILE, NominalSpeed, RobustSpeed, distribution, on_model
 from bifa.gait.pool import Simulations
@@ -29,7 +29,6 @@ _NOMINAL_FINALISTS, _ROBUST_FINALISTS = 60, 4
 # Of cma the most, for a landscape with many basins: it ends when its best runs agree. A quarter of them, where what is
 # fastest on the model is only where a search on robots begins.
 EVALUATIONS = {"cma": 8000, "de": 4000, "bo": 1000}
-_POPULATION = 12
 
 
 @dataclass(frozen=True)
@@ -148,6 +147,56 @@ class Optimum:
         )
 
 
+@dataclass(frozen=True)
+class SearchRun:
+    """A search under way: the model, what is `known` of it, and who is told how it gets on."""
+
+    model: Model
+    runs: Simulations
+    known: Knowledge
+    settings: Settings
+    on_progress: OnProgress = lambda stage, share, best: None
+
+    def telling(self, stage: str, budget: int, least: float = -np.inf) -> OnEvaluated:
+        """Tells of a stage of `budget` evaluations, when `least` has been reached before."""
+        return lambda count, best: self.on_progress(stage, min(count / budget, 1.0), max(best, least))
+
+    def objective(self, stage: RobustRound, number: int) -> RobustSpeed:
+        """Of a round, on robots of its own."""
+        settings = self.settings
+        draws = self.robots(stage.draws, settings.seed + 500_000 * number)
+        metric = settings.metric.in_full() if stage.in_full else settings.metric.quicker()
+        metric = replace(metric, tolerance_m=stage.tolerance_m)
+        share = stage.quantile * settings.share / QUANTILE
+        nominal, space = plant(self.model), settings.space
+        return RobustSpeed(self.runs, nominal, draws, space, metric, share, stage.abandon, stage.jitter)
+
+    def robots(self, count: int, seed: int) -> list[Plant]:
+        """`count` robots that the model may be: they walk with the gaits that it is known to walk with, which a
+        covariance does not know. Where hardly half of those drawn do, the model does not know either, and they are as
+        drawn; so they are if the spread is a guess."""
+        drawn = self.known.plants(self.model, count, seed)
+        if self.known.is_guess or not self.settings.begin:
+            return drawn
+        rows, metric = gait_rows(self.settings.begin), self.settings.metric.quicker()
+        speeds = distribution(self.runs, drawn, rows, metric)
+        least = FELL * np.median(speeds, axis=1, keepdims=True)
+        if (speeds >= least).all():
+            return drawn
+        more = self.known.plants(self.model, 2 * count, seed)[count:]
+        walk = np.hstack([speeds, distribution(self.runs, more, rows, metric)]) >= least
+        walking = [robot for robot, walks in zip((*drawn, *more), walk.all(axis=0), strict=True) if walks]
+        return walking[:count] if len(walking) >= count else drawn
+
+    def verifying_robots(self) -> list[Plant]:
+        """Those that an optimum's speeds are of."""
+        return self.robots(VERIFYING_DRAWS, self.settings.seed + 2_000_003)
+
+    def finely(self, rows: np.ndarray) -> np.ndarray:
+        """(n,) speeds of gaits (n, 6) on the model itself by the finer metric."""
+        return on_model(self.runs, plant(self.model), rows, self.settings.rules.finer())
+
+
 def optimize(
     model: Model, runs: Simulations, settings: Settings | None = None, on_progress: OnProgress | None = None
 ) -> Optimum:
@@ -158,88 +207,77 @@ def optimize(
     settings = settings or Settings()
     if settings.method not in METHODS:
         raise SearchError(f"method {settings.method!r} is not one of {', '.join(METHODS)}")
-    on_progress = on_progress or (lambda stage, share, best: None)
     started = runs.count
-    flat, spread = plant(model), settings.knowledge(model)
-    timing = spread.scatter
+    known = settings.knowledge(model)
+    timing = known.scatter
     metric = replace(settings.metric, clock=timing.clock, dead_time_s=timing.dead_time_s)
     if not settles(model):
         metric = metric.of_unlike_cycles()
     settings = replace(settings, metric=metric)
-    own = NominalSpeed(runs, flat, settings.space, settings.rules.quicker() if settings.robust else metric)
-    explored = _explore(own, settings, on_progress)
+    search = SearchRun(model, runs, known, settings, on_progress or SearchRun.on_progress)
+    rules = settings.rules.quicker() if settings.robust else metric
+    own = NominalSpeed(runs, plant(model), settings.space, rules)
+    explored = _explore(search, own)
     if settings.robust and explored.best_value > 0.0:
-        explored = explore_on_robots(model, runs, spread, explored, settings, on_progress)
+        explored = explore_on_robots(search, explored)
     if explored.best_value <= 0.0:
         raise SearchError(
             f"none of {len(explored.values)} gaits walks without slipping; widen the space or search longer"
         )
     if settings.robust:
-        refined = _refine_on_robots(model, runs, spread, explored, settings, on_progress) if settings.refine else []
-        gait, nominal = best_of_finalists(
-            model, runs, spread, explored, [explored, *refined][-1], settings, on_progress
-        )
+        refined = _refine_on_robots(search, explored) if settings.refine else []
+        gait, nominal = best_of_finalists(search, explored, [explored, *refined][-1])
     else:
-        refined = [_refine(own, explored, settings, on_progress)] if settings.refine else []
-        gait, nominal = _nominally(model, runs, explored.joined(*refined), settings, on_progress)
-    fresh = verifying_robots(model, runs, spread, settings)
-    speeds = distribution(runs, fresh, gait_rows([gait]), replace(settings.metric.in_full(), tolerance_m=FINE_M))[0]
-    on_progress("verify", 1.0, nominal)
+        refined = [_refine(search, own, explored)] if settings.refine else []
+        gait, nominal = _nominally(search, explored.joined(*refined))
+    verifying, finest = search.verifying_robots(), replace(metric.in_full(), tolerance_m=FINE_M)
+    speeds = distribution(runs, verifying, gait_rows([gait]), finest)[0]
+    search.on_progress("verify", 1.0, nominal)
     return Optimum(
         gait,
         nominal,
         float(np.quantile(speeds, settings.share)),
         speeds,
-        spread,
+        known,
         settings,
         sum(len(found.values) for found in (explored, *refined)),
         runs.count - started,
         explored,
-        _predicted(model, spread, gait, speeds, settings),
+        _predicted(search, gait, speeds),
     )
 
 
-def _predicted(model: Model, known: Knowledge, gait: Gait, speeds: np.ndarray, settings: Settings) -> Prediction:
+def _predicted(search: SearchRun, gait: Gait, speeds: np.ndarray) -> Prediction:
     """By the rule of measured walks; where the metric is another (up a pipe, through a tunnel), by the metric's own."""
-    plain = isinstance(settings.metric, Metric) and settings.metric.is_plain
-    if not plain:
-        return Prediction(speeds, settings.metric.cycles)
-    cycles = max(CYCLES, settings.metric.in_full().cycles)
-    return predict_speed(model, known, gait, seed=settings.seed, cycles=cycles)
+    metric = search.settings.metric
+    if not (isinstance(metric, Metric) and metric.is_plain):
+        return Prediction(speeds, metric.cycles)
+    cycles = max(CYCLES, metric.in_full().cycles)
+    return predict_speed(search.model, search.known, gait, seed=search.settings.seed, cycles=cycles)
 
 
-def _explore(objective: Objective, settings: Settings, on_progress: OnProgress) -> Evaluated:
+def _explore(search: SearchRun, objective: Objective) -> Evaluated:
+    settings, space = search.settings, search.settings.space
     budget = _budget(settings)
-    explored = METHODS[settings.method](
-        objective,
-        settings.space.wraps,
-        budget,
-        settings.seed,
-        lambda count, best: on_progress("search", min(count / budget, 1.0), best),
-    )
-    begun = settings.space.nearest(settings.begin)
+    method = METHODS[settings.method]
+    explored = method(objective, space.wraps, budget, settings.seed, search.telling("search", budget))
+    begun = space.nearest(settings.begin)
     return explored.joined(Evaluated(begun, objective(begun))) if len(begun) else explored
 
 
-def explore_on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
-) -> Evaluated:
+def explore_on_robots(search: SearchRun, explored: Evaluated) -> Evaluated:
     """CMA-ES on a few robots from families of gaits, from the basins of the model's own speed, and from the gaits to
     begin with: from slower copies too, since the fastest are beyond the cliff of most robots, whose objective is 0."""
-    objective, budget = on_robots(model, runs, spread, settings, EXPLORE, 0), _scaled(EXPLORE.evaluations, settings)
-    wraps = settings.space.wraps
-    recorder = RecordedObjective(
-        objective,
-        wraps,
-        lambda count, best: on_progress("search on robots", min(count / budget, 1.0), best),
-    )
-    starts = np.vstack([settings.space.nearest(settings.begin), basins(explored, wraps, _BASINS)])
-    recorder(np.concatenate(_at_periods(settings.space, starts, EXPLORE.periods)))
+    settings, space, wraps = search.settings, search.settings.space, search.settings.space.wraps
+    budget = _scaled(EXPLORE.evaluations, settings)
+    recorder = RecordedObjective(search.objective(EXPLORE, 0), wraps, search.telling("search on robots", budget))
+    starts = np.vstack([space.nearest(settings.begin), basins(explored, wraps, _BASINS)])
+    recorder(np.concatenate(_at_periods(space, starts, EXPLORE.periods)))
     if not settings.refine:
         return recorder.found()
-    families = _suited(recorder, settings.space, settings.space.nearest(FAMILIES), PERIODS)
+    families = _suited(recorder, space, space.nearest(FAMILIES), PERIODS)
     known = list(families.near_best(_FAMILY_WORTH).finalists(_FAMILIES, _NEAR, wraps))
-    return climb_basins(recorder, wraps, budget, settings.seed, _POPULATION, EXPLORE.step, known, EXPLORE.abandon)
+    return climb_basins(recorder, wraps, budget, settings.seed, EXPLORE.step, known, EXPLORE.abandon)
 
 
 def _suited(objective: Objective, space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> Evaluated:
@@ -269,95 +307,49 @@ def _usual(settings: Settings) -> int:
 
 def _scaled(evaluations: int, settings: Settings) -> int:
     """As many more or fewer than usual as of the method's."""
-    return max(2 * _POPULATION, round(evaluations * _budget(settings) / _usual(settings)))
+    return max(2 * POPULATION, round(evaluations * _budget(settings) / _usual(settings)))
 
 
-def _refine(objective: Objective, explored: Evaluated, settings: Settings, on_progress: OnProgress) -> Evaluated:
+def _refine(search: SearchRun, objective: Objective, explored: Evaluated) -> Evaluated:
     """CMA-ES from the best."""
-    share = _scaled(_FINAL, settings)
-    recorder = RecordedObjective(
-        objective,
-        settings.space.wraps,
-        lambda count, best: on_progress("refine", min(count / share, 1.0), max(best, explored.best_value)),
-    )
-    climb_together(recorder, explored.best_point[None], share, settings.seed, _POPULATION, [_FINAL_STEP])
+    settings = search.settings
+    budget = _scaled(_FINAL, settings)
+    telling = search.telling("refine", budget, explored.best_value)
+    recorder = RecordedObjective(objective, settings.space.wraps, telling)
+    climb_together(recorder, explored.best_point[None], budget, settings.seed, [_FINAL_STEP])
     return recorder.found()
 
 
-def _refine_on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, explored: Evaluated, settings: Settings, on_progress: OnProgress
-) -> list[Evaluated]:
+def _refine_on_robots(search: SearchRun, explored: Evaluated) -> list[Evaluated]:
     """CMA-ES in rounds of more robots each, every time from where the climbs of the round before ended: those ends that
     these robots like best, since what was best on few robots may owe it to them."""
-    wraps = settings.space.wraps
+    settings, wraps = search.settings, search.settings.space.wraps
     ended = explored.finalists(_STARTS, APART, wraps) if explored.ends is None else explored.ends.points
-    found = [explored]
+    found = []
     for number, stage in enumerate(_REFINE, start=1):
-        objective = on_robots(model, runs, spread, settings, stage, number)
         budget = _scaled(stage.evaluations, settings)
-
-        def show(count: int, best: float, number: int = number, budget: int = budget) -> None:
-            on_progress(f"refine {number}", min(count / budget, 1.0), best)
-
-        recorder = RecordedObjective(objective, wraps, show)
+        telling = search.telling(f"refine {number}", budget)
+        recorder = RecordedObjective(search.objective(stage, number), wraps, telling)
         best = _suited(recorder, settings.space, ended, stage.periods)
         begun = best.near_best(_END_WORTH).finalists(stage.climbs, APART, wraps)
         if not len(begun):
             break
         steps = [stage.step] * len(begun)
-        ended = climb_together(recorder, begun, budget, settings.seed, _POPULATION, steps, stage.abandon).points
+        ended = climb_together(recorder, begun, budget, settings.seed, steps, stage.abandon).points
         found.append(recorder.found())
-    return found[1:]
+    return found
 
 
-def on_robots(
-    model: Model, runs: Simulations, spread: Knowledge, settings: Settings, stage: RobustRound, number: int
-) -> RobustSpeed:
-    """The objective of a round, on robots of its own."""
-    draws = possible_robots(model, runs, spread, settings, stage.draws, settings.seed + 500_000 * number)
-    metric = settings.metric.in_full() if stage.in_full else settings.metric.quicker()
-    metric = replace(metric, tolerance_m=stage.tolerance_m)
-    share = stage.quantile * settings.share / QUANTILE
-    return RobustSpeed(runs, plant(model), draws, settings.space, metric, share, stage.abandon, stage.jitter)
-
-
-def possible_robots(
-    model: Model, runs: Simulations, spread: Knowledge, settings: Settings, count: int, seed: int
-) -> list[Plant]:
-    """`count` robots that the model may be: they walk with the gaits that it is known to walk with, which a covariance
-    does not know. Where hardly half of those drawn do, the model does not know either, and they are as drawn; so they
-    are if the spread is a guess."""
-    drawn = spread.plants(model, count, seed)
-    if spread.is_guess or not settings.begin:
-        return drawn
-    rows, metric = gait_rows(settings.begin), settings.metric.quicker()
-    speeds = distribution(runs, drawn, rows, metric)
-    least = FELL * np.median(speeds, axis=1, keepdims=True)
-    if (speeds >= least).all():
-        return drawn
-    more = spread.plants(model, 2 * count, seed)[count:]
-    walk = np.hstack([speeds, distribution(runs, more, rows, metric)]) >= least
-    walking = [robot for robot, walks in zip((*drawn, *more), walk.all(axis=0), strict=True) if walks]
-    return walking[:count] if len(walking) >= count else drawn
-
-
-def verifying_robots(model: Model, runs: Simulations, spread: Knowledge, settings: Settings) -> list[Plant]:
-    """Those that an optimum's speeds are of."""
-    return possible_robots(model, runs, spread, settings, VERIFYING_DRAWS, settings.seed + 2_000_003)
-
-
-def _nominally(
-    model: Model, runs: Simulations, explored: Evaluated, settings: Settings, on_progress: OnProgress
-) -> tuple[Gait, float]:
+def _nominally(search: SearchRun, explored: Evaluated) -> tuple[Gait, float]:
     """The fastest of the finalists by the finer metric. Many fall, since the fastest gaits live at a cliff; where none
     reaches half of what was promised, those in other places are asked, and then slower copies of all of them."""
-    rows, speeds = np.empty((0, 6)), np.empty(0)
+    space, rows, speeds = search.settings.space, np.empty((0, 6)), np.empty(0)
     near, far = (explored.finalists(_NOMINAL_FINALISTS, apart=apart) for apart in (_NEAR, _FAR))
-    slower = np.concatenate([settings.space.slower(points, share) for points in (near, far) for share in _SLOWER])
+    slower = np.concatenate([space.slower(points, share) for points in (near, far) for share in _SLOWER])
     for points in (near, far, slower):
-        more = gait_rows(settings.space.gaits(points))
-        rows, speeds = np.vstack([rows, more]), np.append(speeds, _finely(model, runs, more, settings))
-        on_progress("verify", 0.5, float(speeds.max()))
+        more = gait_rows(space.gaits(points))
+        rows, speeds = np.vstack([rows, more]), np.append(speeds, search.finely(more))
+        search.on_progress("verify", 0.5, float(speeds.max()))
         if speeds.max() > _PROMISED * explored.best_value:
             break
     best = int(np.argmax(speeds))
@@ -366,40 +358,33 @@ def _nominally(
     return Gait(*rows[best].tolist()), float(speeds[best])
 
 
-def best_of_finalists(
-    model: Model,
-    runs: Simulations,
-    spread: Knowledge,
-    explored: Evaluated,
-    refined: Evaluated,
-    settings: Settings,
-    on_progress: OnProgress,
-) -> tuple[Gait, float]:
+def best_of_finalists(search: SearchRun, explored: Evaluated, refined: Evaluated) -> tuple[Gait, float]:
     """The first of the finalists that keeps what the best promised, over robots that the search did not meet; slower
     copies of it follow, for the case that all are beyond the cliff. Where none does, the best of them that stand; where
     none stands, the one that walks best on average."""
+    settings, space = search.settings, search.settings.space
     finalists = refined.finalists(_ROBUST_FINALISTS, apart=_NEAR)
-    objective = on_robots(model, runs, spread, settings, _SHORTLIST, 3)
-    shortlist = np.concatenate(_at_periods(settings.space, finalists, _SHORTLIST.periods))
+    objective = search.objective(_SHORTLIST, 3)
+    shortlist = np.concatenate(_at_periods(space, finalists, _SHORTLIST.periods))
     # One by one: what is worse than the best so far meets few robots, the hardest first.
     values = np.concatenate([objective(point[None]) for point in shortlist])
-    on_progress("verify", 0.6, float(values.max()))
+    search.on_progress("verify", 0.6, float(values.max()))
     ranked = shortlist[np.argsort(-values, kind="stable")]
     best = ranked[:_ROBUST_FINALISTS]
-    checking = possible_robots(model, runs, spread, settings, _CHECKING_DRAWS, settings.seed + 2_500_000)
+    checking = search.robots(_CHECKING_DRAWS, settings.seed + 2_500_000)
     metric = replace(settings.metric.in_full(), tolerance_m=FINE_M)
     # Of what the best promised, not of what this one does on the model: there it may have fallen as well.
     least = max(_PROMISED * float(values.max()), STANDING_MM_S)
-    near = np.concatenate([best, *(settings.space.slower(best[:1], share) for share in _SLOWER)])
+    near = np.concatenate([best, *(space.slower(best[:1], share) for share in _SLOWER)])
     # Only where none of these walks at all by the metric in full: what the method found elsewhere.
     far = explored.finalists(_NOMINAL_FINALISTS, apart=_FAR)
     otherwise, most = None, (False, -1.0)
     for candidates in (near, far):
-        rows = gait_rows(settings.space.gaits(candidates))
-        for row, speed in zip(rows, _finely(model, runs, rows, settings), strict=True):
+        rows = gait_rows(space.gaits(candidates))
+        for row, speed in zip(rows, search.finely(rows), strict=True):
             if speed <= 0.0:
                 continue
-            speeds = distribution(runs, checking, row[None], metric)[0]
+            speeds = distribution(search.runs, checking, row[None], metric)[0]
             low = float(np.quantile(speeds, _CHECK_QUANTILE * settings.share / QUANTILE))
             stands = low > least
             if stands and low >= _KEPT * values.max():
@@ -414,7 +399,3 @@ def best_of_finalists(
 def _at_periods(space: SearchSpace, points: np.ndarray, periods: Sequence[float]) -> list[np.ndarray]:
     """The points (n, dimensions) with their periods changed by each share of `periods`."""
     return [space.slower(points, share) for share in periods]
-
-
-def _finely(model: Model, runs: Simulations, rows: np.ndarray, settings: Settings) -> np.ndarray:
-    return on_model(runs, plant(model), rows, settings.rules.finer())

@@ -46,12 +46,12 @@ def sensitivity(
     for name, reach in _REACH.items():
         lower, upper, _ = RANGES[name]
         width = reach * base[name] if name == "period_s" else reach
-        values = base[name] + width * np.linspace(-1.0, 1.0, points)
-        values = np.mod(values, 360.0) if name.startswith("psi") else np.clip(values, lower, upper)
         scans[name] = base[name] + width * np.linspace(-1.0, 1.0, points)
-        rows += [Gait(**{**base, name: float(value)}) for value in values]
-    own = on_model(runs, nominal, gait_rows(rows), metric)
-    quantiles = np.quantile(distribution(runs, draws, gait_rows(rows), metric), QUANTILE, axis=1)
+        walked = np.mod(scans[name], 360.0) if name.startswith("psi") else np.clip(scans[name], lower, upper)
+        rows += [Gait(**{**base, name: float(value)}) for value in walked]
+    gaits = gait_rows(rows)
+    own = on_model(runs, nominal, gaits, metric)
+    quantiles = np.quantile(distribution(runs, draws, gaits, metric), QUANTILE, axis=1)
     result = []
     for number, (name, values) in enumerate(scans.items()):
         part = slice(number * points, (number + 1) * points)
@@ -103,9 +103,9 @@ def front(
     shift[1:3] = (shift[1:3] + 180.0) % 360.0 - 180.0  # the shorter way round
     rows = ends[0] + np.linspace(0.0, 1.0, points)[:, None] * shift
     # The period alone is the cheapest way to trade: the same gaits, faster or slower.
-    periods = np.linspace(0.97, 1.03, 7)[:, None]
-    around = np.repeat(rows[:: max(1, points // 6)], 7, axis=0)
-    around[:, 0] = (rows[:: max(1, points // 6), 0][:, None] * periods.T).ravel()
+    some, periods = rows[:: max(1, points // 6)], np.linspace(0.97, 1.03, 7)
+    around = np.repeat(some, len(periods), axis=0)
+    around[:, 0] = np.outer(some[:, 0], periods).ravel()
     rows = np.concatenate([rows, around])
     quantiles = np.quantile(distribution(runs, draws, rows, metric), QUANTILE, axis=1)
     return Front(rows, on_model(runs, nominal, rows, metric), quantiles)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.special import ndtri
 from scipy.stats import qmc
 
 from bifa.effects import library
 from bifa.errors import BifaError
-from bifa.gait.drawn import Draws
+from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import LEARNT, STIFFNESS, Model, Scatter
-from bifa.robot.parameters import BASE_PARAMETERS
+from bifa.robot.parameters import BASE_PARAMETERS, ModelParameterError
+from bifa.robot.stiffness import StiffnessCurve
 from bifa.simulate import Plant
+from bifa.simulate.plant import of_values, with_curve
+from bifa.simulate.tables import Family, Tabulated
 
 SPREAD = 0.02  # relative standard deviation where the model has no covariance
 _RUNS = Scatter(friction=0.01)  # of a fit that does not say how its runs differ
@@ -51,18 +55,18 @@ class Knowledge:
 
         Drawn as a scrambled Sobol sequence, so that few draws already cover the spread; numbers differ by seed.
         """
-        own, moves = _own_values(model), _MOVES if self.scatter != self.scatter.timing else ()
+        own, moves = _own_values(model), _MOVES if self.scatter != self.scatter.timing else 0
         ways = self.factor.shape[1]
-        size = ways + len(moves) + len(own)
+        size = ways + moves + len(own)
         power = max(0, int(np.ceil(np.log2(count))))
         unit = qmc.Sobol(size, scramble=True, rng=np.random.default_rng([seed, 4])).random_base2(power)[:count]
         normal = ndtri(np.clip(unit, 1e-6, 1.0 - 1e-6))
-        draws, robots = Draws(model, self.names), []
+        draws, robots = _Draws(model, self.names), []
         drawn = normal[:, :ways] @ self.factor.T
-        for off, amounts, turns in zip(drawn, normal[:, ways:], unit[:, size - len(own) :], strict=True):
+        for off, amounts, turns in zip(drawn, normal[:, ways : ways + moves], unit[:, ways + moves :], strict=True):
             robot = {name: model[name] for name in _MOVED} | draws.plain(off)
-            for move, amount in zip(moves, amounts, strict=False):
-                move(robot, self.scatter, float(amount))
+            if moves:
+                _in_a_walk(robot, self.scatter, *amounts.tolist())
             robot |= {
                 name: low + share * (high - low) for (name, (low, high)), share in zip(own.items(), turns, strict=True)
             }
@@ -106,25 +110,19 @@ def _words(scatter: Scatter) -> str:
     return ", ".join(said)
 
 
-def _friction(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
+def _in_a_walk(
+    robot: dict[str, float], scatter: Scatter, friction: float, positive: float, negative: float, force: float
+) -> None:
+    """Move a robot's values by what differs from run to run and what is unexplained: so many standard deviations."""
     for name in ("mu_s", "mu_k"):
-        robot[name] *= 1.0 + scatter.friction * amount
-
-
-def _positive(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
-    robot["supply_positive_psi"] += scatter.pressure_psi * amount
-
-
-def _negative(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
-    robot["supply_negative_psi"] += scatter.pressure_psi * amount
-
-
-def _force(robot: dict[str, float], scatter: Scatter, amount: float) -> None:
+        robot[name] *= 1.0 + scatter.friction * friction
+    robot["supply_positive_psi"] += scatter.pressure_psi * positive
+    robot["supply_negative_psi"] += scatter.pressure_psi * negative
     push_N = robot["body_area_N_psi"] * max(abs(robot["supply_positive_psi"]), 1.0)
-    robot["body_area_N_psi"] *= 1.0 + scatter.force_N * amount / push_N
+    robot["body_area_N_psi"] *= 1.0 + scatter.force_N * force / push_N
 
 
-_MOVES = (_friction, _positive, _negative, _force)
+_MOVES = 4  # by independent amounts
 _MOVED = ("mu_s", "mu_k", "supply_positive_psi", "supply_negative_psi", "body_area_N_psi")
 
 
@@ -140,13 +138,70 @@ def _own_values(model: Model) -> Mapping[str, tuple[float, float]]:
 
 
 def _within(model: Model, name: str, value: float) -> float:
-    lower, upper = _bounds(model, name)
+    if name in model.parameters:
+        lower, upper = model.parameters[name].lower, model.parameters[name].upper
+    else:
+        effect, _, own = name.partition(".")
+        lower, upper = next((p.lower, p.upper) for p in library()[effect].parameters if p.name == own)
     return min(max(value, lower), upper)
 
 
-def _bounds(model: Model, name: str) -> tuple[float, float]:
-    if name in model.parameters:
-        return model.parameters[name].lower, model.parameters[name].upper
-    effect, _, own = name.partition(".")
-    parameter = next(p for p in library()[effect].parameters if p.name == own)
-    return parameter.lower, parameter.upper
+class _Draws:
+    """Robots that differ from `model` in the values `names`, as its covariance names them, its curves included; some
+    thousands a second, without a model file's checks."""
+
+    def __init__(self, model: Model, names: Sequence[str]):
+        self._model, self._values = model, model.values
+        self._plain = [(k, name) for k, name in enumerate(names) if name in self._values]
+        self._springs = [_Spring(model.stiffness(curve), _members(names, curve)) for curve in STIFFNESS]
+        self._curves = {site: _Bent(curve, _members(names, f"{LEARNT}.{site}")) for site, curve in model.learnt.items()}
+
+    def plain(self, off: np.ndarray) -> dict[str, float]:
+        """Base and effect parameters by name, `off` (n,) being by how much each of the names differs."""
+        return {name: self._values[name] + float(off[k]) for k, name in self._plain}
+
+    def plant(self, values: Mapping[str, float], off: np.ndarray) -> Plant:
+        """The flat form of the robot that has these of the `values`, and whose curves differ by `off`."""
+        body, small = (spring.at(off) for spring in self._springs)
+        flat = of_values(self._values | dict(values), self._model.effects, body, small)
+        for site, curve in self._curves.items():
+            flat = with_curve(flat, site, curve.at(off))
+        return flat
+
+
+def _members(names: Sequence[str], owner: str) -> dict[str, int]:
+    """Where the values of a curve are among the names, by what comes after its own."""
+    return {name.removeprefix(f"{owner}."): k for k, name in enumerate(names) if name.startswith(f"{owner}.")}
+
+
+class _Spring:
+    def __init__(self, curve: StiffnessCurve, members: Mapping[str, int]):
+        self._places = list(members.values())
+        powers = np.eye(len(curve.coefficients))[[int(power) for power in members]]
+        self._family = Family(curve, [StiffnessCurve(tuple(way), curve.lower_m, curve.upper_m) for way in powers])
+
+    def at(self, off: np.ndarray) -> Tabulated:
+        """The drawn curve; the model's own in place of one that is not bistable, which no robot has."""
+        try:
+            return self._family.at(tuple(off[self._places].tolist()))
+        except ModelParameterError:
+            return self._family.at((0.0,) * len(self._places))
+
+
+class _Bent:
+    """A learnt curve that differs at its knots, and between them by the natural cubic spline that it was fitted as."""
+
+    def __init__(self, curve: LearntCurve, members: Mapping[str, int]):
+        self._curve, self._rows = curve, []
+        for row in range(len(curve.values)):
+            mine = {int(name.split(".")[1]): k for name, k in members.items() if name.split(".")[0] == str(row)}
+            if mine:
+                knots = np.array(list(mine))
+                spline = CubicSpline(knots, np.eye(len(knots)), bc_type="natural")
+                self._rows.append((row, list(mine.values()), spline(np.arange(curve.values.shape[1])).T))
+
+    def at(self, off: np.ndarray) -> LearntCurve:
+        values = self._curve.values.copy()
+        for row, places, basis in self._rows:
+            values[row] += off[places] @ basis
+        return LearntCurve(self._curve.lower, self._curve.upper, values)

@@ -14,10 +14,9 @@ from bifa.problem.system import RobotSystem
 from bifa.robot import Model
 from bifa.robot.model import LEARNT, Covariance
 from bifa.simulate import plant
-from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit
 from lacuna.estimation.structure import is_learnt, knot_name
-from lacuna.estimation.uncertainty import Uncertainty, uncertainty
+from lacuna.estimation.uncertainty import Uncertainty, clustered_covariance, uncertainty
 
 
 def completed_model(fit: Fit, date: str = "") -> Model:

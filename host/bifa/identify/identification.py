@@ -11,21 +11,25 @@ import numpy as np
 from bifa.data import Dataset
 from bifa.identify.completed import described
 from bifa.identify.start import fit_statics, prepare
-from bifa.identify.static import CONFIDENCE, IntervalEstimate, StaticFit
+from bifa.identify.static import IntervalEstimate, StaticFit
 from bifa.problem.inputs import ANCHOR
-from bifa.problem.system import RobotSystem
+from bifa.problem.system import PIPE, RobotSystem
 from bifa.robot import Model
-from lacuna.estimation.clustered import clustered_covariance
 from lacuna.estimation.fit import Fit, fit_base
 from lacuna.estimation.problem import Problem
 from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import one_thread, solve
-from lacuna.estimation.uncertainty import Uncertainty, profile_interval, uncertainty
+from lacuna.estimation.uncertainty import (
+    CONFIDENCE,
+    Uncertainty,
+    clustered_covariance,
+    profile_interval,
+    uncertainty,
+)
 
 _NORMAL_HALF = round(NormalDist().inv_cdf(0.5 + CONFIDENCE / 2), 4)  # standard deviations on either side
 # mu_s shows in one sample of a pull, its threshold: there the cost is no parabola.
-_PROFILED = ("mu_s",)
-_PULL_PARAMETERS = ("wall_offset_m", "mu_s", "mu_k")
+_PROFILED = "mu_s"
 
 _GIVEN_BY = {
     "body_damping_Ns_m": "step_response of the large actuator",
@@ -97,7 +101,7 @@ def identify(
     fit = fit_base(system, system.trials)
     on_progress("final steps and uncertainty")
     fit = settle(fit)
-    known = uncertainty(fit, confidence=CONFIDENCE)
+    known = uncertainty(fit)
     intervals = _intervals(system, fit, known)
     intervals |= _profiles(fit, intervals)
     sd = {name: interval.sd for name, interval in intervals.items()}
@@ -129,21 +133,18 @@ def _intervals(system: RobotSystem, fit: Fit, known: Uncertainty) -> dict[str, I
 
 
 def _profiles(fit: Fit, intervals: Mapping[str, IntervalEstimate]) -> dict[str, IntervalEstimate]:
-    """Profile-likelihood intervals from the pulls alone, the rest of the robot where the joint fit has it; never
+    """A profile-likelihood interval from the pulls alone, the rest of the robot where the joint fit has it; never
     narrower than the quadratic ones."""
     pulls = [trial for trial in fit.problem.trials if trial.experiment == ANCHOR]
-    free = tuple(fit.structure.names.index(name) for name in _PULL_PARAMETERS if name in intervals)
-    if not pulls or len(free) < len(_PULL_PARAMETERS):
+    if not pulls or not all(name in intervals for name in PIPE):
         return {}
+    free = tuple(fit.structure.names.index(name) for name in PIPE)
     problem = Problem(fit.structure, pulls, fit.problem.floor)
     local = Fit(problem, solve(problem, problem.start(fit.solution.point.values), free=free), 1, 1)
-    found = {}
-    for name in _PROFILED:
-        old = intervals[name]
-        low, high = profile_interval(local, name, confidence=CONFIDENCE)
-        low, high = min(low, old.lower), max(high, old.upper)
-        found[name] = IntervalEstimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high)
-    return found
+    old = intervals[_PROFILED]
+    low, high = profile_interval(local, _PROFILED)
+    low, high = min(low, old.lower), max(high, old.upper)
+    return {_PROFILED: IntervalEstimate(old.value, max(old.sd, (high - low) / 2.0 / _NORMAL_HALF), low, high)}
 
 
 _SETTLED = 0.7  # of the prior's standard deviation: half of what is known afterwards was known before
@@ -159,12 +160,9 @@ def _open(
     prior_sd = {p.name: p.prior_sd for p in system.parameters}
     # what the data tell hardly more of than was known before is as open as what they do not tell
     sd = {e.name: intervals[e.name].sd if e.name in intervals else e.sd for e in known.estimates}
-    settled = {
-        e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)
-    }
-    loose = {e.name for e in known.estimates} - settled
-    absent = [n for n in identified.parameters if n not in system.fitted and n not in dataset.known]
-    names = [n for n in identified.parameters if n in loose or n in absent]
+    told = {*dataset.known}
+    told |= {e.name for e in known.estimates if e.determined and sd[e.name] <= _SETTLED * (prior_sd[e.name] or np.inf)}
+    names = [n for n in identified.parameters if n not in told]
     found = [Open(n, identified[n], _GIVEN_BY[n]) for n in names]
     for actuator, prefix in (("large", "body"), ("small", "small")):
         if prefix not in system.curves:

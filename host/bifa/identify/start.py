@@ -8,12 +8,11 @@ all experiments, graduated (`lacuna.estimation.graduated`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from bifa import robot
-from bifa.data import Dataset, Trial
+from bifa.data import Dataset
 from bifa.identify.static import StaticFit, fit_static
 from bifa.problem.curves import FittedCurve
 from bifa.problem.stiffness import UndeterminedError
@@ -80,12 +79,11 @@ def _curve(dataset: Dataset, fit: StaticFit, values: Mapping[str, float], model:
     prefix, stiffness = _ACTUATORS[fit.actuator], fit.stiffness
     name = f"{prefix}_area_N_psi"
     area = values.get(name, model[name])
-    seen = _rests(dataset, fit.actuator)
-    if seen:
-        held_N = [area * rest.pressure_psi for rest in seen]
-        sd = np.full(len(seen), area * _PRESSURE_SD_PSI)
-        stiffness = stiffness.with_equilibria([rest.displacement_m for rest in seen], held_N, sd)
-    return FittedCurve(prefix, stiffness, bool(seen or dataset.of("locomotion")))
+    rest_m, held_psi = _rests(dataset, fit.actuator).T
+    if len(rest_m):
+        sd_N = np.full(len(rest_m), area * _PRESSURE_SD_PSI)
+        stiffness = stiffness.with_equilibria(rest_m, area * held_psi, sd_N)
+    return FittedCurve(prefix, stiffness, bool(len(rest_m) or dataset.of("locomotion")))
 
 
 def _known(dataset: Dataset, model: Model) -> dict[str, float]:
@@ -101,7 +99,7 @@ def _known(dataset: Dataset, model: Model) -> dict[str, float]:
 def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
     """Supplies that the lab did not measure, read off the sensors; the joint refinement has the last word."""
     found = {}
-    vacuum = [r.pressure_psi for a in _ACTUATORS for r in _rests(dataset, a) if r.pressure_psi < 0]
+    vacuum = [psi for actuator in _ACTUATORS for _, psi in _rests(dataset, actuator) if psi < 0]
     if "supply_negative_psi" not in dataset.known and vacuum:
         found["supply_negative_psi"] = float(np.median(vacuum))
     walks = [t.columns["pressure_body_psi"] for t in dataset.of("locomotion") if t.pressure_psi is None]
@@ -111,17 +109,18 @@ def _supplies(dataset: Dataset, model: Model) -> dict[str, float]:
     return {name: float(np.clip(value, *bounds[name])) for name, value in found.items()}
 
 
-@dataclass(frozen=True)
-class _Rest:
-    """A displacement [m] held at a pressure [psi] as it was read."""
-
-    displacement_m: float
-    pressure_psi: float
-
-
-def _rests(dataset: Dataset, actuator: str) -> list[_Rest]:
-    """Under vacuum before the step, and extended before the pressure goes, of every step response of the actuator."""
-    return [rest for trial in dataset.of("step_response", actuator) for rest in _rests_of(trial)]
+def _rests(dataset: Dataset, actuator: str) -> np.ndarray:
+    """Displacements [m], and the pressures [psi], as they were read, that held the actuator there: under vacuum before
+    the step, and extended before the pressure goes, of every step response; shape (n, 2)."""
+    found = []
+    for trial in dataset.of("step_response", actuator):
+        time_s = trial.time_s - trial.time_s[0]
+        for end in (*(t for t in step_timeline(trial).time_s if t > 0.0), time_s[-1] + 1.0):
+            last = np.flatnonzero(time_s < end - 1e-9)[-_SAMPLES:]
+            x = trial.columns["displacement_mm"][last]
+            if len(last) == _SAMPLES and abs(np.polyfit(time_s[last], x, 1)[0]) < _SETTLED_MM_S:
+                found.append((float(x.mean()) * 1e-3, float(trial.columns["pressure_psi"][last].mean())))
+    return np.reshape(found, (-1, 2))
 
 
 def _reach_m(dataset: Dataset, actuator: str) -> tuple[float, float] | None:
@@ -131,18 +130,3 @@ def _reach_m(dataset: Dataset, actuator: str) -> tuple[float, float] | None:
         return None
     limits = [np.percentile(trial.columns["displacement_mm"], (0.5, 99.5)) for trial in trials]
     return float(min(low for low, _ in limits)) * 1e-3, float(max(high for _, high in limits)) * 1e-3
-
-
-def _rests_of(trial: Trial) -> list[_Rest]:
-    time_s = trial.time_s - trial.time_s[0]
-    ends = [*(t for t in step_timeline(trial).time_s if t > 0.0), time_s[-1] + 1.0]
-    found = []
-    for end in ends:
-        last = np.flatnonzero(time_s < end - 1e-9)[-_SAMPLES:]
-        if len(last) < _SAMPLES:
-            continue
-        x = trial.columns["displacement_mm"][last]
-        slope = np.polyfit(time_s[last], x, 1)[0]
-        if abs(slope) < _SETTLED_MM_S:
-            found.append(_Rest(float(x.mean()) * 1e-3, float(trial.columns["pressure_psi"][last].mean())))
-    return found

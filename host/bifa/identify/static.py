@@ -10,8 +10,8 @@ from scipy.special import stdtrit
 from bifa.data import Dataset, Trial
 from bifa.problem.motion import imposed_motion
 from bifa.problem.stiffness import StiffnessFit, UndeterminedError, fit_stiffness
+from lacuna.estimation.uncertainty import CONFIDENCE
 
-CONFIDENCE = 0.9  # of every interval
 UNPRESSURISED_PSI = 0.05  # below this commanded pressure a trial counts as one at 0 psi
 
 

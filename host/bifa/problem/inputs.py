@@ -28,6 +28,7 @@ from lacuna.system import Theta
 
 STATIC, STEP, ANCHOR, WALK = "static_loading", "step_response", "anchor_pull", "locomotion"
 _MM = 1e3
+Columns = Mapping[str, np.ndarray]
 Given = TypeVar("Given", bound="Inputs", covariant=True)
 
 
@@ -70,9 +71,7 @@ class Inputs(Protocol):
     def bench(self) -> Hashable: ...
 
     @staticmethod
-    def simulate(
-        cases: Sequence[RobotInTrial[Any]], tolerance_m: float, together: bool
-    ) -> list[Mapping[str, np.ndarray]]:
+    def simulate(cases: Sequence[RobotInTrial[Any]], tolerance_m: float, together: bool) -> list[Columns]:
         """The channels of each case on one bench, each of shape (n,). `together`: see `bifa.simulate.walks`."""
         ...
 
@@ -110,14 +109,8 @@ class StaticInputs:
     def _is_sample(self) -> np.ndarray:
         return np.insert(np.ones(len(self.time_s), bool), self.turned_before, False)
 
-    def sampled(self, record: SimulatedTrial) -> Mapping[str, np.ndarray]:
-        """The channels without the turns."""
-        return {name: record[name][self._is_sample] for name in self.channels}
-
     @staticmethod
-    def simulate(
-        cases: Sequence[RobotInTrial[StaticInputs]], tolerance_m: float, together: bool
-    ) -> list[Mapping[str, np.ndarray]]:
+    def simulate(cases: Sequence[RobotInTrial[StaticInputs]], tolerance_m: float, together: bool) -> list[Columns]:
         first = cases[0].inputs
         records = simulate.static_loadings(
             [case.plant for case in cases],
@@ -126,7 +119,8 @@ class StaticInputs:
             [(case.inputs.path_m - case.zero_m) * _MM for case in cases],
             [case.inputs.pressure_psi for case in cases],
         )
-        return [first.sampled(record) for record in records]
+        # the turns are no samples
+        return [{name: record[name][first._is_sample] for name in first.channels} for record in records]
 
 
 @dataclass(frozen=True)
@@ -144,9 +138,7 @@ class StepInputs:
         return STEP, self.actuator
 
     @staticmethod
-    def simulate(
-        cases: Sequence[RobotInTrial[StepInputs]], tolerance_m: float, together: bool
-    ) -> list[Mapping[str, np.ndarray]]:
+    def simulate(cases: Sequence[RobotInTrial[StepInputs]], tolerance_m: float, together: bool) -> list[Columns]:
         records = simulate.step_responses(
             [case.plant for case in cases],
             cases[0].inputs.actuator,
@@ -186,9 +178,7 @@ class PullInputs:
         return ANCHOR, self.rate_mm_s, self.load_cell_N_m, self.extended_psi
 
     @staticmethod
-    def simulate(
-        cases: Sequence[RobotInTrial[PullInputs]], tolerance_m: float, together: bool
-    ) -> list[Mapping[str, np.ndarray]]:
+    def simulate(cases: Sequence[RobotInTrial[PullInputs]], tolerance_m: float, together: bool) -> list[Columns]:
         first = cases[0].inputs
         records = simulate.anchor_pulls(
             [case.plant for case in cases],
@@ -241,9 +231,7 @@ class WalkInputs:
         return WALK
 
     @staticmethod
-    def simulate(
-        cases: Sequence[RobotInTrial[WalkInputs]], tolerance_m: float, together: bool
-    ) -> list[Mapping[str, np.ndarray]]:
+    def simulate(cases: Sequence[RobotInTrial[WalkInputs]], tolerance_m: float, together: bool) -> list[Columns]:
         records = simulate.walks(
             [case.plant for case in cases],
             [case.commands for case in cases],

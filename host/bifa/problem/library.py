@@ -30,15 +30,10 @@ def _engine_effect(effect: effects.PhysicalEffect) -> Effect:
 
 def _engine_parameter(p: effects.EffectParameter) -> Parameter:
     lower, upper = p.lower, p.upper
+    # a trial's own value may lie anywhere
+    scale = 0.25 * (upper - lower) if p.own else 0.3 * abs(p.typical) or 0.05 * (upper - lower)
     if p.period is not None:
         lower, upper = p.typical - 0.5 * p.period, p.typical + 0.5 * p.period
     return Parameter(
-        p.name, p.unit, p.typical, lower, upper, scale=_scale(p), source=p.meaning, periodic=p.period is not None
+        p.name, p.unit, p.typical, lower, upper, scale=scale, source=p.meaning, periodic=p.period is not None
     )
-
-
-def _scale(parameter: effects.EffectParameter) -> float:
-    width = parameter.upper - parameter.lower
-    if parameter.own:
-        return 0.25 * width  # a trial's own value may lie anywhere
-    return 0.3 * abs(parameter.typical) or 0.05 * width

@@ -24,10 +24,8 @@ def of(trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
             named["direction of motion"] = inputs.direction.astype(float)
             named["pressure"] = np.full(trial.time_s.shape, inputs.pressure_psi)
         case StepInputs():
-            moving = np.gradient(prediction["displacement_mm"], trial.time_s)
             named["displacement"] = prediction["displacement_mm"]
-            named["velocity"] = moving
-            named["direction of motion"] = _direction(moving)
+            named |= _motion(prediction["displacement_mm"], trial.time_s)
             named["pressure"] = prediction["pressure_psi"]
             named |= _switching(inputs.commands, inputs.time_s, 0, "")
         case PullInputs():
@@ -35,19 +33,18 @@ def of(trial: Record, prediction: Channels) -> dict[str, np.ndarray]:
             named["direction of motion"] = np.full(trial.time_s.shape, np.sign(inputs.rate_mm_s))
             named["pressure"] = np.full(trial.time_s.shape, inputs.pressure_psi)
         case WalkInputs():
-            head = prediction["displacement_head_mm"]
-            moving = np.gradient(head, trial.time_s)
-            named["position in the pipe"] = head
-            named["velocity"] = moving
-            named["direction of motion"] = _direction(moving)
+            named["position in the pipe"] = prediction["displacement_head_mm"]
+            named |= _motion(prediction["displacement_head_mm"], trial.time_s)
             for i, chamber in enumerate(CHAMBERS):
                 named[f"pressure of the {chamber}"] = prediction[f"pressure_{chamber}_psi"]
                 named |= _switching(inputs.commands, inputs.time_s, i, f" of the {chamber}")
     return named
 
 
-def _direction(velocity_mm_s: np.ndarray) -> np.ndarray:
-    return np.where(np.abs(velocity_mm_s) > _RESTING_MM_S, np.sign(velocity_mm_s), 0.0)
+def _motion(displacement_mm: np.ndarray, time_s: np.ndarray) -> dict[str, np.ndarray]:
+    velocity_mm_s = np.gradient(displacement_mm, time_s)
+    direction = np.where(np.abs(velocity_mm_s) > _RESTING_MM_S, np.sign(velocity_mm_s), 0.0)
+    return {"velocity": velocity_mm_s, "direction of motion": direction}
 
 
 def _switching(commands: Timeline, time_s: np.ndarray, chamber: int, suffix: str) -> dict[str, np.ndarray]:

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import LinearConstraint, minimize
 
 from bifa.errors import BifaError
-from lacuna.estimation.autocorrelation import correlation_samples
+from bifa.robot.stiffness import DEGREE
+from lacuna.estimation.sampling import correlation_samples
 
-DEGREE = 15
 CONTINUATION = 0.13  # of the static range, on either side, at most: beyond it the curve goes on straight
 _PRIOR_POINTS = 6  # on either side
 _TOLD = 0.9  # share of the information that stems from static loading
@@ -58,10 +58,6 @@ class StiffnessFit:
         """K(x) [N] at displacements x [m]."""
         return self._rows(x) @ self.coefficients
 
-    def slope(self, x: np.ndarray) -> np.ndarray:
-        """K'(x) [N/m]."""
-        return self._rows(x, derivative=1) @ self.coefficients
-
     @property
     def covariance(self) -> np.ndarray:
         """Covariance of the coefficients [N^2], shape (16, 16)."""
@@ -87,7 +83,8 @@ class StiffnessFit:
         rows = self._rows(np.asarray(x)) / np.asarray(sd_N)[:, None]
         information = self.information + rows.T @ rows
         target = self.information @ self.coefficients + rows.T @ (np.asarray(force_N) / np.asarray(sd_N))
-        coefficients = _solve_monotone(information, target, self._outside_slopes())
+        outside = _outside(self.lower_m, self.upper_m, self.covered_m)
+        coefficients = _solve_monotone(information, target, self._rows(outside, derivative=1))
         return replace(self, coefficients=coefficients, information=information)
 
     def shapes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -112,9 +109,6 @@ class StiffnessFit:
 
     def _rows(self, x: np.ndarray, derivative: int = 0) -> np.ndarray:
         return _rows(x, self.lower_m, self.upper_m, derivative)
-
-    def _outside_slopes(self) -> np.ndarray:
-        return self._rows(_outside(self.lower_m, self.upper_m, self.covered_m), derivative=1)
 
 
 def fit_stiffness(

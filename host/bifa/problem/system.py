@@ -21,7 +21,7 @@ from bifa.errors import BifaError
 from bifa.problem import candidates, regressors, sites
 from bifa.problem.accuracy import accuracy_of
 from bifa.problem.curves import FittedCurve
-from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK, Inputs, RobotInTrial, inputs_of
+from bifa.problem.inputs import ANCHOR, STATIC, STEP, WALK, Columns, Inputs, RobotInTrial, inputs_of
 from bifa.problem.library import engine_effects
 from bifa.problem.spare import spare
 from bifa.problem.unmeasured import BENCH, LOAD_CELL, PRIOR_SD, STAND_MASS
@@ -50,7 +50,7 @@ _ALIKE_M = {STATIC: 1e-6, STEP: 1e-6, ANCHOR: 1e-6, WALK: 1e-5}  # shared steps 
 
 _LARGE = ("body_damping_Ns_m", "body_area_N_psi", "body_alpha_n_per_s", "body_alpha_s_per_s")
 _SMALL = ("small_damping_Ns_m", "small_area_N_psi", "small_alpha_n_per_s", "small_alpha_s_per_s")
-_PIPE = ("wall_offset_m", "mu_s", "mu_k")
+PIPE = ("wall_offset_m", "mu_s", "mu_k")
 # A pull fits about as well with a wall nearer by a centimetre and less friction; only walks tell.
 _PLACES = {"wall_offset_m": (0.017, 0.022, 0.026, 0.031)}
 _SUPPLIES = ("supply_positive_psi", "supply_negative_psi")
@@ -64,8 +64,8 @@ _SEEN_BY: dict[tuple[str, str | None], frozenset[str]] = {
     (STATIC, "small"): frozenset({"small_area_N_psi"}),
     (STEP, "large"): frozenset({*_LARGE, "supply_negative_psi"}),
     (STEP, "small"): frozenset({*_SMALL, "small_mass_kg", "supply_negative_psi"}),
-    (ANCHOR, None): frozenset({"small_area_N_psi", "head_segment_mass_kg", "wall_stiffness_N_m", *_PIPE}),
-    (WALK, None): frozenset({*_LARGE, *_SMALL, *_PIPE, *_SUPPLIES, *_MASSES, *_WALL}),
+    (ANCHOR, None): frozenset({"small_area_N_psi", "head_segment_mass_kg", "wall_stiffness_N_m", *PIPE}),
+    (WALK, None): frozenset({*_LARGE, *_SMALL, *PIPE, *_SUPPLIES, *_MASSES, *_WALL}),
 }
 
 
@@ -89,8 +89,10 @@ class RobotSystem(System):
         self._last_in_session = max((t.session_order or 0 for t in self.trials), default=0)
         self.effects: Mapping[str, Effect] = engine_effects()
         shapes = [p for curve in self.curves.values() for p in curve.parameters]
-        self.bench = tuple(BENCH[name] for name in _bench_unknowns(dataset))
-        self.parameters = (*(self._named(name) for name in self.fitted), *self.bench, *shapes)
+        # constants of the bench that these trials feel and nobody declared
+        felt = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
+        bench = (BENCH[name] for name, where in _FELT.items() if where in felt)
+        self.parameters = (*(self._named(name) for name in self.fitted), *bench, *shapes)
         self._remember()
 
     def _remember(self) -> None:
@@ -149,7 +151,8 @@ class RobotSystem(System):
             simulated = _simulated(list(cases.values()), tolerances_m[experiment], alike)
             for (k, case), channels in zip(cases.items(), simulated, strict=True):
                 if channels:
-                    found[k] = _seen(channels, learnt[k], case, trials[k])
+                    seen = sites.corrected_readings(dict(channels), learnt[k], case.inputs, case.plant)
+                    found[k] = {name: seen[name] for name in trials[k].channels}
         return [found[k] if k in found else _nothing(trial) for k, trial in enumerate(trials)]
 
     def _case(
@@ -243,7 +246,7 @@ class RobotSystem(System):
         low, high = p.plausible
         prior_sd = PRIOR_SD.get(name)
         # friction shows in fewer samples: wider steps for its derivatives
-        scale = prior_sd or (high - low) * (1.0 if name in _PIPE else 0.1)
+        scale = prior_sd or (high - low) * (1.0 if name in PIPE else 0.1)
         # A foot that slides at once has no static friction to find: below mu_k nothing would lead mu_s back.
         at_least, elsewhere = "mu_k" if name == "mu_s" else None, _PLACES.get(name, ())
         return Parameter(
@@ -294,15 +297,7 @@ def fittable(dataset: Dataset, curves: Mapping[str, FittedCurve]) -> tuple[str, 
     return tuple(n for n in robot.nominal().parameters if n in seen and n not in dataset.known)
 
 
-def _bench_unknowns(dataset: Dataset) -> list[str]:
-    """Constants of the bench that these trials feel and nobody declared."""
-    experiments = {(t.experiment, t.actuator) for t in dataset.trials if LOAD_CELL not in t.extra}
-    return [name for name, where in _FELT.items() if where in experiments]
-
-
-def _simulated(
-    cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool
-) -> list[Mapping[str, np.ndarray]]:
+def _simulated(cases: Sequence[RobotInTrial[Inputs]], tolerance_m: float, alike: bool) -> list[Columns]:
     """The channels of each case on one bench; none of one that is out of range."""
     try:
         return cases[0].inputs.simulate(cases, tolerance_m, alike)
@@ -314,14 +309,6 @@ def _simulated(
 
 def _nothing(trial: Record) -> Channels:
     return {name: np.full(trial.time_s.shape, np.nan) for name in trial.channels}
-
-
-def _seen(
-    channels: Mapping[str, np.ndarray], learnt: Sequence[Correction], case: RobotInTrial[Inputs], trial: Record
-) -> Channels:
-    """What the instruments show of a simulation."""
-    channels = sites.corrected_readings(dict(channels), learnt, case.inputs, case.plant)
-    return {name: channels[name] for name in trial.channels}
 
 
 def _picked(names: Sequence[str]) -> Callable[[Theta], tuple[float, ...]]:

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from bifa.errors import BifaError
+from bifa.errors import BifaError, check_range
 from bifa.files import read_text, write_text
 from bifa.ranges import RANGES
-from bifa.robot.parameters import ModelParameterError, check_bounds
 from bifa.toml import parse_toml
 
 FORMAT = 1
@@ -25,10 +24,7 @@ class GaitError(BifaError):
 
 
 def _checked(name: str, value: float) -> float:
-    try:
-        check_bounds(name, value, *RANGES[name])
-    except ModelParameterError as error:
-        raise GaitError(f"gait: {error}") from None
+    check_range(GaitError, f"gait: {name}", value, *RANGES[name])
     return float(value)
 
 

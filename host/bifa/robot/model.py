@@ -11,7 +11,7 @@ import numpy as np
 from bifa import effects as library
 from bifa.robot.learnt import LearntCurve
 from bifa.robot.learnt import check as check_learnt
-from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParameterError, check_bounds
+from bifa.robot.parameters import BASE_PARAMETERS, ModelParameter, ModelParameterError
 from bifa.robot.stiffness import StiffnessCurve
 
 GRAVITY_M_S2 = 9.80665
@@ -96,7 +96,7 @@ class Model:
             what = f"lacks {', '.join(missing)}" if missing else f"has unknown parameters {', '.join(unknown)}"
             raise ModelParameterError(f"model {self.name!r} {what}; known are {', '.join(BASE_PARAMETERS)}")
         for parameter in self.parameters.values():
-            check_bounds(parameter.name, parameter.value, parameter.lower, parameter.upper, parameter.unit)
+            parameter.check(parameter.value)
         object.__setattr__(self, "effects", {name: library.complete(name, v) for name, v in self.effects.items()})
         for name, curve in self.learnt.items():
             check_learnt(name, curve)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from bifa.errors import BifaError
+from bifa.errors import BifaError, check_range
 
 
 class ModelParameterError(BifaError):
@@ -37,15 +37,12 @@ class ModelParameter:
 
     def with_value(self, value: float, sd: float | None = None, source: str | None = None) -> ModelParameter:
         """The same parameter with another value; ModelParameterError when it is outside the bounds."""
-        check_bounds(self.name, value, self.lower, self.upper, self.unit)
+        self.check(value)
         return replace(self, value=float(value), sd=sd, source=self.source if source is None else source)
 
-
-def check_bounds(name: str, value: float, lower: float, upper: float, unit: str = "") -> None:
-    """Raise ModelParameterError naming the range unless `value` is a finite number within it."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not lower <= value <= upper:  # NaN is not; and an integer may be too long for a float
-        raise ModelParameterError(f"{name} = {value!r} is outside its range {lower:g} to {upper:g} {unit}".rstrip())
+    def check(self, value: float) -> None:
+        """Raise ModelParameterError, naming the range, unless `value` is a finite number within the bounds."""
+        check_range(ModelParameterError, self.name, value, self.lower, self.upper, self.unit)
 
 
 _SEARCHED = "found to reproduce the paper's reported speeds and forces"

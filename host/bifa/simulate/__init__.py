@@ -6,7 +6,7 @@
 """
 
 from bifa.robot.gait import gait_rows
-from bifa.simulate.gaits import Advance, cores, full_lanes, speed, speeds
+from bifa.simulate.gaits import Advance, cores, speed, speeds
 from bifa.simulate.plant import Plant, plant
 from bifa.simulate.records import (
     SimulatedTrial,
@@ -46,7 +46,6 @@ __all__ = [
     "anchor_pulls",
     "arcs",
     "cores",
-    "full_lanes",
     "gait_rows",
     "obstacles",
     "of_gait",

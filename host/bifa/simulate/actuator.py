@@ -13,10 +13,6 @@ from bifa.simulate.compiled import merged
 from bifa.simulate.hooks import chains
 from bifa.simulate.learnt import AREA, DAMPING, EMPTYING, FILLING, IN_AREA, IN_DAMPING, IN_FILLING, learnt_at
 
-_THRESHOLD = layout.THRESHOLD
-_ALPHA_S = layout.ALPHA_S
-_ALPHA_N = layout.ALPHA_N
-
 
 @merged
 def reach(curve):
@@ -50,7 +46,7 @@ def stiffness(curve, x):
 @merged
 def convergence(q, block, x, inlet):
     """alpha of eq. (3)."""
-    return q[block + _ALPHA_S] if x > q[block + _THRESHOLD] and inlet < 0.0 else q[block + _ALPHA_N]
+    return q[block + layout.ALPHA_S] if x > q[block + layout.THRESHOLD] and inlet < 0.0 else q[block + layout.ALPHA_N]
 
 
 @merged

@@ -7,57 +7,31 @@ simulator and of the effects.
 from __future__ import annotations
 
 import inspect
-from importlib import import_module
 from pathlib import Path
 
 from bifa import effects
-from bifa.simulate import generated, hooks
+from bifa.simulate import generated, hooks, locomotion, stand
 
-_ENTRIES = {
-    "walk_record": "locomotion",
-    "progress_record": "locomotion",
-    "step_record": "stand",
-    "static_record": "stand",
-    "anchor_record": "stand",
-}
-
-
+_ENTRIES = (locomotion.walk_record, stand.step_record, stand.static_record, stand.anchor_record)
 # Never compiled: a change there needs no new compilation.
-_PLAIN = {
-    "__init__.py",
-    "entries.py",
-    "gaits.py",
-    "learnt_curves.py",
-    "paper.py",
-    "passing.py",
-    "records.py",
-    "rigs.py",
-    "tables.py",
-    "terrain.py",
-}
+_PLAIN = {"__init__", "entries", "gaits", "paper", "passing", "records", "rigs", "tables", "terrain"}
 
 
 def sources() -> list[str]:
     """Of the simulator, of every effect wherever its file lies, and of the chains that join them."""
-    paths = [path for path in sorted(Path(__file__).parent.glob("*.py")) if path.name not in _PLAIN]
+    paths = [path for path in sorted(Path(__file__).parent.glob("*.py")) if path.stem not in _PLAIN]
     own = [path.read_text("utf-8") for path in paths]
     return [*own, *(inspect.getsource(module) for module in effects.modules().values()), hooks.chain_source()]
 
 
 def entry_source() -> str:
     lines = [f'"""Generated; sources {generated.digest(*sources())}."""', "from numba import njit"]
-    for name, module in _ENTRIES.items():
-        lines.append(f"from bifa.simulate.{module} import {name} as _{name}")
-    for name, module in _ENTRIES.items():
-        arguments = ", ".join(_arguments(module, name))
+    lines += [f"from {entry.__module__} import {entry.__name__} as _{entry.__name__}" for entry in _ENTRIES]
+    for entry in _ENTRIES:
+        arguments = ", ".join(inspect.signature(entry.py_func).parameters)
         lines += ["", "", '@njit(cache=True, nogil=True, error_model="numpy")']
-        lines += [f"def {name}({arguments}):", f"    return _{name}({arguments})"]
+        lines += [f"def {entry.__name__}({arguments}):", f"    return _{entry.__name__}({arguments})"]
     return "\n".join(lines) + "\n"
-
-
-def _arguments(module: str, name: str) -> list[str]:
-    function = getattr(import_module(f"bifa.simulate.{module}"), name)
-    return list(inspect.signature(function.py_func).parameters)
 
 
 entries = generated.load("entries", entry_source())

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -51,43 +52,51 @@ def speeds(
     terrain: np.ndarray = rigs.CLEAR,
     dead_time_s: float = 0.0,
     workers: int | None = None,
+    executor: Executor | None = None,
 ) -> Advance:
     """Many gaits (n, 6) with one model, or with n models one each; shapes (n, cycles). `dead_time_s`: for so long the
     Uno vents a chamber between its supplies.
 
-    Runs in threads without the GIL: `workers`, or one a core. Rows are dealt out in small pieces, since gaits differ
-    in cost. Angles need not be within 0-360.
+    Runs on `executor`, else in threads, without the GIL: `workers`, or one a core. Rows are dealt out in small pieces,
+    since gaits differ in cost. Angles need not be within 0-360.
     """
     gaits = np.ascontiguousarray(gaits, dtype=float).reshape(-1, 6)
     n = gaits.shape[0]
     flats = [plant(model)] * n if isinstance(model, (Model, Plant)) else [plant(one) for one in model]
-    ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
-    ends = gaits[:, :1] * np.arange(1, cycles + 1)
-    switches = [(t.time_s, t.chamber, t.command) for t in gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)]
-    advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
-
-    def run(piece: np.ndarray) -> None:
-        first, last = piece[0], piece[-1] + 1
-        what = lanes.Experiment(
-            lanes.PROGRESS, ways[first:last], switches[first:last], list(ends[first:last]), tolerance_m
-        )
-        rows = np.array(lanes.march(flats[first:last], what, together=False))
-        starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats[first:last]])
-        advance[piece] = np.diff(rows[:, 0], prepend=starts[:, None])
-        slip[piece] = np.diff(rows[:, 1], prepend=0.0)
-
     count = workers or cores()
-    pieces = min(_PIECES_PER_WORKER * count, -(-n // full_lanes())) if count > 1 else 1
+    pieces = min(_PIECES_PER_WORKER * count, -(-n // _full_lanes())) if executor or count > 1 else 1
     shares = [piece for piece in np.array_split(np.arange(n), max(1, pieces)) if piece.size]
-    if len(shares) <= 1:
-        for piece in shares:
-            run(piece)
-    else:
-        list(_pool(count).map(run, shares))
+    if executor is None and len(shares) > 1:
+        executor = _pool(count)
+    run = partial(_progress, cycles, tolerance_m, inclination_deg, terrain, dead_time_s)
+    each: Callable[..., Any] = executor.map if executor else map
+    found = each(run, [flats[piece[0] : piece[-1] + 1] for piece in shares], [gaits[piece] for piece in shares])
+    advance, slip = np.zeros((n, cycles)), np.zeros((n, cycles))
+    for piece, (advanced, slid) in zip(shares, found, strict=True):
+        advance[piece], slip[piece] = advanced, slid
     return Advance(advance, slip, gaits[:, 0])
 
 
-def full_lanes() -> int:
+def _progress(
+    cycles: int,
+    tolerance_m: float,
+    inclination_deg: float,
+    terrain: np.ndarray,
+    dead_time_s: float,
+    flats: Sequence[Plant],
+    gaits: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Advance and slip of each cycle, (n, cycles) each."""
+    ways = [rigs.pipe(flat, inclination_deg, terrain) for flat in flats]
+    ends = gaits[:, :1] * np.arange(1, cycles + 1)
+    switches = gait_switches(gaits, ends[:, -1], dead_time_s=dead_time_s)
+    what = lanes.Experiment(lanes.PROGRESS, ways, switches, list(ends), tolerance_m)
+    rows = np.array(lanes.march(flats, what, together=False))
+    starts = np.array([flat.q[layout.BODY + layout.CONTRACTED] for flat in flats])
+    return np.diff(rows[:, 0], prepend=starts[:, None]), np.diff(rows[:, 1], prepend=0.0)
+
+
+def _full_lanes() -> int:
     """Walks that are worth a call: fewer leave lanes idle at its end for much of the time."""
     return _LANES_FULL * lanes.width() if lanes.width() > 1 else 1
 

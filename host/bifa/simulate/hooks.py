@@ -12,7 +12,7 @@ from __future__ import annotations
 import inspect
 
 from bifa import effects
-from bifa.effects import EffectError
+from bifa.effects import EffectError, PhysicalEffect
 from bifa.simulate import generated, layout
 
 _STATEFUL = ("z", "actuator")
@@ -42,6 +42,19 @@ HOOKS: dict[str, tuple[tuple[str, ...], str]] = {
     "initial": ((*_STATEFUL, "position_m", "pressure_psi"), "first"),
 }
 HIDDEN = {"z", "z_new", "actuator"}
+# How results combine: what the chain begins with, what each call does, and what the chain returns. `{value}` is the
+# hook's first argument that is offered, `{state}` the place of the effect's own number.
+_COMBINED = {
+    "sum": ("total = 0.0", "total += {call}", "total"),
+    "product": ("total = 1.0", "total *= {call}", "total"),
+    "pair": ("total = growth = 0.0", "force, slope = {call}; total += force; growth += slope", "total, growth"),
+    "replace": ("", "{value} = {call}", "{value}"),
+    "keep": ("", "{value} = {call}; z_new{state} = {value}", "{value}"),
+    "state": ("", "z_new{state} = {call}", ""),
+    "first": ("", "z{state} = {call}", ""),
+    # The next sensor of the chain sees this one's output.
+    "follow": ("", "before = z{state}; after_psi = {call}; z{state} = after_psi; before_psi = before", "after_psi"),
+}
 
 
 def chain_source() -> str:
@@ -67,19 +80,16 @@ def chain_source() -> str:
 
 def _chain(hook: str, names: list[str]) -> list[str]:
     arguments, combine = HOOKS[hook]
-    value = {"sum": "total", "product": "total", "pair": "total, growth"}.get(combine, "")
-    if combine in ("replace", "keep"):
-        value = next(argument for argument in arguments if argument not in HIDDEN)
-    body = {"sum": ["total = 0.0"], "product": ["total = 1.0"], "pair": ["total = 0.0", "growth = 0.0"]}.get(
-        combine, []
-    )
+    begin, each, result = _COMBINED[combine]
+    value = next((argument for argument in arguments if argument not in HIDDEN), "")
+    body = [begin] if begin else []
     for name in names:
+        effect = effects.library()[name]
+        state = f"[{layout.state_slot(name)} + actuator]" if effect.states else "_of_nothing"
         body.append(f"if active & {1 << layout.effect_bit(name)}:")
-        body += ["    " + line for line in _call(hook, name, combine, value)]
-    if combine == "follow":
-        body.append("return after_psi")
-    elif value:
-        body.append(f"return {value}")
+        body.append("    " + each.format(call=_call(hook, effect, state), value=value, state=state))
+    if result:
+        body.append(f"return {result.format(value=value)}")
     signature = ", ".join(("active", "q", *arguments))
     return [
         "",
@@ -90,37 +100,19 @@ def _chain(hook: str, names: list[str]) -> list[str]:
     ]
 
 
-def _call(hook: str, name: str, combine: str, value: str) -> list[str]:
-    effect = effects.library()[name]
-    state = f"[{layout.state_slot(name)} + actuator]" if effect.states else None
-    own = {parameter.name: f"q[{layout.index(f'{name}.{parameter.name}')}]" for parameter in effect.parameters}
+def _call(hook: str, effect: PhysicalEffect, state: str) -> str:
+    """The call of an effect's function; `state`: where in the memory the actuator's number is."""
+    own = {parameter.name: f"q[{layout.index(f'{effect.name}.{parameter.name}')}]" for parameter in effect.parameters}
     offered = {argument: argument for argument in HOOKS[hook][0] if argument not in HIDDEN}
-    if state and "actuator" in HOOKS[hook][0]:
+    if effect.states and "actuator" in HOOKS[hook][0]:
         offered["state"] = f"z{state}"
     given = []
-    for argument in inspect.signature(getattr(effects.modules()[name], hook)).parameters:
+    for argument in inspect.signature(getattr(effects.modules()[effect.name], hook)).parameters:
         source = own.get(argument) or offered.get(argument)
         if source is None:
-            raise EffectError(f"{name}.{hook} asks for {argument!r}; it may have {', '.join([*own, *offered])}")
+            raise EffectError(f"{effect.name}.{hook} asks for {argument!r}; it may have {', '.join([*own, *offered])}")
         given.append(source)
-    call = f"{hook}_of_{name}({', '.join(given)})"
-    match combine:
-        case "sum":
-            return [f"total += {call}"]
-        case "product":
-            return [f"total *= {call}"]
-        case "pair":
-            return [f"force, slope = {call}", "total += force", "growth += slope"]
-        case "replace":
-            return [f"{value} = {call}"]
-        case "keep":
-            return [f"{value} = {call}", f"z_new{state} = {value}"]
-        case "state":
-            return [f"z_new{state} = {call}"]
-        case "first":
-            return [f"z{state} = {call}"]
-        case _:  # follow: the next sensor of the chain sees this one's output
-            return [f"before = z{state}", f"after_psi = {call}", f"z{state} = after_psi", "before_psi = before"]
+    return f"{hook}_of_{effect.name}({', '.join(given)})"
 
 
 chains = generated.load("chains", chain_source())

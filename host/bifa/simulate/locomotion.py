@@ -6,7 +6,7 @@ import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.compiled import kernel, merged
-from bifa.simulate.march import march, new_run, shown, start_effects
+from bifa.simulate.march import march_through, new_run, shown, start_effects
 from bifa.simulate.stepper import (
     STATES,
     V_HEAD,
@@ -19,38 +19,19 @@ from bifa.simulate.stepper import (
 )
 from bifa.simulate.timeline import delayed
 
-# Columns of a record: the state y, then what the sensors say, then the normal forces (7).
+# Columns of a record: the state y, then what the sensors say, the normal forces (7), and how far both ends have slid.
 READ_BODY = STATES
 NORMAL_HEAD = STATES + 3
-COLUMNS = STATES + 5
-
-
-@kernel
-def rest(plant, rig, states_of_effects):
-    """A robot at rest, vented and contracted, its tail's end at 0."""
-    run = new_run(states_of_effects)
-    contracted(plant, rig, run)
-    return run
+SLIP = STATES + 5
+COLUMNS = STATES + 6
 
 
 @merged
 def contracted(plant, rig, run):
-    """Put a new run where a walk starts."""
+    """Put a new run where a walk starts: at rest, vented and contracted, the tail's end at 0."""
     run.y[X_HEAD] = plant.q[layout.BODY + layout.CONTRACTED]
     run.y[X_SMALL_HEAD] = run.y[X_SMALL_TAIL] = plant.q[layout.SMALL + layout.CONTRACTED]
     start_effects(plant, rig, run)
-
-
-@kernel
-def _through(plant, rig, run, until, tolerance, late, order, chamber, command, i):
-    """March to `until`, switching valves on the way; returns the next switch."""
-    while i < order.size and late[order[i]] <= until:
-        k = order[i]
-        march(plant, rig, run, late[k], tolerance)
-        run.command[chamber[k]] = command[k]
-        i += 1
-    march(plant, rig, run, until, tolerance)
-    return i
 
 
 @merged
@@ -62,6 +43,7 @@ def walk_row(plant, rig, run, row):
         row[READ_BODY + actuator] = shown(plant, run, actuator)
     row[NORMAL_HEAD] = grip(plant, rig, run.gravity, 0, run.y)
     row[NORMAL_HEAD + 1] = grip(plant, rig, run.gravity, 1, run.y)
+    row[SLIP] = run.slip[0]
 
 
 @merged
@@ -82,24 +64,12 @@ def progress_row(plant, rig, run, row):
 @kernel
 def walk_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
     """(n, COLUMNS) at `sample_times` (rising, from 0), of a walk that starts at rest at time 0."""
-    run = rest(plant, rig, states_of_effects)
+    run = new_run(states_of_effects)
+    contracted(plant, rig, run)
     late, order = delayed(plant, times, chamber, command)
     out = np.empty((sample_times.size, COLUMNS))
     i = 0
     for k in range(sample_times.size):
-        i = _through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
+        i = march_through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
         walk_row(plant, rig, run, out[k])
-    return out
-
-
-@kernel
-def progress_record(plant, rig, states_of_effects, times, chamber, command, sample_times, tolerance):
-    """(n, 2) of the same walk: `progress_row` at `sample_times`."""
-    run = rest(plant, rig, states_of_effects)
-    late, order = delayed(plant, times, chamber, command)
-    out = np.empty((sample_times.size, 2))
-    i = 0
-    for k in range(sample_times.size):
-        i = _through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
-        progress_row(plant, rig, run, out[k])
     return out

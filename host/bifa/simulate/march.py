@@ -131,6 +131,18 @@ def march(plant, rig, run, until, tolerance):
     arrive(plant, run)
 
 
+@kernel
+def march_through(plant, rig, run, until, tolerance, late, order, chamber, command, i):
+    """March to `until`, switching valves on the way; returns the next switch."""
+    while i < order.size and late[order[i]] <= until:
+        k = order[i]
+        march(plant, rig, run, late[k], tolerance)
+        run.command[chamber[k]] = command[k]
+        i += 1
+    march(plant, rig, run, until, tolerance)
+    return i
+
+
 @merged
 def arrive(plant, run):
     """What is read where a march ends."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bifa.robot import BASELINE, Gait, Model
+from bifa.robot.model import GRAVITY_M_S2
 from bifa.simulate.gaits import speed
 from bifa.simulate.passing import Passing, passing
 from bifa.simulate.records import anchor_pull, static_loading, step_response
@@ -56,7 +57,7 @@ def _forces(model: Model) -> list[Row]:
     pressure = model["supply_positive_psi"]
     anchored = float(anchor_pull(model, _PULL_S, 20.0, pressure)["force_N"].max())
     vented = float(anchor_pull(model, _PULL_S, 20.0, 0.0)["force_N"].max())
-    weight = 9.80665 * (model["head_mass_kg"] + model["tail_mass_kg"])
+    weight = GRAVITY_M_S2 * (model["head_mass_kg"] + model["tail_mass_kg"])
     push = _push(model, pressure)
     needed = pressure + (150.0 - push) / model["body_area_N_psi"]
     return [

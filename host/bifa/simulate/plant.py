@@ -8,12 +8,22 @@ from typing import NamedTuple
 import numpy as np
 
 from bifa import effects
+from bifa.robot.learnt import LearntCurve
 from bifa.robot.model import Model
-from bifa.simulate import layout
-from bifa.simulate.learnt_curves import with_curve
-from bifa.simulate.tables import Tabulated, tabulated
+from bifa.simulate import layout, learnt
+from bifa.simulate.tables import Tabulated, sealed, tabulated
 
 _NOTHING = np.zeros((0, 4))
+_POINTS = 513  # of a row of `Plant.learnt`: fine enough for the lips of a pipe's joints
+_TERMS = {
+    "filling": (learnt.IN_FILLING, learnt.FILLING, learnt.EMPTYING),
+    "friction_speed": (learnt.IN_FRICTION_SPEED, learnt.FORWARD, learnt.BACKWARD),
+    "friction_place": (learnt.IN_FRICTION_PLACE, learnt.PLACE),
+    "body_damper": (learnt.IN_DAMPING, learnt.DAMPING),
+    "grip_speed": (learnt.IN_GRIP_SPEED, learnt.GRIP_FORWARD, learnt.GRIP_BACKWARD),
+    "grip_place": (learnt.IN_GRIP_PLACE, learnt.GRIP_PLACE),
+    "area_stroke": (learnt.IN_AREA, learnt.AREA),
+}
 
 
 class Plant(NamedTuple):
@@ -42,23 +52,21 @@ def of_values(
     values: Mapping[str, float], active: Mapping[str, Mapping[str, float]], body: Tabulated, small: Tabulated
 ) -> Plant:
     """A plant from values by name (those of effects too), the active effects' own, and the two curves."""
-    return Plant(_numbers(values, body, small), mask(active), body.rows, small.rows)
-
-
-def _numbers(values: Mapping[str, float], body: Tabulated, small: Tabulated) -> np.ndarray:
     q = np.zeros(layout.size())
     q[[layout.index(name) for name in values]] = list(values.values())
     q[layout.BODY + layout.MASS] = values["head_mass_kg"]
-    _shape(q, layout.BODY, body)
-    _shape(q, layout.SMALL, small)
+    for block, curve in ((layout.BODY, body), (layout.SMALL, small)):
+        q[block + layout.THRESHOLD] = curve.unstable_m
+        q[block + layout.CONTRACTED] = curve.contracted_m
+        q[block + layout.STROKE] = curve.stroke_m
     q[layout.BODY + layout.VOLUME] = 1.0
     q[layout.SMALL + layout.VOLUME] = (q[layout.SMALL + layout.AREA] * small.stroke_m) / (
         q[layout.BODY + layout.AREA] * body.stroke_m
     )
-    return q
+    return Plant(q, _mask(active), body.rows, small.rows)
 
 
-def mask(active: Mapping[str, Mapping[str, float]]) -> int:
+def _mask(active: Mapping[str, Mapping[str, float]]) -> int:
     """The bits of the effects with a size other than 0."""
     bits = 0
     for name, values in active.items():
@@ -67,7 +75,26 @@ def mask(active: Mapping[str, Mapping[str, float]]) -> int:
     return bits
 
 
-def _shape(q: np.ndarray, block: int, curve: Tabulated) -> None:
-    q[block + layout.THRESHOLD] = curve.unstable_m
-    q[block + layout.CONTRACTED] = curve.contracted_m
-    q[block + layout.STROKE] = curve.stroke_m
+def with_curve(plant: Plant, name: str, curve: LearntCurve) -> Plant:
+    """The plant with `curve` added to the term `name` (`bifa.robot.learnt.ROWS`)."""
+    if name == "body_spring":
+        return plant._replace(body_curve=_added(plant.body_curve, curve))
+    if name == "small_spring":
+        return plant._replace(small_curve=_added(plant.small_curve, curve))
+    filled = plant.learnt.copy() if len(plant.learnt) else np.zeros((learnt.TERMS, 2 + _POINTS))
+    at = np.linspace(curve.lower, curve.upper, _POINTS)
+    bit, *terms = _TERMS[name]
+    for row, term in zip(range(len(curve.values)), terms, strict=True):
+        filled[term, :2] = curve.lower, (_POINTS - 1) / (curve.upper - curve.lower)
+        filled[term, 2:] = curve.at(at, row)
+    return plant._replace(active=plant.active | bit, learnt=filled)
+
+
+def _added(rows: np.ndarray, curve: LearntCurve) -> np.ndarray:
+    """A stiffness table (`bifa.simulate.tables`) plus a curve."""
+    nodes = np.linspace(rows[0, 0], rows[0, 1], rows.shape[0])
+    added = curve.at(nodes)
+    total = rows.copy()
+    total[1:, 0] += added[:-1]
+    total[1:, 1] += np.diff(added)
+    return sealed(total)

@@ -28,9 +28,8 @@ from bifa.simulate.stepper import (
     X_SMALL_HEAD,
     X_SMALL_TAIL,
     X_TAIL,
-    Mounting,
 )
-from bifa.simulate.timeline import NO_COMMANDS, Timeline, of_gait, timeline
+from bifa.simulate.timeline import NO_COMMANDS, Timeline, of_gait, of_samples, timeline
 
 TOLERANCE_M = 1e-6
 LOAD_CELL_N_M = 5000.0
@@ -97,7 +96,7 @@ def walks(
     flats = [plant(model) for model in models]
     mounted = [rigs.pipe(flat, degrees, terrain) for flat, degrees in zip(flats, inclinations_deg, strict=True)]
     kind, walked = (lanes.WALK, _walked) if states else (lanes.SEEN, _seen)
-    rows = _marched(kind, flats, mounted, commands, times_s, tolerance_m, together)
+    rows = lanes.march(flats, lanes.Experiment(kind, mounted, commands, times_s, _tolerance(tolerance_m)), together)
     return [SimulatedTrial("locomotion", *walked(*one)) for one in zip(flats, commands, rows, times_s, strict=True)]
 
 
@@ -155,7 +154,10 @@ def step_response(
     if command is None:
         raise SimulationError("a step response at given times needs its commands")
     if not isinstance(command, Timeline):
-        command = _timeline_of(time_s, np.asarray(command, dtype=float))
+        command = np.asarray(command, dtype=float)
+        if command.shape != time_s.shape:
+            raise SimulationError("a step response needs one command for each time")
+        command = of_samples(time_s, command[None])
     flat = plant(model)
     supply_psi = flat.q[layout.SUPPLY_POSITIVE] if pressure_psi is None else pressure_psi
     record = step_responses([flat], actuator, [time_s], [command], [supply_psi], tolerance_m)[0]
@@ -175,14 +177,13 @@ def step_responses(
     `together` as in `walks`."""
     flats = [plant(model) for model in models]
     mounted = [rigs.stand(flat, actuator, supply) for flat, supply in zip(flats, pressures_psi, strict=True)]
-    found = _marched(lanes.STEP, flats, mounted, commands, times_s, tolerance_m, together)
-    return [_stepped(*one) for one in zip(flats, found, times_s, strict=True)]
-
-
-def _stepped(flat: Plant, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
-    displacement_m = as_stamped(flat, time_s, rows[0], rows[1])
-    columns = {"time_s": time_s, "displacement_mm": displacement_m * _MM, "pressure_psi": rows[2]}
-    return SimulatedTrial("step_response", columns, {"velocity_m_s": rows[1]})
+    what = lanes.Experiment(lanes.STEP, mounted, commands, times_s, _tolerance(tolerance_m))
+    records = []
+    for flat, time_s, rows in zip(flats, times_s, lanes.march(flats, what, together), strict=True):
+        displacement_m = as_stamped(flat, time_s, rows[0], rows[1])
+        columns = {"time_s": time_s, "displacement_mm": displacement_m * _MM, "pressure_psi": rows[2]}
+        records.append(SimulatedTrial("step_response", columns, {"velocity_m_s": rows[1]}))
+    return records
 
 
 def _shown(command: Timeline, time_s: np.ndarray) -> np.ndarray:
@@ -217,17 +218,7 @@ def static_loadings(
     flats, paths = [plant(model) for model in models], [path / _MM for path in displacements_mm]
     mounted = [rigs.stand(flat, actuator, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
     found = lanes.load(flats, mounted, paths, time_s)
-    return [_loaded(path, rows, time_s) for path, rows in zip(paths, found, strict=True)]
-
-
-def _loaded(path: np.ndarray, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
-    columns = {
-        "time_s": time_s,
-        "displacement_mm": path * _MM,
-        "force_N": rows[0],
-        "pressure_psi": rows[1],
-    }
-    return SimulatedTrial("static_loading", columns)
+    return [_forced("static_loading", time_s, path * _MM, rows) for path, rows in zip(paths, found, strict=True)]
 
 
 def anchor_pull(
@@ -263,35 +254,29 @@ def anchor_pulls(
         raise SimulationError("an anchor pull needs a rate other than 0 and a load cell stiffer than 0 N/m")
     flats = [plant(model) for model in models]
     mounted = [rigs.anchor(flat, psi) for flat, psi in zip(flats, pressures_psi, strict=True)]
-    still = [NO_COMMANDS] * len(flats)
-    pull = {"extended_psi": extended_psi, "rate_m_s": rate_mm_s / _MM, "load_cell_N_m": float(load_cell_N_m)}
-    found = _marched(lanes.ANCHOR, flats, mounted, still, times_s, tolerance_m, together, **pull)
-    return [_pulled(rate_mm_s, *one) for one in zip(found, times_s, strict=True)]
+    what = lanes.Experiment(
+        lanes.ANCHOR,
+        mounted,
+        [NO_COMMANDS] * len(flats),
+        times_s,
+        _tolerance(tolerance_m),
+        extended_psi=extended_psi,
+        rate_m_s=rate_mm_s / _MM,
+        load_cell_N_m=float(load_cell_N_m),
+    )
+    found = lanes.march(flats, what, together)
+    return [
+        _forced("anchor_pull", time_s, abs(rate_mm_s) * time_s, rows, ("wound_N", "holding_N", "kinetic_N"))
+        for time_s, rows in zip(times_s, found, strict=True)
+    ]
 
 
-def _pulled(rate_mm_s: float, rows: np.ndarray, time_s: np.ndarray) -> SimulatedTrial:
-    columns = {
-        "time_s": time_s,
-        "displacement_mm": abs(rate_mm_s) * time_s,
-        "force_N": rows[0],
-        "pressure_psi": rows[1],
-    }
-    return SimulatedTrial("anchor_pull", columns, {"wound_N": rows[2], "holding_N": rows[3], "kinetic_N": rows[4]})
-
-
-def _marched(
-    kind: int,
-    flats: Sequence[Plant],
-    mounted: Sequence[Mounting],
-    commands: Sequence[Timeline],
-    times_s: Sequence[np.ndarray],
-    tolerance_m: float,
-    together: bool,
-    **pull: float,
-) -> list[np.ndarray]:
-    switches = [_switches(one) for one in commands]
-    what = lanes.Experiment(kind, mounted, switches, times_s, _tolerance(tolerance_m), **pull)
-    return lanes.march(flats, what, together)
+def _forced(
+    experiment: str, time_s: np.ndarray, displacement_mm: np.ndarray, rows: np.ndarray, states: Sequence[str] = ()
+) -> SimulatedTrial:
+    """A record whose rows are force, reading, and `states`."""
+    columns = {"time_s": time_s, "displacement_mm": displacement_mm, "force_N": rows[0], "pressure_psi": rows[1]}
+    return SimulatedTrial(experiment, columns, dict(zip(states, rows[2:], strict=True)))
 
 
 def as_stamped(flat: Plant, time_s: np.ndarray, position_m: np.ndarray, velocity_m_s: np.ndarray) -> np.ndarray:
@@ -320,19 +305,3 @@ def _tolerance(value: float) -> float:
     if not 0.0 < value <= 1e-3:
         raise SimulationError(f"tolerance_m = {value!r} is outside its range 0 to 0.001 m")
     return float(value)
-
-
-def _switches(commands: Timeline) -> lanes.Switches:
-    return (
-        np.ascontiguousarray(commands.time_s, dtype=float),
-        np.ascontiguousarray(commands.chamber, dtype=np.int64),
-        np.ascontiguousarray(commands.command, dtype=np.int64),
-    )
-
-
-def _timeline_of(time_s: np.ndarray, command: np.ndarray) -> Timeline:
-    if command.shape != time_s.shape:
-        raise SimulationError("a step response needs one command for each time")
-    state = np.where(np.isnan(command), OFF, command)
-    changes = [0, *(np.flatnonzero(np.diff(state)) + 1)]
-    return timeline((time_s[i], 0, state[i]) for i in changes)

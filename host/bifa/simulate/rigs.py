@@ -43,18 +43,15 @@ def stand(plant: Plant, actuator: str, positive_psi: float) -> Mounting:
         raise SimulationError(f"actuator {actuator!r} is not one of {', '.join(ACTUATORS)}")
     small = plant.q[layout.SMALL + layout.VOLUME]
     parts = HAS_BODY if actuator == "large" else HAS_HEAD
-    return Mounting(parts, 1, 0, 0.0, _pressure(positive_psi), _vacuum(plant), np.array([1.0, small, small]), CLEAR)
+    shares, vacuum = np.array([1.0, small, small]), plant.q[layout.SUPPLY_NEGATIVE]
+    return Mounting(parts, 1, 0, 0.0, _pressure(positive_psi), vacuum, shares, CLEAR)
 
 
 def anchor(plant: Plant, pressure_psi: float) -> Mounting:
     """A head segment in the pipe."""
     segment = _SMALL_ACTUATORS * plant.q[layout.SMALL + layout.VOLUME]
-    shares = np.array([1.0, segment, segment])
-    return Mounting(HAS_HEAD, 1, 1, 0.0, _pressure(pressure_psi), _vacuum(plant), shares, CLEAR)
-
-
-def _vacuum(plant: Plant) -> float:
-    return plant.q[layout.SUPPLY_NEGATIVE]
+    shares, vacuum = np.array([1.0, segment, segment]), plant.q[layout.SUPPLY_NEGATIVE]
+    return Mounting(HAS_HEAD, 1, 1, 0.0, _pressure(pressure_psi), vacuum, shares, CLEAR)
 
 
 def _pressure(value: float) -> float:

@@ -10,7 +10,7 @@ from bifa.simulate import layout
 from bifa.simulate.actuator import area_at, pressure_after, pressure_moved, remember, resistance
 from bifa.simulate.compiled import kernel, merged
 from bifa.simulate.hooks import chains
-from bifa.simulate.march import march, new_run, pressures, shown, start_effects
+from bifa.simulate.march import march, march_through, new_run, pressures, shown, start_effects
 from bifa.simulate.stepper import (
     HAS_BODY,
     P_BODY,
@@ -85,15 +85,12 @@ def step_record(plant, rig, states_of_effects, times, command, sample_times, tol
     run = new_run(states_of_effects)
     under_vacuum(plant, rig, run)
     march(plant, rig, run, 0.0, tolerance)
-    late, order = delayed(plant, times, np.zeros_like(command), command)
+    chamber = np.full_like(command, actuator)
+    late, order = delayed(plant, times, chamber, command)
     out = np.empty((sample_times.size, 3))
     i = 0
     for k in range(sample_times.size):
-        while i < order.size and late[order[i]] <= sample_times[k]:
-            march(plant, rig, run, late[order[i]], tolerance)
-            run.command[actuator] = command[order[i]]
-            i += 1
-        march(plant, rig, run, sample_times[k], tolerance)
+        i = march_through(plant, rig, run, sample_times[k], tolerance, late, order, chamber, command, i)
         step_row(plant, rig, run, out[k])
     return out
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bifa.robot.model import GRAVITY_M_S2
 from bifa.simulate import layout, learnt
 from bifa.simulate.actuator import area_at, convergence, pressure_after, pressure_moved, remember, resistance
 from bifa.simulate.compiled import inner, merged
@@ -28,7 +29,6 @@ HAS_BODY, HAS_HEAD, HAS_TAIL = 1, 2, 4
 # Commands of a chamber
 VACUUM, POSITIVE, OFF = 0, 1, 2
 
-_GRAVITY = 9.80665
 _WALL_COUNT = 3.0  # eq. (7): three actuators a segment
 _LEAST_GROWTH = 0.05  # of the damping: below, the step is too long for the falling part of K
 _ALIKE = 1e-9  # relative difference of two holds that counts as none
@@ -59,7 +59,7 @@ def gravity_of(plant, rig, gravity):
     incline = rig.incline_rad
     if not rig.free:
         incline += chains.incline(plant.active, plant.q)
-    gravity[0], gravity[1] = _GRAVITY * math.sin(incline), _GRAVITY * math.cos(incline)
+    gravity[0], gravity[1] = GRAVITY_M_S2 * math.sin(incline), GRAVITY_M_S2 * math.cos(incline)
 
 
 @merged

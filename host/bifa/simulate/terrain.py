@@ -80,11 +80,7 @@ def obstacles(name: str) -> tuple[Obstacle, ...]:
     return OBSTACLES[name]()
 
 
-def terrain(
-    obstacles: Sequence[Obstacle],
-    supports: Supports = Supports(),
-    robot_length_m: float = CONTRACTED_LENGTH_M,
-) -> np.ndarray:
+def terrain(obstacles: Sequence[Obstacle], supports: Supports = Supports()) -> np.ndarray:
     """(7, n) table for `walk(..., terrain=...)`, over position.
 
     Row 0: start, 1 / spacing; rows 1-4: force in N against head forward, head backward, tail forward, tail backward;
@@ -95,19 +91,19 @@ def terrain(
             raise SimulationError(
                 f"an obstacle of {obstacle.diameter_m * 1e3:g} mm: the robot passes 97 to 147 mm, over more than 0 mm"
             )
-    end = max((o.start_m + o.length_m for o in obstacles), default=0.0) + robot_length_m + _MARGIN_M
+    end = max((o.start_m + o.length_m for o in obstacles), default=0.0) + CONTRACTED_LENGTH_M + _MARGIN_M
     x = np.arange(-_MARGIN_M, end, _SPACING_M)
     rows = np.zeros((7, x.size))
     rows[0, :2] = x[0], 1.0 / _SPACING_M
-    for first, shift in ((1, 0.0), (3, robot_length_m)):
+    for first, shift in ((1, 0.0), (3, CONTRACTED_LENGTH_M)):
         for obstacle in obstacles:
             _add(rows[first : first + 2], rows[5 + first // 2], x - shift, obstacle, supports)
     return rows
 
 
-def passed_at_m(obstacles: Sequence[Obstacle], robot_length_m: float = CONTRACTED_LENGTH_M) -> float:
+def passed_at_m(obstacles: Sequence[Obstacle]) -> float:
     """Displacement of the tail at which the whole robot is behind the last obstacle."""
-    return max(o.start_m + o.length_m for o in obstacles) + robot_length_m
+    return max(o.start_m + o.length_m for o in obstacles) + CONTRACTED_LENGTH_M
 
 
 def _add(forces: np.ndarray, narrowing: np.ndarray, x: np.ndarray, obstacle: Obstacle, supports: Supports) -> None:

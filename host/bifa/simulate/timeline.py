@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from bifa.errors import BifaError
 from bifa.robot import cpg
-from bifa.robot.gait import Gait
+from bifa.robot.gait import Gait, gait_rows
 from bifa.simulate.compiled import kernel
 from bifa.simulate.hooks import chains
 from bifa.simulate.stepper import OFF, POSITIVE, VACUUM
@@ -35,6 +35,10 @@ class Timeline:
     time_s: np.ndarray
     chamber: np.ndarray
     command: np.ndarray
+
+    def __post_init__(self) -> None:  # as compiled code reads them
+        for name, kind in (("time_s", float), ("chamber", np.int64), ("command", np.int64)):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=kind))
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
         """(m, 3) commands in force at times; off before the first."""
@@ -61,8 +65,7 @@ def vented_between(commands: Timeline, dead_time_s: float) -> Timeline:
             else:
                 rows.append((time_s, chamber, command))
             before = command
-    times, chambers, states = (np.array(column) for column in zip(*sorted(rows, key=lambda row: row[0]), strict=True))
-    return Timeline(times, chambers, states.astype(np.int64))
+    return Timeline(*(np.array(column) for column in zip(*sorted(rows, key=lambda row: row[0]), strict=True)))
 
 
 def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
@@ -74,13 +77,12 @@ def timeline(switches: Iterable[Sequence[float]]) -> Timeline:
     chamber, command = rows[:, 1].astype(np.int64), rows[:, 2].astype(np.int64)
     if np.any((chamber < 0) | (chamber > 2) | (command < 0) | (command > 2)):
         raise TimelineError("chambers are 0 (body), 1 (head), 2 (tail); commands 0 (vacuum), 1 (positive), 2 (off)")
-    return Timeline(np.ascontiguousarray(rows[:, 0]), chamber, command)
+    return Timeline(rows[:, 0], chamber, command)
 
 
 def of_gait(gait: Gait, duration_s: float, first_phase_rad: float = 0.0) -> Timeline:
     """Settled switching: phases a constant psi apart from time 0 on, the body at `first_phase_rad`."""
-    row = np.array([[*gait.as_dict().values()]])
-    return gait_switches(row, np.array([duration_s], dtype=float), float(first_phase_rad))[0]
+    return gait_switches(gait_rows([gait]), np.array([duration_s], dtype=float), float(first_phase_rad))[0]
 
 
 def of_phases(

@@ -2,7 +2,9 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -63,14 +65,21 @@ def folders(tmp_path):
     return inputs, outputs
 
 
-def walk_into(number, model, gait, folder):
-    write_dataset(folder, walked({f"round-{number}": gait}, number))
+def stood(gaits: dict[str, Gait], seed: int) -> Dataset:
+    """A robot that does not walk."""
+    still = []
+    for trial in walked(gaits, seed).trials:
+        place_mm = 5.0 * np.sin(2 * np.pi * trial.time_s / trial.gait["period_s"])
+        still.append(replace(trial, columns=dict(trial.columns) | {"displacement_head_mm": place_mm}))
+    return Dataset(None, "walks", {}, tuple(still), {})
+
+
+def walk_into(number, model, gait, folder, walks=walked):
+    write_dataset(folder, walks({f"round-{number}": gait}, number))
     return read_dataset(folder)
 
 
-def fall(number, model, gait, folder):
-    write_dataset(folder, stood(gait, number))
-    return read_dataset(folder)
+fall = partial(walk_into, walks=stood)
 
 
 def rounds_of(folders, first, trades, effects=()):
@@ -81,23 +90,15 @@ def rounds_of(folders, first, trades, effects=()):
     return json.loads((outputs / "rounds.json").read_text())
 
 
-def go_round(folders, first, later, gaits=(FASTER, FASTER)):
-    """The rounds with diagnoses that answer `later` in turn, and the data that they saw."""
-    seen, answers, left, begun, asked = [], iter(later), iter(gaits), [], []
-
-    def complete(dataset, suspected):
-        seen.append([trial.file for trial in dataset.trials])
-        asked.append(suspected)
-        return next(answers), ("hysteresis",)
-
-    def search(model, walked):
-        begun.append(walked)
-        return next(left)
-
+def go_round(folders, first, later):
+    """The rounds with diagnoses that answer `later` in turn, and the data that they saw; each ends at FASTER."""
+    complete, search = Mock(side_effect=[(model, ("hysteresis",)) for model in later]), Mock(return_value=FASTER)
     rounds = rounds_of(folders, first, Trades(complete, search, walk_into))
-    assert begun == [(FASTER, FAST, *gaits[:number]) for number in range(len(begun))], "from all that were walked"
-    assert asked == [(), *[("hysteresis",)] * (len(asked) - 1)], "what was named before is tried again"
-    return rounds, seen
+    begun = [walked for (_, walked), _ in search.call_args_list]
+    assert begun == [(FASTER, FAST, *[FASTER] * number) for number in range(len(later))], "from all that were walked"
+    seen, asked = zip(*(call.args for call in complete.call_args_list), strict=True)
+    assert asked == ((), *[("hysteresis",)] * (len(later) - 1)), "what was named before is tried again"
+    return rounds, [[trial.file for trial in dataset.trials] for dataset in seen]
 
 
 def test_a_robust_gait_that_is_predicted_is_followed_by_the_one_at_the_edge(folders):
@@ -117,12 +118,11 @@ def test_a_robust_gait_that_is_predicted_is_followed_by_the_one_at_the_edge(fold
 
 
 def test_a_gait_that_is_not_is_fed_back_and_the_next_one_judged(folders):
-    rounds, seen = go_round(folders, SLIPPERY, [ROBOT])
+    rounds, (seen,) = go_round(folders, SLIPPERY, [ROBOT])
     assert [r["error_mm"] < 1.1 * r["floor_mm"] for r in rounds] == [False, True]
-    assert len(seen) == 1
-    assert {file.split("/")[0] for file in seen[0]} == {"walks-1"}
-    assert not any("baseline" in file for file in seen[0]), "the bench has walked it for another length of time"
-    assert len(seen[0]) == 6
+    assert sorted(seen) == [f"walks-1/{name}_{n}.csv" for name in ("base", "completed") for n in (1, 2, 3)], (
+        "its walks and the base model's; the bench has walked the baseline for another length of time"
+    )
     walks = read_dataset(folders[1] / "rounds" / "walks-2")
     assert {Gait(**trial.gait) for trial in walks.trials} == {FASTER}
     assert [(Gait(**r["gait"]), r["ended"]) for r in rounds] == [(FAST, None), (FASTER, "predicted")]
@@ -137,28 +137,19 @@ def test_it_ends_where_nothing_changes_any_more(folders):
 
 def test_a_model_that_names_something_is_not_given_up_for_one_that_names_nothing(folders):
     """Choked flow, 800: with the walks among the data nothing was named, and the edge was sought of the base model."""
-    searched = []
-
-    def search(model, walked):
-        searched.append(model)
-        return FASTER
-
+    search = Mock(return_value=FASTER)
     trades = Trades(lambda dataset, suspected: (SLIPPERY, ()), search, walk_into)
     rounds = rounds_of(folders, ROBOT, trades, ("hysteresis",))
     assert [r["effects"] for r in rounds] == [["hysteresis"], ["hysteresis"]]
-    assert searched[0]["mu_k"] == pytest.approx(ROBOT["mu_k"])
+    assert search.call_args_list[0].args[0]["mu_k"] == pytest.approx(ROBOT["mu_k"])
     assert load_model(folders[1] / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"])
 
 
 def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
     """The robot stands still with the gait at the edge: two cycles of it are recorded, fed back, and the next tried."""
-    seen = []
-
-    def complete(dataset, suspected):
-        seen.append(sorted({trial.file.split("/")[0] for trial in dataset.trials}))
-        return ROBOT, ()
-
+    complete = Mock(return_value=(ROBOT, ()))
     rounds = rounds_of(folders, ROBOT, Trades(complete, lambda model, walked: FASTER, fall))
+    seen = [sorted({trial.file.split("/")[0] for trial in call.args[0].trials}) for call in complete.call_args_list]
     assert len(rounds) == ROUNDS
     assert seen == [["walks-1"], ["walks-1", "walks-2"]]
     assert all(abs(r["measured_mm_s"]) < 1.0 and not r["inside"] for r in rounds[1:])
@@ -168,12 +159,8 @@ def test_falling_off_the_edge_is_data_and_loses_nothing(folders):
 def test_a_gait_that_its_own_model_expects_to_fall_is_not_walked(folders):
     """Choked flow, 906: a third diagnosis took a miss of 0.8 % for a tether, and walked what it gave a probability of
     0.16; 20.3 mm/s became 6.4."""
-    answers, gaits = iter([ROBOT, SLIPPERY]), iter([FASTER, None])
-
-    def complete(dataset, suspected):
-        return next(answers), (*suspected, "hysteresis")
-
-    rounds = rounds_of(folders, SLIPPERY, Trades(complete, lambda model, walked: next(gaits), fall))
+    complete = Mock(side_effect=[(robot, ("hysteresis",)) for robot in (ROBOT, SLIPPERY)])
+    rounds = rounds_of(folders, SLIPPERY, Trades(complete, Mock(side_effect=[FASTER, None]), fall))
     assert [(tuple(r["effects"]), r["ended"]) for r in rounds] == [((), None), (("hysteresis",), "falls")]
     assert load_model(folders[1] / "model-last.toml")["mu_k"] == pytest.approx(ROBOT["mu_k"]), "that of the last walk"
     assert load_gait(folders[1] / "gait-last.toml") == FAST
@@ -191,24 +178,10 @@ def test_rounds_that_an_interrupted_run_has_walked_are_neither_sought_nor_walked
 @pytest.mark.parametrize(("probability", "gait"), [(0.97, FASTER), (0.16, None), (None, None)])
 def test_at_the_edge_there_may_be_no_gait(monkeypatch, probability, gait):
     """None walks, or the best of them probably would not."""
-
-    def found(*_):
-        if probability is None:
-            raise SearchError("none of 40 gaits walks")
-        return SimpleNamespace(gait=FASTER, prediction=SimpleNamespace(walks_probability=probability))
-
-    monkeypatch.setattr("bifa.campaign.loop.found_gait", found)
+    found = SimpleNamespace(gait=FASTER, prediction=SimpleNamespace(walks_probability=probability))
+    nothing = SearchError("none of 40 gaits walks")
+    monkeypatch.setattr("bifa.campaign.loop.found_gait", Mock(side_effect=[found if probability else nothing]))
     assert gait_at_edge(ROBOT, 0, lambda what, share: None, (FAST,)) == gait
-
-
-def stood(gait, seed):
-    """A robot that does not walk."""
-    walks = walked({f"round-{seed}": gait}, seed)
-    still = []
-    for trial in walks.trials:
-        place_mm = 5.0 * np.sin(2 * np.pi * trial.time_s / gait.period_s)
-        still.append(replace(trial, columns=dict(trial.columns) | {"displacement_head_mm": place_mm}))
-    return replace(walks, trials=tuple(still))
 
 
 def test_it_ends_with_as_many_rounds_as_there_may_be():

@@ -4,8 +4,8 @@ What computes between them is given: the gaits, and a diagnosis that errs at fir
 """
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -24,7 +24,6 @@ from bifa.robot.gait import BASELINE, Gait, save_gait
 from bifa.simulate import walk
 
 pytestmark = [pytest.mark.uno, pytest.mark.real_time]
-HOST = Path(__file__).parents[2]
 ROBOT = nominal()
 SLIPPERY = ROBOT.with_values({"mu_k": 0.6 * ROBOT.values["mu_k"], "mu_s": 0.6 * ROBOT.values["mu_s"]})
 FAST = Gait(2.72, 204.5, 331.7, 0.6535, 0.439, 0.439)
@@ -64,12 +63,7 @@ def walks(lab, folder, said, stop_at=None):
 
 
 def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, monkeypatch):
-    fed = []
-
-    def diagnosed(dataset, **_):
-        fed.append({trial.file for trial in dataset.trials})
-        return SimpleNamespace(effects=[SimpleNamespace(name="stribeck")], final=ROBOT)
-
+    diagnosed = Mock(return_value=SimpleNamespace(effects=[SimpleNamespace(name="stribeck")], final=ROBOT))
     monkeypatch.setattr(loop, "prepare", lambda dataset: dataset)
     monkeypatch.setattr(loop, "diagnose", diagnosed)
     monkeypatch.setattr(loop, "completed_model", lambda final: final)
@@ -98,6 +92,7 @@ def test_walks_are_measured_go_on_after_a_stop_and_are_fed_back(lab, folder, mon
     assert {Gait(**trial.gait) for trial in read_dataset(folder / "walks-base").trials} == {BASELINE, BRISK}
 
     rounds = json.loads((folder / "rounds.json").read_text())
+    fed = [{trial.file for trial in call.args[0].trials} for call in diagnosed.call_args_list]
     assert fed == [{"walk_1.csv", "walks-1/base_1.csv", "walks-1/completed_1.csv"}]
     assert [(Gait(**one["gait"]), one["effects"]) for one in rounds] == [(FAST, []), (FASTER, ["stribeck"])]
     assert rounds[0]["error_mm"] > 1.5 * rounds[1]["error_mm"]

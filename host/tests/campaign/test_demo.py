@@ -25,17 +25,11 @@ def test_the_baseline_walks_as_fast_as_in_the_paper(tmp_path):
     assert set(trial.columns) >= {"displacement_tail_mm", "pressure_tail_psi", "command_tail"}
 
 
-def run_demo(folder):
-    command = [sys.executable, "-m", "bifa", "demo", "--quick", "--out", str(folder)]
-    return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
-    )
-
-
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_killed_in_the_middle_it_leaves_no_process_and_no_artefact(tmp_path, how):
     folder = tmp_path / "demo"
-    process = run_demo(folder)
+    command = [sys.executable, "-m", "bifa", "demo", "--quick", "--out", folder]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
     while not folder.exists() and process.poll() is None:
         time.sleep(0.05)
     time.sleep(0.5)

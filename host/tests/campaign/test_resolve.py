@@ -1,6 +1,7 @@
 """What a diagnosis could not tell apart is measured and diagnosed again, on the real firmware."""
 
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from typer.testing import CliRunner
@@ -45,17 +46,14 @@ def test_trials_measured_later_are_further_repeats_under_names_of_their_own():
 
 @pytest.mark.uno
 def test_the_experiment_runs_on_the_rig_until_nothing_is_confused(tmp_path):
-    seen = []
-
-    def diagnose(dataset, suspected):
-        seen.append((dataset, suspected))
-        return SimpleNamespace(next=NextExperiment(), effects=())
-
+    diagnose = Mock(return_value=SimpleNamespace(next=NextExperiment(), effects=()))
     found = SimpleNamespace(next=SEPARATING, effects=(SimpleNamespace(name="leak"),))
     dataset, found, ran = resolve(DAY, found, diagnose, lambda n: open_rig("virtual", seed=n), tmp_path)
     assert ran == (SEPARATING,)
     assert found.next.experiment is None
-    assert seen == [(dataset, {"leak", "hysteresis", "viscoelasticity"})], "what was named is tried again"
+    diagnose.assert_called_once_with(
+        dataset, {"leak", "hysteresis", "viscoelasticity"}
+    )  # what was named is tried again
     assert [t.actuator for t in dataset.trials] == ["small"] * 3
     assert dataset.trials[0].columns["displacement_mm"].max() > 25.0
 
@@ -82,10 +80,7 @@ def test_where_it_cannot_resolve_is_said_before_the_diagnosis(diagnosing, tmp_pa
 
 
 def test_the_verdict_is_told_where_the_rig_fails_after_it(diagnosing, monkeypatch, tmp_path):
-    def fails(*_):
-        raise RigError("gone")
-
-    monkeypatch.setattr("bifa.campaign.resolve.resolve", fails)
+    monkeypatch.setattr("bifa.campaign.resolve.resolve", Mock(side_effect=RigError("gone")))
     error, done = diagnosing("--resolve", "--port", "virtual", "--json", str(tmp_path / "verdict.json"))
     assert isinstance(error, RigError)
     assert done == ["diagnosed", "the verdict"]

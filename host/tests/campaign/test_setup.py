@@ -1,6 +1,7 @@
 """A campaign at a bench of one's own: what is known is asked once, and only measuring needs the robot."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 
@@ -19,39 +20,25 @@ from bifa.robot import nominal, save_model
 from bifa.robot.gait import BASELINE, load_gait, save_gait
 
 
-class Answering:
+def answering(*lines):
     """A desk with somebody who says these lines."""
-
-    def __init__(self, *lines):
-        self.lines, self.said = list(lines), []
-
-    def say(self, text):
-        self.said.append(text)
-
-    def ask(self, step, text, about=None):
-        self.say(text)
-
-    def answer(self):
-        return self.lines.pop(0)
-
-    def clear(self):
-        pass
+    return Mock(**{"answer.side_effect": lines})
 
 
 def test_known_values_are_asked_once_and_kept(tmp_path):
     path = tmp_path / "bench.toml"
-    desk = Answering("0.182", "", "9 bar", "8.4", "")
+    desk = answering("0.182", "", "9 bar", "8.4", "")
     known = known_on(path, desk)
     assert known == {"head_mass_kg": 0.182, "supply_positive_psi": 8.4}
-    assert "supply_positive_psi must be a number, not '9 bar'" in "\n".join(desk.said)
-    assert known_on(path, Answering()) == known
+    assert any("supply_positive_psi must be a number, not '9 bar'" in call.args[0] for call in desk.say.call_args_list)
+    assert known_on(path, answering()) == known
     assert len(ASKED) == 4
 
 
 def test_a_bench_that_has_only_declared_its_instruments_is_asked_and_keeps_them(tmp_path):
     path = tmp_path / "bench.toml"
     path.write_text('[instrument.machine]\npreset = "testxpert"\n')
-    assert known_on(path, Answering("0.182", "", "", "")) == {"head_mass_kg": 0.182}
+    assert known_on(path, answering("0.182", "", "", "")) == {"head_mass_kg": 0.182}
     assert read_bench(path) == {"head_mass_kg": 0.182}
     assert read_exports(path)["machine"].columns["force_N"] == "Standardkraft"
 
@@ -84,12 +71,6 @@ def test_a_corrected_mass_is_declared_anew_without_the_robot(tmp_path):
     assert read_dataset(tmp_path / "bench").known == {"head_mass_kg": 0.19}
 
 
-def test_by_hand_only_measuring_stages_are_measured_by_hand():
-    kept = [stage.name for stage in stages_of("/dev/ttyACM0") if stage.by_hand]
-    assert kept == ["measure", "walk-base", "walk-completed", "again"]
-    assert not any(stage.by_hand for stage in stages_of("virtual"))
-
-
 @pytest.fixture
 def own_driver(monkeypatch):
     """A rig of one's own, by its name; what it records is written by `recording`."""
@@ -120,9 +101,16 @@ def test_what_an_own_driver_measured_is_not_measured_again_unasked(own_driver, t
     assert read_dataset(tmp_path / "measured.earlier-1").known
 
 
-def test_every_stage_that_measures_with_an_own_driver_keeps_what_it_measured(own_driver):
-    kept = [stage.name for stage in stages_of(own_driver) if stage.by_hand]
-    assert kept == ["measure", "walk-base", "diagnose", "walk-completed", "again"]
+@pytest.mark.parametrize(
+    ("port", "kept"),
+    [
+        ("/dev/ttyACM0", ["measure", "walk-base", "walk-completed", "again"]),
+        ("my-lab", ["measure", "walk-base", "diagnose", "walk-completed", "again"]),
+        ("virtual", []),
+    ],
+)
+def test_every_stage_that_measures_a_real_robot_keeps_what_it_measured(own_driver, port, kept):
+    assert [stage.name for stage in stages_of(port) if stage.by_hand] == kept
 
 
 def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path):
@@ -134,11 +122,7 @@ def test_a_session_interrupted_after_its_last_trial_is_not_begun_again(tmp_path)
 @pytest.mark.parametrize("model", ["base", "completed"])
 def test_a_model_without_a_gait_ends_no_campaign(tmp_path, monkeypatch, model):
     """What the base model lacks is what the campaign is for, and a robot that does not walk has a diagnosis, too."""
-
-    def nothing_walks(*_):
-        raise SearchError("none walks")
-
-    monkeypatch.setattr(loop, "found_gait", nothing_walks)
+    monkeypatch.setattr(loop, "found_gait", Mock(side_effect=SearchError("none walks")))
     stages = {stage.name: stage for stage in stages_of("virtual")}
     save_model(tmp_path / f"model-{model}.toml", nominal())
     save_gait(tmp_path / "gait-base.toml", BASELINE)

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,101 +22,79 @@ def copier(name, needs, makes, log, text="x", settings=None):
     return Stage(name, name, tuple(needs), (makes,), run, settings or {})
 
 
-def test_a_stage_runs_once_and_again_only_when_something_changed(tmp_path):
-    log = []
-    first, second = copier("a", [], "a.txt", log), copier("b", ["a.txt"], "b.txt", log)
-    run_stages(tmp_path, [first, second])
-    run_stages(tmp_path, [first, second])
-    assert log == ["a", "b"]
-    changed = copier("a", [], "a.txt", log, text="y", settings={"seed": 2})
-    run_stages(tmp_path, [changed, second])
-    assert log == ["a", "b", "a", "b"]
-    assert (tmp_path / "b.txt").read_text() == "yx"
+def writing(files, raises=None, **options):
+    """A stage "measure" that writes these files, name and text, and then raises what it is told to."""
+
+    def run(inputs, outputs):
+        for name, text in files.items():
+            (outputs / name).parent.mkdir(parents=True, exist_ok=True)
+            (outputs / name).write_text(text)
+        if raises is not None:
+            raise raises
+
+    return Stage("measure", "m", (), tuple({name.partition("/")[0] for name in files}), run, **options)
 
 
-def test_a_stage_can_be_rerun_alone_and_the_rest_follows_only_if_its_result_changed(tmp_path):
+def by_hand(text, settings=None):
+    return writing({"data": text}, settings=settings or {}, by_hand=True)
+
+
+def test_a_stage_runs_once_and_again_only_when_asked_or_something_changed(tmp_path):
     log = []
     stages = [copier("a", [], "a.txt", log), copier("b", ["a.txt"], "b.txt", log)]
     run_stages(tmp_path, stages)
-    run_stages(tmp_path, stages, rerun=["a"])
-    assert log == ["a", "b", "a"]
-
-
-def test_an_artefact_that_was_edited_is_made_again(tmp_path):
-    log = []
-    stages = [copier("a", [], "a.txt", log)]
     run_stages(tmp_path, stages)
+    assert log == ["a", "b"]
+    run_stages(tmp_path, stages, rerun=["a"])
+    assert log == ["a", "b", "a"], "what it makes is what it was: the rest does not follow"
     (tmp_path / "a.txt").write_text("edited")
     run_stages(tmp_path, stages)
+    assert log == ["a", "b", "a", "a"]
     assert (tmp_path / "a.txt").read_text() == "x"
+    run_stages(tmp_path, [copier("a", [], "a.txt", log, text="y", settings={"seed": 2}), stages[1]])
+    assert log == ["a", "b", "a", "a", "a", "b"]
+    assert (tmp_path / "b.txt").read_text() == "yx"
 
 
 def test_a_failing_stage_leaves_the_old_artefact_and_no_scratch(tmp_path):
-    log = []
-    run_stages(tmp_path, [copier("a", [], "a.txt", log)])
-
-    def fail(inputs, outputs):
-        (outputs / "a.txt").write_text("half")
-        raise RuntimeError("power cut")
-
+    run_stages(tmp_path, [writing({"a.txt": "x"})])
     with pytest.raises(RuntimeError, match="power cut"):
-        run_stages(tmp_path, [Stage("a", "a", (), ("a.txt",), fail, {"seed": 3})])
+        run_stages(tmp_path, [writing({"a.txt": "half"}, RuntimeError("power cut"), settings={"seed": 3})])
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.txt", PROVENANCE]
     assert (tmp_path / "a.txt").read_text() == "x"
 
 
-def test_a_stage_that_does_not_make_what_it_promised_is_an_error(tmp_path):
-    with pytest.raises(StageError, match=r"without making a\.txt"):
-        run_stages(tmp_path, [Stage("a", "a", (), ("a.txt",), lambda i, o: None)])
-
-
-def test_a_missing_input_and_an_unknown_stage_are_named(tmp_path):
-    log = []
-    with pytest.raises(StageError, match=r"needs a\.txt"):
-        run_stages(tmp_path, [copier("b", ["a.txt"], "b.txt", log)])
-    with pytest.raises(StageError, match="no stage is called z"):
-        run_stages(tmp_path, [copier("a", [], "a.txt", log)], rerun=["z"])
+@pytest.mark.parametrize(
+    ("stages", "rerun", "told"),
+    [
+        ([Stage("a", "a", (), ("a.txt",), lambda i, o: None)], [], r"without making a\.txt"),
+        ([copier("b", ["a.txt"], "b.txt", [])], [], r"needs a\.txt"),
+        ([copier("a", [], "a.txt", [])], ["z"], "no stage is called z"),
+    ],
+    ids=["it does not make what it promised", "an input is missing", "it is unknown"],
+)
+def test_a_stage_that_cannot_run_is_an_error(tmp_path, stages, rerun, told):
+    with pytest.raises(StageError, match=told):
+        run_stages(tmp_path, stages, rerun=rerun)
 
 
 def test_folders_are_artefacts_too_and_provenance_is_the_same_for_the_same_settings(tmp_path):
-    def run(inputs, outputs):
-        (outputs / "data").mkdir()
-        (outputs / "data" / "one.csv").write_text("1\n")
-
-    stage = Stage("measure", "measure", (), ("data",), run, {"seed": 1})
     for name in ("one", "two"):
-        run_stages(tmp_path / name, [stage])
+        run_stages(tmp_path / name, [writing({"data/one.csv": "1\n"}, settings={"seed": 1})])
     records = [(tmp_path / name / PROVENANCE).read_bytes() for name in ("one", "two")]
     assert records[0] == records[1]
     assert json.loads(records[0])["stages"]["measure"]["artefacts"]["data"]
 
 
-def test_a_damaged_provenance_is_refused_with_advice(tmp_path):
-    (tmp_path / PROVENANCE).write_text("{")
-    with pytest.raises(StageError, match="choose another folder"):
-        run_stages(tmp_path, [])
-
-
-def test_a_stage_that_resumes_finds_what_an_interrupted_run_left(tmp_path):
-    def run(inputs, outputs):
-        marker = outputs / "trial_1"
-        if not marker.exists():
-            marker.write_text("recorded")
-            raise KeyboardInterrupt
-        (outputs / "data").write_text("whole")
-
-    stage = Stage("measure", "measure", (), ("data",), run, resumes=True)
-    with pytest.raises(KeyboardInterrupt):
-        run_stages(tmp_path, [stage])
-    assert not (tmp_path / "data").exists()
-    run_stages(tmp_path, [stage])
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["data", PROVENANCE]
-
-
-def by_hand(text, settings=None):
-    return Stage(
-        "measure", "m", (), ("data",), lambda i, o: (o / "data").write_text(text), settings or {}, by_hand=True
-    )
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [(PROVENANCE, "{", "choose another folder"), ("dataset.toml", "mine", "is a data set; choose another folder")],
+    ids=["a damaged provenance", "a data set"],
+)
+def test_a_folder_that_is_none_of_a_campaign_is_refused_with_advice(tmp_path, name, text, told):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(StageError, match=told):
+        run_stages(tmp_path, [writing({"data/one.csv": "made"})])
 
 
 def test_what_somebody_measured_is_measured_again_only_on_request_and_kept_beside(tmp_path, monkeypatch):
@@ -132,28 +109,14 @@ def test_what_somebody_measured_is_measured_again_only_on_request_and_kept_besid
     assert (tmp_path / "data.earlier-1").read_text() == "monday"
 
 
-def folder_maker(makes="data", text="made", **options):
-    def run(inputs, outputs):
-        (outputs / makes).mkdir()
-        (outputs / makes / "one.csv").write_text(text)
-
-    return Stage("measure", "m", (), (makes,), run, **options)
-
-
 def test_what_the_campaign_did_not_make_is_refused_before_any_stage_runs(tmp_path):
     log = []
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "dataset.toml").write_text("mine")
     with pytest.raises(StageError, match=r"data was not made by .*choose another folder"):
-        run_stages(tmp_path, [copier("a", [], "a.txt", log), folder_maker()], rerun=["measure"])
+        run_stages(tmp_path, [copier("a", [], "a.txt", log), writing({"data/one.csv": "made"})], rerun=["measure"])
     assert log == []
     assert (tmp_path / "data" / "dataset.toml").read_text() == "mine"
-
-
-def test_a_campaign_does_not_run_inside_a_data_set(tmp_path):
-    (tmp_path / "dataset.toml").write_text("mine")
-    with pytest.raises(StageError, match="is a data set; choose another folder"):
-        run_stages(tmp_path, [folder_maker()])
 
 
 def test_what_appears_while_a_stage_runs_is_not_replaced(tmp_path):
@@ -167,10 +130,10 @@ def test_what_appears_while_a_stage_runs_is_not_replaced(tmp_path):
 
 
 def test_another_campaigns_artefact_is_replaced_but_not_what_another_kind_of_bench_measured(tmp_path):
-    run_stages(tmp_path, [folder_maker("bench")])
-    declare = Stage("declare", "d", (), ("bench",), folder_maker("bench", "declared").run)
+    run_stages(tmp_path, [writing({"bench/one.csv": "made"})])
+    declare = replace(writing({"bench/one.csv": "declared"}), name="declare")
     with pytest.raises(StageError, match="bench was not made by the stage declare"):
-        run_stages(tmp_path, [folder_maker("measured"), declare])
+        run_stages(tmp_path, [writing({"measured/one.csv": "made"}), declare])
     run_stages(tmp_path, [declare])
     assert (tmp_path / "bench" / "one.csv").read_text() == "declared"
 
@@ -233,6 +196,7 @@ def test_a_stage_goes_on_only_with_what_was_begun_alike(tmp_path, seed, found):
         run_stages(tmp_path, [stopping(log, {"seed": 1})])
     run_stages(tmp_path, [stopping(log, {"seed": seed})])
     assert log == [[], found]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["data", PROVENANCE]
 
 
 def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, monkeypatch):
@@ -250,34 +214,23 @@ def test_what_somebody_has_begun_to_measure_is_neither_mixed_nor_lost(tmp_path, 
 
 def test_settings_that_differ_are_refused_with_what_would_be_lost_and_what_would_not(tmp_path):
     """Nobody is told to delete trials of hours."""
-
-    def run(inputs, outputs):
-        for trial in range(16):
-            file = outputs / "measured.partial" / f"step_{trial}.csv"
-            file.parent.mkdir(exist_ok=True)
-            file.write_text("time_s\n0\n")
-        raise KeyboardInterrupt
-
-    def stage(quick):
-        return Stage("measure", "m", (), ("measured",), run, {"quick": quick}, resumes=True, by_hand=True)
-
+    files = {"measured.partial/step_1.csv": "time_s\n0\n", "measured.partial/step_2.csv": "time_s\n0\n"}
+    begun = replace(writing(files, KeyboardInterrupt, resumes=True, by_hand=True), makes=("measured",))
     with pytest.raises(KeyboardInterrupt):
-        run_stages(tmp_path, [stage(False)])
+        run_stages(tmp_path, [replace(begun, settings={"quick": False})])
     with pytest.raises(StageError) as refused:
-        run_stages(tmp_path, [stage(True)])
+        run_stages(tmp_path, [replace(begun, settings={"quick": True})])
     assert str(refused.value) == (
-        f"{tmp_path / '.measure-unfinished'} holds 16 trials of the stage measure, begun with quick = False, not True: "
+        f"{tmp_path / '.measure-unfinished'} holds 2 trials of the stage measure, begun with quick = False, not True: "
         "resume with the original settings, or choose another folder for a new campaign (both are then kept)"
     )
-    assert len(list((tmp_path / ".measure-unfinished").rglob("*.csv"))) == 16
+    assert all((tmp_path / ".measure-unfinished" / name).exists() for name in files)
 
 
 def test_another_input_of_what_was_begun_by_hand_is_named(tmp_path):
-    log = []
-    gait = copier("gait", [], "gait.toml", [])
-    walk = replace(stopping(log, {}, by_hand=True), needs=("gait.toml",))
+    walk = replace(stopping([], {}, by_hand=True), needs=("gait.toml",))
     with pytest.raises(KeyboardInterrupt):
-        run_stages(tmp_path, [gait, walk])
+        run_stages(tmp_path, [copier("gait", [], "gait.toml", []), walk])
     with pytest.raises(StageError, match=r"was begun with another gait\.toml"):
         run_stages(tmp_path, [copier("gait", [], "gait.toml", [], "y", {"seed": 2}), walk])
 
@@ -287,24 +240,15 @@ def test_what_was_kept_before_is_never_replaced_though_some_of_it_is_gone(tmp_pa
         run_stages(tmp_path, [by_hand(text)], rerun=["measure"])
     (tmp_path / "data.earlier-1").unlink()
     run_stages(tmp_path, [by_hand("4")], rerun=["measure"])
-    assert {p.name: p.read_text() for p in tmp_path.glob("data*")} == {
-        "data": "4",
-        "data.earlier-2": "2",
-        "data.earlier-3": "3",
-    }
+    kept = {p.name: p.read_text() for p in tmp_path.glob("data*")}
+    assert kept == {"data": "4", "data.earlier-2": "2", "data.earlier-3": "3"}
 
 
 def measured(text="1,2\n"):
     """A stage that measures a data set of one trial, with the instrument's own record of it."""
-
-    def run(inputs, outputs):
-        folder = outputs / "data"
-        (folder / "raw").mkdir(parents=True)
-        (folder / "dataset.toml").write_text('format = 1\n[[trial]]\nfile = "one.csv"\n')
-        (folder / "one.csv").write_text(text)
-        (folder / "raw" / "one.csv").write_text("as it came")
-
-    return Stage("measure", "m", (), ("data",), run, by_hand=True)
+    table = 'format = 1\n[[trial]]\nfile = "one.csv"\n'
+    files = {"data/dataset.toml": table, "data/one.csv": text, "data/raw/one.csv": "as it came"}
+    return writing(files, by_hand=True)
 
 
 STRAYS = (".DS_Store", "Thumbs.db", ".~lock.one.csv#", "._one.csv", "~$one.xlsx", "raw/.DS_Store", "notes.txt")
@@ -319,26 +263,20 @@ def test_a_stray_file_among_what_was_measured_measures_nothing_again(tmp_path, s
     assert ran == [False]
 
 
-@pytest.mark.parametrize("file", ["one.csv", "dataset.toml", "raw/one.csv"])
-def test_where_what_was_measured_differs_the_robot_does_not_move_unasked(tmp_path, file):
+@pytest.mark.parametrize("file", ["one.csv", "dataset.toml", "raw/one.csv", ""])
+def test_where_what_was_measured_differs_or_is_gone_the_robot_does_not_move_unasked(tmp_path, file):
     run_stages(tmp_path, [measured()])
-    for spoil in (
-        lambda path: path.write_text('format = 1\n[[trial]]\nfile = "two.csv"\n'),
-        lambda path: path.unlink(),
-    ):
-        spoil(tmp_path / "data" / file)
+    place = tmp_path / "data" / file
+    if file:
+        place.write_text('format = 1\n[[trial]]\nfile = "two.csv"\n')
         with pytest.raises(StageError, match=r"data in .* is not what .*measured .*--rerun measure"):
             run_stages(tmp_path, [measured("another day\n")])
+    place.rename(tmp_path / "gone")
+    with pytest.raises(StageError, match=r"data in .* is not what .*measured .*--rerun measure"):
+        run_stages(tmp_path, [measured("another day\n")])
     run_stages(tmp_path, [measured("another day\n")], rerun=["measure"])
     assert (tmp_path / "data" / "one.csv").read_text() == "another day\n"
-    assert (tmp_path / "data.earlier-1").exists()
-
-
-def test_what_was_measured_and_is_gone_altogether_is_asked_for(tmp_path):
-    run_stages(tmp_path, [measured()])
-    shutil.rmtree(tmp_path / "data")
-    with pytest.raises(StageError, match="--rerun measure"):
-        run_stages(tmp_path, [measured()])
+    assert (tmp_path / "data.earlier-1").exists() == bool(file)
 
 
 def test_what_an_earlier_version_recorded_of_a_data_set_still_holds(tmp_path):

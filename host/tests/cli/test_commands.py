@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import nullcontext
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 import typer
@@ -147,10 +148,7 @@ def test_what_only_lists_imports_nothing_that_takes_seconds(tmp_path):
 
 
 def test_ctrl_c_says_what_became_of_the_work(monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("bifa.data.read_dataset", interrupted)
+    monkeypatch.setattr("bifa.data.read_dataset", Mock(side_effect=KeyboardInterrupt))
     result = invoke("check", ".")
     assert result.exit_code == 130
     assert "Interrupted. Finished results are listed above" in result.output
@@ -219,12 +217,15 @@ def test_ctrl_c_while_the_command_is_loaded_ends_it_without_a_traceback(tmp_path
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
-@pytest.mark.parametrize("width", [60, 200])
+@pytest.mark.parametrize("width", [60, 80, 200])
 def test_the_gaits_are_listed_whole_on_any_terminal(width):
     said = invoke("gaits", columns=width).output
+    lines = said.partition("files:")[0].splitlines()
     assert "…" not in said
-    assert max(map(len, said.partition("files:")[0].splitlines())) <= width
+    assert max(map(len, lines)) <= width
     assert all(figure in said for figure in ("speed", "period", "23.5", "208, 334", "0.65, 0.43,"))
+    in_a_line = ("robust", "197, 323", "0.65, 0.43, 0.43")
+    assert width < 80 or any(all(figure in line for figure in in_a_line) for line in lines)
 
 
 EXPERIMENT = ["experiment", "--out", "{missing}"]
@@ -239,6 +240,8 @@ EXPERIMENT = ["experiment", "--out", "{missing}"]
         (["upload", "{here}", "--seconds", "3", "--port", "nowhere"], "--seconds requires --run"),
         (["compare", "{here}"], "two campaigns or more"),
         (["gaits", "--seed", "0"], "--seed requires --make"),
+        (["gaits", "--out", "{folder}"], "--out requires --make"),
+        (["gaits", "--model", "{here}"], "--model requires --make"),
         (["simulate", "--buckling", "5"], "--buckling requires --obstacle"),
         (["diagnose", "{folder}", "--port", "nowhere", "--watch", "x"], "--port and --watch require --resolve"),
         (["diagnose", "{folder}", "--resolve", "--port", "virtual", "--watch", "x"], "--watch requires a serial port"),

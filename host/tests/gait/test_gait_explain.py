@@ -25,7 +25,7 @@ def test_the_three_reasons_of_the_paper(both):
     assert after.speed_mm_s > 2 * before.speed_mm_s
     # More time for contraction, since it takes longer.
     assert after.contraction_s > 1.5 * after.extension_s
-    assert after.contraction_share > 0.6
+    assert after.gait.duty_body > 0.6
     # The ends are told to anchor closer to the body's switches.
     assert 0 < after.tail_lead_s < 0.5 * before.tail_lead_s
     assert 0 < after.head_lead_s < 0.5 * before.head_lead_s

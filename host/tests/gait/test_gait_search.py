@@ -5,22 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.gait import Metric, SearchError, Settings, library, optimize, paper_space, simulations
+from bifa.cluster import ClusterError
+from bifa.gait import Metric, SearchError, Settings, library, optimize, simulations
 from bifa.gait.methods import METHODS, Evaluated
 from bifa.gait.objectives import NominalSpeed, RobustSpeed, distribution
-from bifa.gait.search import (
-    EXPLORE,
-    VERIFYING_DRAWS,
-    best_of_finalists,
-    explore_on_robots,
-    on_robots,
-    possible_robots,
-)
+from bifa.gait.search import EXPLORE, VERIFYING_DRAWS, SearchRun, best_of_finalists, explore_on_robots
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Gait, nominal
 from bifa.simulate import gait_rows, plant
 
-ROBUST = np.array([[2.7, 193.0, 325.0, 0.655, 0.428, 0.428]])
+ROBUST = Gait(2.7, 193.0, 325.0, 0.655, 0.428, 0.428)
+SPACE = Settings().space
+
+
+def verified(model, runs, points, spread, values=None):
+    """The finalist of these points, and its speed."""
+    found = Evaluated(points, np.ones(len(points)) if values is None else values)
+    return best_of_finalists(SearchRun(model, runs, spread_of(model, spread), Settings()), found, found)
 
 
 def test_the_baseline_has_the_papers_speed(runs, nominal_plant):
@@ -41,13 +42,16 @@ def test_a_short_nominal_search_doubles_the_baseline_and_stands_verification(run
 
 def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nominal_plant):
     draws = spread_of(nominal()).plants(nominal(), 32, seed=5)
-    metric, space = Metric().quicker(), paper_space()
-    points = np.array([space.point(space.gaits(space.point(gait_of(row))[None])[0]) for row in near(ROBUST[0])])
-    objective = RobustSpeed(runs, nominal_plant, draws, space, metric, share=0.05)
+    metric = Metric().quicker()
+    near = np.array([[*ROBUST.as_dict().values()]]) * (
+        1 + 0.01 * np.random.default_rng(0).normal(size=(8, 5))[:, [0, 1, 2, 3, 4, 4]]
+    )
+    points = np.array([SPACE.point(Gait(*row)) for row in near.tolist()])
+    objective = RobustSpeed(runs, nominal_plant, draws, SPACE, metric, share=0.05)
     robust = objective(points)
-    rows = gait_rows(space.gaits(points))
+    rows = gait_rows(SPACE.gaits(points))
     speeds = np.sort(distribution(runs, draws, rows, metric), axis=1)
-    alone = NominalSpeed(runs, nominal_plant, space, metric)(points)
+    alone = NominalSpeed(runs, nominal_plant, SPACE, metric)(points)
     exact = np.minimum(speeds[:, 1], alone)  # the second smallest of 32
     best = int(np.argmax(exact))
     assert robust[best] == pytest.approx(exact[best])
@@ -60,28 +64,16 @@ def test_robust_objective_is_the_order_statistic_of_the_distribution(runs, nomin
 
 
 def test_a_gait_that_walks_by_a_hair_of_its_period_does_not_count_where_periods_jitter(runs, nominal_plant):
-    metric, space = Metric().quicker(), paper_space()
-    draws = [nominal_plant] * 16
-    exact, jittered = (RobustSpeed(runs, nominal_plant, draws, space, metric, jitter=jitter) for jitter in (0.0, 0.005))
-    point = space.point(library.load("fast").gait)[None]
-    copies = np.concatenate([space.slower(point, share) for share in np.arange(0.02, -0.03, -0.001)])
+    among = (runs, nominal_plant, [nominal_plant] * 16, SPACE, Metric().quicker())
+    exact, jittered = (RobustSpeed(*among, jitter=jitter) for jitter in (0.0, 0.005))
+    point = SPACE.point(library.load("fast").gait)[None]
+    copies = np.concatenate([SPACE.slower(point, share) for share in np.arange(0.02, -0.03, -0.001)])
     walks = exact(copies) > 20.0
     last = int(np.argmin(walks)) - 1  # one step of 0.1 % before the first copy that does not
     assert last >= 10
     assert jittered(copies[last][None])[0] < 0.5 * exact(copies[last][None])[0]
     well = copies[last - 8][None]  # 0.8 % slower
     assert jittered(well)[0] == pytest.approx(exact(well)[0], rel=2e-3)
-
-
-def near(row):
-    rng = np.random.default_rng(0)
-    return row * (1 + 0.01 * rng.normal(size=(8, 5))[:, [0, 1, 2, 3, 4, 4]])
-
-
-def gait_of(row):
-    from bifa.robot.gait import Gait
-
-    return Gait(*row.tolist())
 
 
 def test_a_robot_that_cannot_walk_is_said_so(runs):
@@ -94,22 +86,23 @@ def test_a_robot_that_cannot_walk_is_said_so(runs):
 def test_where_the_fastest_gait_falls_the_climb_begins_at_its_slower_copies(runs):
     """Most of the fast basin is beyond the cliff of some robots, where a robust objective is 0 and nothing leads up:
     of a robot whose valves choke a search ended at 8.5 mm/s in place of 18."""
-    settings, spread = Settings(), spread_of(nominal(), 0.02)
-    fast = settings.space.point(library.load("fast").gait)[None]
-    assert on_robots(nominal(), runs, spread, settings, EXPLORE, 0)(fast)[0] < 2.0
-    found = explore_on_robots(nominal(), runs, spread, Evaluated(fast, np.ones(1)), settings, lambda *_: None)
+    search = SearchRun(nominal(), runs, spread_of(nominal(), 0.02), Settings())
+    fast = SPACE.point(library.load("fast").gait)[None]
+    assert search.objective(EXPLORE, 0)(fast)[0] < 2.0
+    found = explore_on_robots(search, Evaluated(fast, np.ones(1)))
     assert found.best_value > 20.0
 
 
 def test_a_gait_that_never_is_periodic_to_a_thousandth_counts_in_a_robust_search(runs):
     """A tether is longer by every cycle, and the feet slip by microns: a gait that had walked at 23.2 mm/s counted 0,
     and the search ended at 22.7."""
-    dragging, settings = nominal().with_effects({"tether_drag": {"drag_N_m": 1.0}}), Settings()
-    row = np.array([[2.68, 213.8, 349.96, 0.6433, 0.4655, 0.4655]])
-    strict = [runs.judged([plant(dragging)], np.zeros(1, int), row, m) for m in (Metric(), Metric().finer())]
-    assert all(one.refused[0] and one.speed_mm_s[0] > 22.0 for one in strict)
-    known = Evaluated(settings.space.nearest([Gait(*row[0])]), np.ones(1))
-    _, speed = best_of_finalists(dragging, runs, spread_of(dragging, 0.001), known, known, settings, lambda *_: None)
+    dragging = nominal().with_effects({"tether_drag": {"drag_N_m": 1.0}})
+    walked = Gait(2.68, 213.8, 349.96, 0.6433, 0.4655, 0.4655)
+    for metric in (Metric(), Metric().finer()):
+        strict = runs.judged([plant(dragging)], np.zeros(1, int), gait_rows([walked]), metric)
+        assert strict.refused[0]
+        assert strict.speed_mm_s[0] > 22.0
+    _, speed = verified(dragging, runs, SPACE.nearest([walked]), 0.001)
     assert speed > 22.0
 
 
@@ -128,26 +121,22 @@ def test_a_search_ends_no_slower_than_the_gaits_that_it_begins_from(runs, robust
 def test_a_gait_beyond_the_cliff_gives_way_to_a_slower_copy(runs):
     """With a spread of 1 % a search on few robots ended at gaits that fail one robot in ten: 10th percentile 0."""
     sloping = nominal().with_effects({"inclination": {"angle_deg": 5.0}})
-    settings, spread = Settings(spread=0.01), spread_of(sloping, 0.01)
-    brittle = settings.space.slower(settings.space.point(library.load("robust").gait)[None], -0.04)
-    metric = settings.metric
-    draws = spread.plants(sloping, 128, seed=99)
-    before = distribution(runs, draws, gait_rows(settings.space.gaits(brittle)), metric)
-    assert np.quantile(before, 0.1) < 1.0
-    found = Evaluated(brittle, np.ones(1))
-    gait, speed = best_of_finalists(sloping, runs, spread, found, found, settings, lambda *_: None)
-    after = distribution(runs, draws, gait_rows([gait]), metric)
-    assert np.quantile(after, 0.1) > 0.95 * speed > 20.0
+    brittle = SPACE.slower(SPACE.point(library.load("robust").gait)[None], -0.04)
+    gait, speed = verified(sloping, runs, brittle, 0.01)
+    draws = spread_of(sloping, 0.01).plants(sloping, 128, seed=99)
+    speeds = distribution(runs, draws, gait_rows([*SPACE.gaits(brittle), gait]), Settings().metric)
+    before, after = np.quantile(speeds, 0.1, axis=1)
+    assert before < 1.0
+    assert after > 0.95 * speed > 20.0
 
 
 @pytest.mark.parametrize("elsewhere", [["robust"], []], ids=["the others are asked", "slower copies are"])
 def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere):
     """Of a viscoelastic robot one seed in four found no gait: all finalists lay beyond the same cliff, where the robot
     creeps at best. With a tether drag one seed in five had none elsewhere either."""
-    space = Settings().space
-    fallen = space.slower(space.point(library.load("fast").gait)[None], -0.02)
+    fallen = SPACE.slower(SPACE.point(library.load("fast").gait)[None], -0.02)
     near = 0.0035 * np.array([[0.0, row, column, 0.0, 0.0] for row in range(8) for column in range(9)])
-    points = np.vstack([fallen + near, *(space.point(library.load(name).gait) for name in elsewhere)])
+    points = np.vstack([fallen + near, *(SPACE.point(library.load(name).gait) for name in elsewhere)])
     found = Evaluated(points, np.r_[np.full(len(near), 25.0), np.full(len(elsewhere), 22.0)])
     monkeypatch.setitem(METHODS, "cma", lambda *_: found)
     assert optimize(nominal(), runs, Settings(robust=False, refine=False)).nominal_mm_s > 21.0
@@ -156,37 +145,26 @@ def test_where_all_gaits_of_one_place_fall(runs, monkeypatch, elsewhere):
 def test_a_gait_of_which_no_cycle_is_like_the_one_before_counts_where_none_can_be(runs, monkeypatch):
     """On a supply that ripples a search kept to the few gaits whose period the ripple divides: 18.5 mm/s, not 22.8."""
     rippling = nominal().with_effects({"regulator_ripple": {}})
-    space = Settings().space
-    found = Evaluated(space.slower(space.point(library.load("robust").gait)[None], 0.02), np.array([22.0]))
+    found = Evaluated(SPACE.slower(SPACE.point(library.load("robust").gait)[None], 0.02), np.array([22.0]))
     monkeypatch.setitem(METHODS, "cma", lambda *_: found)
     assert optimize(rippling, runs, Settings(robust=False, refine=False)).nominal_mm_s > 20.0
+    monkeypatch.setattr(Metric, "of_unlike_cycles", lambda self: self)  # cycles have to agree, whatever the robot
     with pytest.raises(SearchError):
-        optimize(rippling, runs, Settings(robust=False, refine=False, metric=Strict()))
-
-
-class Strict(Metric):
-    """Cycles have to agree, whatever the robot."""
-
-    def of_unlike_cycles(self) -> Metric:
-        return self
+        optimize(rippling, runs, Settings(robust=False, refine=False))
 
 
 def test_a_gait_that_falls_on_the_model_itself_is_not_taken_for_one_that_stands(runs):
     """Nearly all robots were as fast as the model there, which was not walking either."""
-    settings, spread = Settings(spread=0.001), spread_of(nominal(), 0.001)
-    fallen = settings.space.slower(settings.space.point(library.load("fast").gait)[None], -0.02)
-    rows = gait_rows(settings.space.gaits(fallen))
-    assert distribution(runs, [plant(nominal())], rows, Metric())[0, 0] < 2.0
-    found = Evaluated(fallen, np.ones(1))
-    _, speed = best_of_finalists(nominal(), runs, spread, found, found, settings, lambda *_: None)
+    fallen = SPACE.slower(SPACE.point(library.load("fast").gait)[None], -0.02)
+    assert distribution(runs, [plant(nominal())], gait_rows(SPACE.gaits(fallen)), Metric())[0, 0] < 2.0
+    _, speed = verified(nominal(), runs, fallen, 0.001)
     assert speed > 20.0
 
 
 def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that_keeps_it(runs, monkeypatch):
     """Of one supply that sags 8.5 % of 512 robots were just as fast as promised, and 10 % of 1,024 were not."""
-    settings, spread = Settings(), spread_of(nominal(), 0.001)
-    point = settings.space.point(library.load("robust").gait)
-    lucky = np.vstack([point, settings.space.slower(point[None], 0.03)])
+    point = SPACE.point(library.load("robust").gait)
+    lucky = np.vstack([point, SPACE.slower(point[None], 0.03)])
     fastest: list[float] = []
 
     def checked(runs, draws, rows, metric):
@@ -195,8 +173,7 @@ def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that
         return np.full((1, len(draws)), 0.9 * speed if len(fastest) == 1 else speed)
 
     monkeypatch.setattr("bifa.gait.search.distribution", checked)
-    found = Evaluated(lucky, np.array([2.0, 1.0]))
-    gait, _ = best_of_finalists(nominal(), runs, spread, found, found, settings, lambda *_: None)
+    gait, _ = verified(nominal(), runs, lucky, 0.001, np.array([2.0, 1.0]))
     assert len(fastest) > 1
     assert gait.period_s != fastest[0]
 
@@ -204,19 +181,16 @@ def test_a_finalist_that_keeps_less_than_the_best_promised_gives_way_to_one_that
 @pytest.mark.slow
 def test_where_no_gait_suits_nine_robots_in_ten_the_best_is_given(runs):
     """Half the robots of a 20 % spread cannot walk at such speeds: no error, and not just any gait."""
-    settings, spread = Settings(spread=0.2), spread_of(nominal(), 0.2)
-    points = np.array([settings.space.point(library.load(name).gait) for name in ("fast", "robust")])
-    found = Evaluated(points, np.ones(2))
-    gait, speed = best_of_finalists(nominal(), runs, spread, found, found, settings, lambda *_: None)
+    points = np.array([SPACE.point(library.load(name).gait) for name in ("fast", "robust")])
+    gait, speed = verified(nominal(), runs, points, 0.2)
     assert speed > 20.0
     assert gait.period_s > points[:, 0].max() * 2.0 + 2.0
 
 
 def test_slower_copies_keep_to_the_space():
-    space = paper_space()
     points = np.array([[0.5, 0.1, 0.2, 0.3, 0.4], [0.99, 0.1, 0.2, 0.3, 0.4]])
-    slower = space.slower(points, 0.1)
-    assert [gait.period_s for gait in space.gaits(slower)] == pytest.approx([3.3, 4.0])
+    slower = SPACE.slower(points, 0.1)
+    assert [gait.period_s for gait in SPACE.gaits(slower)] == pytest.approx([3.3, 4.0])
     np.testing.assert_array_equal(slower[:, 1:], points[:, 1:])
 
 
@@ -249,27 +223,16 @@ def test_five_seeds_agree_and_reach_what_is_required(runs, robust):
     assert np.ptp(speeds) <= 0.01 * speeds.mean()
 
 
-def test_a_dask_cluster_gives_the_same_gait():
+def test_a_dask_cluster_gives_the_same_speeds(runs, nominal_plant):
     distributed = pytest.importorskip("distributed")
-    settings = Settings(method="cma", robust=False, evaluations=60, seed=1, refine=False)
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
-        simulations(dask=cluster.scheduler_address) as remote,
-    ):
-        there = distributed_sample(remote, settings)
-    with simulations() as here:
-        np.testing.assert_array_equal(there, distributed_sample(here, settings))
-
-
-def distributed_sample(pool, settings):
-    points = np.random.default_rng(settings.seed).random((24, 5))
-    objective = NominalSpeed(pool, plant(nominal()), settings.space, settings.metric)
-    return objective(points)
+    points = np.random.default_rng(1).random((24, 5))
+    local = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**local) as cluster, simulations(dask=cluster.scheduler_address) as remote:
+        there, here = (NominalSpeed(pool, nominal_plant, SPACE, Metric())(points) for pool in (remote, runs))
+    np.testing.assert_array_equal(there, here)
 
 
 def test_no_scheduler_and_no_workers_are_named():
-    from bifa.cluster import ClusterError
-
     with pytest.raises(ClusterError, match="no dask scheduler answers at"), simulations(dask="nonsense://x"):
         pass
 
@@ -277,14 +240,13 @@ def test_no_scheduler_and_no_workers_are_named():
 def test_robots_that_do_not_walk_with_a_gait_that_is_known_to_walk_are_none_of_those_it_may_be(runs):
     """Stribeck friction, 830: by the covariance alone a fifth stood still with gaits that had been walked, and the
     search at the edge ended at the baseline."""
-    wide, known = replace(spread_of(nominal(), 0.05), is_guess=False), gait_of(ROBUST[0])
-    metric = Metric().quicker()
+    wide = replace(spread_of(nominal(), 0.05), is_guess=False)
 
-    def slowest(settings, count=48):
-        robots = possible_robots(nominal(), runs, wide, settings, count, 7)
-        assert len(robots) == count
-        speeds = distribution(runs, robots, gait_rows([known]), metric)[0]
+    def slowest(settings):
+        robots = SearchRun(nominal(), runs, wide, settings).robots(48, 7)
+        assert len(robots) == 48
+        speeds = distribution(runs, robots, gait_rows([ROBUST]), Metric().quicker())[0]
         return speeds.min() / np.median(speeds)
 
     assert slowest(Settings()) < 0.5
-    assert slowest(Settings(begin=(known,))) >= 0.8
+    assert slowest(Settings(begin=(ROBUST,))) >= 0.8

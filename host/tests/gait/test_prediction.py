@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bifa.gait import library
+from bifa.gait import Metric, library
 from bifa.gait.prediction import Prediction, predict_speed
 from bifa.gait.uncertainty import spread_of
 from bifa.robot import BASELINE, Covariance, nominal
 from bifa.robot.model import Scatter
-from bifa.simulate import layout, of_gait, vented_between, walk
+from bifa.simulate import gait_rows, layout, of_gait, vented_between, walk
 
 
 def known(scatter=None, sd=1e-6, **changes):
@@ -24,15 +24,11 @@ def values(model, name, count=512):
 
 def test_what_differs_from_run_to_run_is_drawn_anew_for_each_walk():
     """Robot 4, seed 2: 18.79 mm/s were predicted and 1.41 walked; the fit's covariance alone knows of no such thing."""
-    drawn = values(known(Scatter(friction=0.02)), "mu_s") / nominal()["mu_s"] - 1.0
-    assert np.std(drawn) == pytest.approx(0.02, rel=0.1)
-    assert np.ptp(values(known(Scatter(friction=0.02)), "head_mass_kg")) == 0.0
-
-
-def test_static_and_kinetic_friction_differ_together():
-    model = known(Scatter(friction=0.03))
-    ratio = values(model, "mu_k") / values(model, "mu_s")
-    assert np.std(ratio / ratio.mean()) < 1e-4
+    model = known(Scatter(friction=0.02))
+    static, kinetic = (values(model, name) / nominal()[name] for name in ("mu_s", "mu_k"))
+    assert np.std(static) == pytest.approx(0.02, rel=0.1)
+    assert np.std(kinetic / static) < 1e-4, "both together"
+    assert np.ptp(values(model, "head_mass_kg")) == 0.0
 
 
 def test_an_older_fit_has_the_friction_that_was_expected_and_says_so():
@@ -52,15 +48,12 @@ def test_what_is_unexplained_lies_on_the_supplies_and_on_the_bodys_force():
 def test_the_naive_robots_have_the_covariance_alone():
     knowledge = spread_of(known(Scatter(friction=0.05, pressure_psi=1.0), sd=0.01)).naive
     drawn = knowledge.plants(nominal(), 64, 0)
-    assert len({p.q[layout.index("mu_s")] for p in drawn}) == 1
-    assert len({p.q[layout.index("mu_k")] for p in drawn}) == 64
+    assert [len({p.q[layout.index(name)] for p in drawn}) for name in ("mu_s", "mu_k")] == [1, 64]
 
 
 def test_a_ripples_phase_is_another_in_every_walk():
     model = nominal().with_effects({"regulator_ripple": {"amplitude_psi": 0.3, "phase_rad": 1.0}})
-    drawn = spread_of(model).plants(model, 64, 0)
-    phases = np.array([p.q for p in drawn])
-    assert (np.ptp(phases, axis=0) > 6.0).any()
+    assert np.ptp(values(model, "regulator_ripple.phase_rad", 64)) > 6.0
 
 
 def test_without_a_fit_two_per_cent_is_called_a_guess():
@@ -128,14 +121,12 @@ def test_how_the_uno_keeps_time_is_known_whatever_the_spread():
     assert spread_of(model, 0.02).scatter == spread_of(model).naive.scatter == timing
 
 
-def test_the_search_knows_the_clock():
+def test_the_search_knows_the_clock(runs, nominal_plant):
     """Of a gait sought without it 0.95 of the robots were to walk, and 0.79 did on a clock that was 0.23 % fast."""
-    from bifa.gait import Metric, simulations
-    from bifa.simulate import gait_rows, plant
-
-    rows, which = gait_rows([BASELINE]), np.zeros(1, int)
-    with simulations() as runs:
-        plain, fast = (runs.judged([plant(nominal())], which, rows, Metric(clock=c)).speed_mm_s[0] for c in (1.0, 0.9))
+    judged = (
+        runs.judged([nominal_plant], np.zeros(1, int), gait_rows([BASELINE]), Metric(clock=c)) for c in (1.0, 0.9)
+    )
+    plain, fast = (one.speed_mm_s[0] for one in judged)
     quicker = predict_speed(known(), spread_of(known()), BASELINE, draws=16, clock_rate=0.9).speed_mm_s
     assert fast == pytest.approx(quicker, rel=3e-3)
     assert fast != pytest.approx(plain, rel=1e-3)

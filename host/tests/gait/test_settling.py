@@ -1,11 +1,12 @@
-"""One rule for when a walk has settled, simulated or measured."""
+"""One rule for when a walk has settled, simulated or measured, and the measured speed of what has."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bifa.gait.settling import Walking, settling, walking
+from bifa.errors import BifaError
+from bifa.gait.settling import Walking, measured_speed, settling
 
 
 def test_a_long_transient_is_not_averaged_in():
@@ -34,12 +35,6 @@ def test_what_drifts_or_alternates_does_not_settle():
     assert not settling(np.array([30.0, 70.0] * 8), 0.1).is_settled
 
 
-def test_robots_that_stand_are_told_from_those_that_never_settle():
-    alternating, standing = np.array([30.0, 70.0] * 6), np.array([40.0, 5.0, *[1.0] * 8])
-    assert walking(settling(alternating), 20.0) is Walking.UNSETTLED
-    assert walking(settling(standing), 0.4) is Walking.STANDING
-
-
 @given(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=30), st.floats(0.0, 0.5))
 def test_what_counts_is_the_end_of_the_walk_and_never_nothing(advance, noise):
     found = settling(np.array(advance), noise)
@@ -53,3 +48,55 @@ def test_a_constant_end_is_found_whatever_went_before(transient, settled):
     found = settling(np.array([*transient, *[settled] * 8]))
     assert found.is_settled
     assert found.begins <= len(transient)
+
+
+def walked(advances_mm, period_s=2.0):
+    """A record that moves evenly in every cycle."""
+    time_s = np.arange(0.0, len(advances_mm) * period_s + 0.005, 0.01)
+    ends = np.concatenate([[0.0], np.cumsum(advances_mm)])
+    return time_s, np.interp(time_s, period_s * np.arange(len(ends)), ends)
+
+
+def test_a_steady_walk_has_its_speed_and_no_spread():
+    time_s = np.arange(0, 30.01, 0.01)
+    speed = measured_speed(time_s, 10.8 * time_s, period_s=5.0)
+    assert speed.mean_mm_s == pytest.approx(10.8)
+    assert speed.spread_mm_s == pytest.approx(0, abs=1e-9)
+    assert speed.settled_cycles == 6
+
+
+def test_the_cycles_in_which_it_settles_do_not_count():
+    """Until now two cycles were left out, whatever the walk: this one read 31.4 mm/s."""
+    speed = measured_speed(*walked([90, 80, 75, 70, 65, 62, 60.8, *[50.0] * 6]), 2.0)
+    assert speed.mean_mm_s == pytest.approx(25.0)
+    assert (speed.begins, speed.settled_cycles) == (7, 6)
+
+
+def test_back_and_forth_within_a_cycle_is_not_speed():
+    time_s = np.arange(0, 20.01, 0.01)
+    speed = measured_speed(time_s, 30 * np.sin(np.pi * time_s), 2.0)
+    assert speed.mean_mm_s == pytest.approx(0, abs=1e-9)
+    assert speed.walking is Walking.STANDING
+    assert "stands still" in speed.text
+
+
+def test_what_never_settles_says_so_and_has_the_speed_of_its_second_half():
+    speed = measured_speed(*walked([30.0, 70.0] * 5), 2.0)
+    assert speed.walking is Walking.UNSETTLED
+    assert speed.settled_cycles == 0
+    assert "not settled" in speed.text
+    assert 20.0 < speed.mean_mm_s < 30.0
+
+
+def test_a_robot_that_stands_still_at_first_walks_all_the_same():
+    """The demo's seed 8: after two such cycles it was said to stand still, at 0.7 mm/s where 20.7 were predicted."""
+    speed = measured_speed(*walked([19.0, 2.2, 97.0, *[58.5] * 5], 2.83), 2.83)
+    assert (speed.walking, speed.begins) == (Walking.SETTLED, 3)
+    assert speed.mean_mm_s == pytest.approx(20.67, abs=0.01)
+    assert measured_speed(*walked([19.0, 2.2, 1.8, 1.8, 1.8, 1.8]), 2.0).walking is Walking.STANDING
+
+
+def test_too_short_a_walk_is_refused():
+    time_s = np.arange(0, 5.0, 0.01)
+    with pytest.raises(BifaError, match="record a longer walk"):
+        measured_speed(time_s, time_s, period_s=5.0)

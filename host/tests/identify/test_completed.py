@@ -1,4 +1,4 @@
-"""What a completed model knows of itself."""
+"""What a completed model knows and says of itself: uncertainty, name, provenance, and the source of each value."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bifa.data import Dataset
-from bifa.identify.completed import completed_model
+from bifa.identify.completed import completed_model, labeled
 from bifa.identify.start import prepare
 from bifa.robot import load_model, save_model
 from harness.independent_lab import IndependentLab
@@ -16,21 +16,35 @@ from lacuna.estimation.structure import Structure
 
 
 @pytest.fixture(scope="module")
-def model():
-    """With a curve learnt at the body's spring."""
+def system():
     lab = IndependentLab().with_seed(3)
-    trials = [lab.static("large", p, rate_mm_s=4.0) for p in (0.0, 8.0) for _ in range(2)]
-    trials = tuple(replace(t, file=f"{i}.csv", repeat=1 + i % 2) for i, t in enumerate(trials))
-    system = prepare(Dataset(path=None, name="monday", known={}, trials=trials))
-    structure = Structure(system, (), ("body_spring",))
+    trials = [lab.static(which, p, 4.0, repeat=n) for which in ("large", "small") for p in (0.0, 8.0) for n in (1, 2)]
+    trials = tuple(replace(t, file=f"{i}.csv") for i, t in enumerate(trials))
+    return prepare(Dataset(path=None, name="monday", known={"head_mass_kg": 0.2}, trials=trials))
+
+
+def test_the_knots_of_a_learnt_curve_are_in_the_covariance(system, tmp_path):
     floor = estimate_noise(system, system.trials)
-    return completed_model(fit(structure, system.trials, floor, max_iterations=2))
-
-
-def test_the_knots_of_a_learnt_curve_are_in_the_covariance(model, tmp_path):
+    model = completed_model(fit(Structure(system, (), ("body_spring",)), system.trials, floor, max_iterations=2))
     names = [name for name in model.covariance.names if name.startswith("learnt.body_spring.0.")]
     assert len(names) == 9
     values = model.learnt["body_spring"].values
     assert [model[name] for name in names] == [values[0, int(name.rsplit(".")[-1])] for name in names]
     save_model(tmp_path / "m.toml", model)
     np.testing.assert_allclose(load_model(tmp_path / "m.toml").covariance.matrix, model.covariance.matrix, rtol=1e-12)
+
+
+def test_a_fitted_model_says_where_each_value_comes_from(system):
+    model = labeled(system.model, system, "bifa fit", "2026-11-25")
+    source = {name: parameter.source for name, parameter in model.parameters.items()}
+    assert source["body_area_N_psi"] == "fitted to monday"
+    assert source["head_mass_kg"] == "[known] of monday"
+    assert source["mu_k"].startswith("found to reproduce the paper")  # neither measured nor fitted
+    assert model.name == "monday"
+    assert model.provenance == "bifa fit on 2026-11-25: fitted to 8 trials of monday"
+
+
+def test_a_completed_model_is_named_for_what_was_added(system):
+    model = labeled(system.model.with_effects({"choked_flow": {}}), system, "bifa diagnose")
+    assert model.name == "monday with choked flow"
+    assert model.provenance == "bifa diagnose: fitted to 8 trials of monday, completed by choked flow"

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from bifa.data import Dataset, Trial
-from bifa.errors import BifaError
 from bifa.identify.scatter import of_few, session_drifts, shared_square, switch_timing
-from bifa.robot import BASELINE, load_model, nominal, save_model
+from bifa.robot import BASELINE, nominal
 from bifa.robot.model import Scatter
 from lacuna.system import Correction
 
@@ -24,14 +23,10 @@ def test_noise_averages_out_of_what_repeats_share():
 
 
 def test_the_scatter_says_how_the_uno_keeps_time():
-    gait = BASELINE.as_dict()
-    trials = [
-        Trial(f"walk_{k}.csv", "locomotion", columns={}, gait=gait, repeat=k, extra=extra)
-        for k, extra in enumerate(
-            [{"clock_rate": 1.004, "dead_time_s": 0.004, "switch_error_s": 0.0005}, {"clock_rate": 1.002}], start=1
-        )
-    ]
-    timing = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, tuple(trials), {})))
+    first = Trial("walk.csv", "locomotion", columns={}, gait=BASELINE.as_dict(), extra={"clock_rate": 1.002})
+    noted = {"clock_rate": 1.004, "dead_time_s": 0.004, "switch_error_s": 0.0005}
+    trials = (first, replace(first, repeat=2, extra=noted))
+    timing = switch_timing(SimpleNamespace(dataset=Dataset(None, "day", {}, trials)))
     assert timing == Scatter(clock=0.99701, dead_time_s=0.002, switch_error_s=0.00025)
 
 
@@ -51,28 +46,3 @@ def test_few_gaits_tell_less_of_the_next_than_many():
     assert 1.645 * of_few([1e-4] * 3) == pytest.approx(0.0235, rel=1e-2)
     assert of_few([1e-4] * 1000) == pytest.approx(0.01, rel=1e-2)
     assert of_few([-1e-6]) == of_few([]) == 0.0
-
-
-def test_a_model_file_keeps_the_scatter(tmp_path):
-    model = replace(nominal(), scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004, 0.0005))
-    save_model(tmp_path / "m.toml", model)
-    assert load_model(tmp_path / "m.toml").scatter == model.scatter
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "friction = -0.1",
-        'friction = "much"',
-        "friction = nan",
-        "dead_time_s = 0.2",
-        "switch_error_s = 0.2",
-        "wind = 1.0",
-    ],
-)
-def test_a_scatter_that_is_none_is_refused(tmp_path, line):
-    save_model(tmp_path / "m.toml", nominal())
-    with (tmp_path / "m.toml").open("a") as file:
-        file.write(f"\n[scatter]\n{line}\n")
-    with pytest.raises(BifaError, match="scatter"):
-        load_model(tmp_path / "m.toml")

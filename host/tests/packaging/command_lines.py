@@ -1,5 +1,6 @@
-"""The command lines of the README, the docs and the workflows: those in blocks and those in the text."""
+"""The command lines of the README, the docs, the workflows and the container: those in blocks and those in the text."""
 
+import json
 import re
 import shlex
 from collections.abc import Iterator
@@ -33,6 +34,8 @@ def command_lines(root: Path) -> list[CommandLine]:
     pages += sorted((root / "docs").rglob("*.md"))
     texts = [(page, text) for page in pages for text in _candidates(page.read_text("utf-8"))]
     texts += [(page, step["run"]) for page in workflows(root) for step in steps(page) if "run" in step]
+    container = root / ".devcontainer" / "devcontainer.json"
+    texts.append((container, json.loads(container.read_text("utf-8"))["postCreateCommand"]))
     return list(
         dict.fromkeys(
             CommandLine(page.relative_to(root).as_posix(), command[0], tuple(command[1:]))

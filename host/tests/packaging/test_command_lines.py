@@ -63,6 +63,7 @@ def test_there_are_command_lines():
     said = {str(line) for line in LINES}
     assert "README.md: make demo" in said
     assert "docs/adding-your-own-system.md: pip install ./host/lacuna" in said
+    assert any(line.startswith(".devcontainer/devcontainer.json: make ") for line in said)
     assert len(said) > 100
 
 
@@ -82,9 +83,21 @@ def lay_out(tmp_path, monkeypatch):
     return files_of
 
 
-@pytest.mark.parametrize("line", [line for line in LINES if line.program == "bifa"], ids=str)
-def test_bifa_understands_the_line(line, lay_out):
-    bifa_line(line, lay_out)
+@pytest.mark.parametrize("line", [line for line in LINES if line.program not in ("make", "pio")], ids=str)
+def test_the_program_is_there_and_understands_the_arguments(line, monkeypatch, lay_out):
+    understands(line, monkeypatch, lay_out)
+
+
+def understands(line: CommandLine, monkeypatch, lay_out) -> None:
+    """Whichever program it is."""
+    if line.program == "bifa":
+        bifa_line(line, lay_out)
+    elif line.program == "pip" or line.arguments[:2] == ("-m", "pip"):
+        pip_line(line)
+    elif line.program == "pytest" or line.arguments[:2] == ("-m", "pytest"):
+        assert all((HOST / word).exists() for word in line.arguments if word.startswith("tests/"))
+    else:
+        python_line(line, monkeypatch)
 
 
 def bifa_line(line: CommandLine, lay_out) -> None:
@@ -121,27 +134,14 @@ def test_make_has_the_target_and_its_program_understands_the_arguments(line, mon
         understands(CommandLine("Makefile", words[0], tuple(words[1:])), monkeypatch, lay_out)
 
 
-@pytest.mark.parametrize("line", [line for line in LINES if line.program in ("python", "pytest")], ids=str)
-def test_python_finds_the_program_which_understands_the_arguments(line, monkeypatch, lay_out):
-    understands(line, monkeypatch, lay_out)
-
-
-def understands(line: CommandLine, monkeypatch, lay_out) -> None:
-    """Whichever program it is."""
-    if line.program == "bifa":
-        bifa_line(line, lay_out)
-    elif line.program == "pytest" or line.arguments[:2] == ("-m", "pytest"):
-        pytest_line(line)
-    elif line.arguments[:2] == ("-m", "pip"):
-        pip_line(CommandLine(line.page, "pip", line.arguments[2:]))
-    else:
-        python_line(line, monkeypatch)
-
-
-def pytest_line(line: CommandLine) -> None:
-    for word in line.arguments:
-        if word.startswith("tests/"):
-            assert (HOST / word).exists(), word
+def pip_line(line: CommandLine) -> None:
+    """tests/packaging/test_wheels.py installs those of the project; jupyterlab is the only package of others."""
+    action, *packages = (word for word in line.arguments if not word.startswith("-") and word != "pip")
+    assert action == "install"
+    for package in packages:
+        place = ROOT / re.sub(r"\[.*\]", "", package)
+        file = place if place.suffix == ".lock" else place / "pyproject.toml"
+        assert package == "jupyterlab" or file.is_file(), package
 
 
 def python_line(line: CommandLine, monkeypatch) -> None:
@@ -184,28 +184,6 @@ def test_platformio_has_the_environment_and_the_suite(line):
         assert option != "-e" or value in environments
         assert option != "-t" or value == "upload"
         assert option != "-f" or (ROOT / "test" / value).is_dir()
-
-
-@pytest.mark.parametrize("line", [line for line in LINES if line.program == "pip"], ids=str)
-def test_pip_finds_the_package(line):
-    """tests/packaging/test_wheels.py installs those of the project."""
-    pip_line(line)
-
-
-ELSEWHERE = ("jupyterlab",)  # the only package of others that the pages name by itself
-
-
-def pip_line(line: CommandLine) -> None:
-    action, *packages = (word for word in line.arguments if not word.startswith("-"))
-    assert action == "install"
-    for package in packages:
-        if package in ELSEWHERE:
-            continue
-        if package.endswith(".lock"):
-            assert (ROOT / package).is_file(), package
-            continue
-        folder = ROOT / re.sub(r"\[.*\]", "", package)
-        assert (folder / "pyproject.toml").is_file(), package
 
 
 @pytest.mark.slow

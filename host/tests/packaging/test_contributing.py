@@ -1,6 +1,5 @@
 """What contributors and their tools read: the workflows, the hooks, the forms, the version."""
 
-import json
 import re
 import subprocess
 import sys
@@ -118,14 +117,6 @@ def test_no_project_file_repeats_the_version(folder):
     text = (ROOT / folder / "pyproject.toml").read_text("utf-8")
     assert 'dynamic = ["version"]' in text
     assert VERSION not in text
-
-
-def test_the_container_is_set_up_by_a_target_of_make():
-    program, target = json.loads((ROOT / ".devcontainer/devcontainer.json").read_text("utf-8"))[
-        "postCreateCommand"
-    ].split()
-    assert program == "make"
-    assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
 
 
 @pytest.mark.parametrize("page", ["CONTRIBUTING.md", "SECURITY.md"])

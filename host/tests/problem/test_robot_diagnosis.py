@@ -6,7 +6,6 @@
 import json
 import subprocess
 import sys
-import tomllib
 from datetime import date
 
 import pytest
@@ -16,29 +15,20 @@ from bifa.identify.completed import completed_model
 from bifa.identify.start import prepare
 from bifa.robot import load_model
 from lacuna.diagnosis.diagnose import diagnose
+from virtual_robot.sealed import generate
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture
-def sealed(tmp_path):
-    """Draws a data set of 45 trials; returns its diagnosis and, after the verdict, what the label says."""
-
-    def draw(*options):
-        folder = tmp_path / "set"
-        command = [sys.executable, "-m", "virtual_robot.sealed", "--out", str(folder), *options]
-        subprocess.run(command, check=True)
-        found = diagnose(prepare(read_dataset(folder)))
-        return found, tomllib.loads((tmp_path / "set.sealed.toml").read_text())["effects"]
-
-    return draw
+def diagnosed(folder, seed, *drawn):
+    """The diagnosis of a sealed data set of 45 trials, and what its label says."""
+    label = generate(seed, folder, *drawn)
+    return diagnose(prepare(read_dataset(folder))), label.effects
 
 
 def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
     folder, record, page, model = (tmp_path / name for name in ("set", "found.json", "found.html", "model.toml"))
-    subprocess.run(
-        [sys.executable, "-m", "virtual_robot.sealed", "--out", folder, "--seed", "41", "--none"], check=True
-    )
+    generate(41, folder, "none")
     written = ["--json", record, "--report", page, "--out", model]
     command = [sys.executable, "-m", "bifa", "diagnose", folder, *written]
     said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -67,8 +57,8 @@ def test_the_command_finds_nothing_in_a_robot_without_an_effect(tmp_path):
         pytest.param("regulator_ripple", "amplitude_psi", marks=pytest.mark.soak),
     ],
 )
-def test_names_sizes_and_adds_an_effect_that_nobody_declared(sealed, effect, parameter):
-    found, truth = sealed("--seed", "42", "--effect", effect, "--size", "0.6")
+def test_names_sizes_and_adds_an_effect_that_nobody_declared(tmp_path, effect, parameter):
+    found, truth = diagnosed(tmp_path / "set", 42, "single", effect, 0.6)
     assert found.verdict == "identified"
     assert [e.name for e in found.effects] == [effect]
     assert found.effects[0].parameters[parameter] == pytest.approx(truth[effect][parameter], rel=0.1)
@@ -80,8 +70,8 @@ def test_names_sizes_and_adds_an_effect_that_nobody_declared(sealed, effect, par
 
 
 @pytest.mark.soak
-def test_names_both_of_two_effects(sealed):
-    found, truth = sealed("--seed", "4000", "--pair")
+def test_names_both_of_two_effects(tmp_path):
+    found, truth = diagnosed(tmp_path / "set", 4000, "pair")
     assert found.verdict == "identified"
     assert {e.name for e in found.effects} == set(truth)
     assert found.after.held_out < 1.2 * found.floor.held_out

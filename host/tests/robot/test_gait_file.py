@@ -1,23 +1,20 @@
 """Gait files."""
 
+from contextlib import nullcontext
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bifa.ranges import RANGES
-from bifa.robot import BASELINE, Gait, GaitError, load_gait, read_gait_file, save_gait
+from bifa.robot import BASELINE, GaitError, load_gait, read_gait_file, save_gait
 
 
 def test_round_trip(tmp_path):
     save_gait(tmp_path / "g.toml", BASELINE, provenance={"made_by": "a test"})
     assert load_gait(tmp_path / "g.toml") == BASELINE
     assert read_gait_file(tmp_path / "g.toml").others == {}
-
-
-def written(tmp_path, text: str):
-    path = tmp_path / "g.toml"
-    path.write_text(text)
-    return path
 
 
 BY_HAND = "".join(f"{name} = {value}\n" for name, value in BASELINE.as_dict().items())
@@ -29,7 +26,8 @@ def test_a_mark_that_an_editor_began_the_file_with_is_no_part_of_it(tmp_path):
 
 
 def test_other_parameters_of_the_uno_may_stand_beside_the_gait(tmp_path):
-    path = written(tmp_path, BY_HAND + "coupling_per_s = 5\npressure_psi = 7\n[provenance]\nby = 'me'\n")
+    path = tmp_path / "g.toml"
+    path.write_text(BY_HAND + "coupling_per_s = 5\npressure_psi = 7\n[provenance]\nby = 'me'\n")
     file = read_gait_file(path)
     assert file.others == {"coupling_per_s": 5.0, "pressure_psi": 7.0}
     assert file.parameters == BASELINE.as_dict() | file.others
@@ -53,7 +51,8 @@ def test_other_parameters_of_the_uno_may_stand_beside_the_gait(tmp_path):
 )
 def test_a_bad_gait_file_is_refused_by_file_and_key(tmp_path, old, new, told):
     assert old in BY_HAND
-    path = written(tmp_path, BY_HAND.replace(old, new))
+    path = tmp_path / "g.toml"
+    path.write_text(BY_HAND.replace(old, new))
     with pytest.raises(GaitError, match=told) as refused:
         read_gait_file(path)
     assert str(path) in str(refused.value)
@@ -62,8 +61,5 @@ def test_a_bad_gait_file_is_refused_by_file_and_key(tmp_path, old, new, told):
 @given(st.sampled_from(list(BASELINE.as_dict())), st.floats())
 def test_a_gait_out_of_range_cannot_be_made(name, value):
     low, high, _ = RANGES[name]
-    if low <= value <= high:
-        assert Gait(**{**BASELINE.as_dict(), name: value}).as_dict()[name] == value
-    else:
-        with pytest.raises(GaitError, match=name):
-            Gait(**{**BASELINE.as_dict(), name: value})
+    with nullcontext() if low <= value <= high else pytest.raises(GaitError, match=name):
+        assert replace(BASELINE, **{name: value}).as_dict()[name] == value

@@ -31,6 +31,18 @@ CHANGED = {
     "learnt, uneven": ("[stiffness.body]", _LEARNT.format("filling", "[[0.0, 1.0], [0.0]]"), "rows"),
     "not TOML": ("format = 1", "format = ", "TOML"),
     "not bistable": ("-139.2774809279526", "1e9", "bistable"),
+    "no finite curve": ("-139.2774809279526", "nan", "2 to 16 finite coefficients"),
+    "no covariance": ("[stiffness.body]", '[covariance]\nnames = ["a"]\nmatrix = [[1, 2]]\n[stiffness.body]', "1 x 1"),
+} | {
+    f"scatter, {line}": ("[stiffness.body]", f"[scatter]\n{line}\n[stiffness.body]", "scatter")
+    for line in (
+        "friction = -0.1",
+        'friction = "much"',
+        "friction = nan",
+        "dead_time_s = 0.2",
+        "switch_error_s = 0.2",
+        "wind = 1.0",
+    )
 }
 
 
@@ -39,12 +51,14 @@ def test_round_trip_keeps_every_number(tmp_path):
     changed = replace(
         model.with_values({"mu_k": 0.35, "body_area_N_psi": 8.7}),
         covariance=Covariance(("mu_k", "body_area_N_psi"), np.array([[1e-4, 2e-5], [2e-5, 1e-2]])),
+        scatter=Scatter(0.011, 0.02, 0.3, 0.001, 0.9977, 0.004, 0.0005),
     )
     save_model(tmp_path / "m.toml", changed)
     back = load_model(tmp_path / "m.toml")
     assert back.values == changed.values
     assert back.body_stiffness == model.body_stiffness
     assert back.small_stiffness == model.small_stiffness
+    assert back.scatter == changed.scatter
     assert back.covariance.names == changed.covariance.names
     np.testing.assert_array_equal(back.covariance.matrix, changed.covariance.matrix)
 
@@ -62,9 +76,8 @@ def test_learnt_curves_are_kept_and_act(tmp_path):
     assert np.abs(got - walk(nominal(), BASELINE, 2)["displacement_head_mm"]).max() > 0.2
 
 
-@pytest.mark.parametrize("case", CHANGED)
-def test_a_bad_file_is_refused_by_name(case, tmp_path):
-    old, new, told = CHANGED[case]
+@pytest.mark.parametrize(("old", "new", "told"), CHANGED.values(), ids=CHANGED)
+def test_a_bad_file_is_refused_by_name(old, new, told, tmp_path):
     save_model(tmp_path / "m.toml", nominal())
     text = (tmp_path / "m.toml").read_text()
     assert old in text
@@ -85,19 +98,13 @@ def test_values_out_of_bounds_are_refused_with_the_range():
         nominal().with_values({"mass": 5.0})
 
 
-WHOLE = replace(
-    nominal().with_effects({"hysteresis": {}}),
-    covariance=Covariance(("mu_k",), np.array([[1e-4]])),
-    learnt={"filling": LearntCurve(0.0, 1.0, np.zeros((2, 4)))},
-    scatter=Scatter(),
-)
-
-
 @given(st.data())
 def test_any_model_file_is_read_or_refused(tmp_path_factory, data):
-    folder = tmp_path_factory.mktemp("model")
-    save_model(folder / "m.toml", WHOLE)
-    spoilt = data.draw(tampered(parse_toml((folder / "m.toml").read_text())))
-    (folder / "m.toml").write_text(tomli_w.dumps(spoilt))
+    covariance, curve = Covariance(("mu_k",), np.array([[1e-4]])), LearntCurve(0.0, 1.0, np.zeros((2, 4)))
+    hysteretic = nominal().with_effects({"hysteresis": {}})
+    whole = replace(hysteretic, covariance=covariance, learnt={"filling": curve}, scatter=Scatter())
+    path = tmp_path_factory.mktemp("model") / "m.toml"
+    save_model(path, whole)
+    path.write_text(tomli_w.dumps(data.draw(tampered(parse_toml(path.read_text())))))
     with suppress(ModelFileError):
-        load_model(folder / "m.toml")
+        load_model(path)

@@ -9,21 +9,13 @@ import math
 
 import numpy as np
 from numba import njit
+from scipy.integrate import RK45
 
 GRAVITY = 9.80665
-# Dormand and Prince (1980)
-_A = np.array(
-    [
-        [0, 0, 0, 0, 0, 0],
-        [1 / 5, 0, 0, 0, 0, 0],
-        [3 / 40, 9 / 40, 0, 0, 0, 0],
-        [44 / 45, -56 / 15, 32 / 9, 0, 0, 0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0],
-        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-_E = np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+_A = np.vstack(
+    [np.pad(RK45.A, ((0, 0), (0, 1))), RK45.B]
+)  # Dormand and Prince (1980), the last stage that of the result
+_E = RK45.E
 _SCALE = np.array([1.0, 100.0, 1.0, 100.0, 1e3, 1.0, 100.0, 1e3, 1.0, 100.0, 1e3])  # m, m/s, N over metres
 # Modes: sliding of head and tail, wall contact of head and tail, bulge (alpha_s) of body, head, tail
 SLIDE_H, SLIDE_T, WALL_H, WALL_T, BULGE_B, BULGE_H, BULGE_T = range(7)

@@ -16,6 +16,7 @@ from bifa.simulate import lanes, layout, rigs
 from bifa.simulate.lanes import build, kernel
 from bifa.simulate.lanes.translate import Intrinsic, Shapes, Translator, UntranslatableError
 from bifa.simulate.paper import FAST
+from bifa.simulate.timeline import NO_COMMANDS
 
 ROBOTS = 11  # more than there are lanes, so that some take up a second one
 TIME_S = np.arange(0.0, 6.0, 0.02)
@@ -30,33 +31,27 @@ def found():
     return both
 
 
-def _robots(effect, count=ROBOTS, spread=0.05):
+def _robots(effect, count=ROBOTS):
     rng = np.random.default_rng(len(effect or ""))
+
+    def drawn(parameter, value):
+        return float(np.clip(value, parameter.lower, parameter.upper))
+
     plants = []
     for _ in range(count):
         model = robot.nominal()
-        scaled = {
-            name: float(np.clip(p.value * rng.normal(1.0, spread), p.lower, p.upper))
-            for name, p in model.parameters.items()
-        }
-        model = model.with_values(scaled)
+        model = model.with_values({n: drawn(p, p.value * rng.normal(1.0, 0.05)) for n, p in model.parameters.items()})
         if effect:
-            sizes = {
-                p.name: float(np.clip(p.typical * rng.uniform(0.3, 1.5), p.lower, p.upper))
-                for p in effects.library()[effect].parameters
-            }
+            parameters = effects.library()[effect].parameters
+            sizes = {p.name: drawn(p, p.typical * rng.uniform(0.3, 1.5)) for p in parameters}
             model = model.with_effects({effect: sizes})
         plants.append(simulate.plant(model))
     return plants
 
 
-def _switches(timeline):
-    return timeline.time_s, timeline.chamber, timeline.command
-
-
 def _experiments(plants):
-    walk = _switches(simulate.vented_between(simulate.of_gait(FAST, 10.0), 0.004))
-    step = _switches(simulate.timeline([(0.5, 0, 1), (3.5, 0, 0)]))
+    walk = simulate.vented_between(simulate.of_gait(FAST, 10.0), 0.004)
+    step = simulate.timeline([(0.5, 0, 1), (3.5, 0, 0)])
     n = len(plants)
 
     def one(kind, mounted, switches, **pull):
@@ -69,7 +64,7 @@ def _experiments(plants):
         "pull": one(
             lanes.ANCHOR,
             [rigs.anchor(p, 8.5 - 0.5 * k) for k, p in enumerate(plants)],
-            kernel.NO_SWITCHES,
+            NO_COMMANDS,
             extended_psi=8.0,
             rate_m_s=0.02,
             load_cell_N_m=5000.0,
@@ -86,7 +81,8 @@ def test_lanes_and_numba_tell_the_same(effect, found):
     plants = _robots(effect)
     for name, what in _experiments(plants).items():
         expected = [lanes.in_numba(what, k, plant) for k, plant in enumerate(plants)]
-        for got in (found[0].march(plants, what, False), found[1].march(plants, what, False)):
+        for one in found:
+            got = one.march(plants, what, False)
             errors = [np.abs((a - b) / _size(b)).max() for a, b in zip(got, expected, strict=True)]
             # Both take the same steps, but where a rounding decides whether a step is good enough: at rest both springs
             # of ROUNDED divide one small difference by another.
@@ -124,10 +120,8 @@ def test_every_effect_and_every_learnt_curve_at_once(found):
     what = replace(what, rigs=[rig._replace(terrain=ground) for rig in what.rigs])
     expected = [lanes.in_numba(what, k, plant) for k, plant in enumerate(both)]
     assert np.abs(expected[0] - expected[1]).max() > 1e-3
-    for got in (found[0].march(both, what, False), [found[1].march([p], replace(
-        what, rigs=[r], switches=[s], sample_s=[t]), False)[0]
-        for p, r, s, t in zip(both, what.rigs, what.switches, what.sample_s, strict=True)]):  # fmt: skip
-        for a, b in zip(got, expected, strict=True):
+    for one in found:
+        for a, b in zip(one.march(both, what, False), expected, strict=True):
             assert np.abs((a - b) / _size(b)).max() < 5e-3
             assert np.abs(a[0] - b[0]).max() < 1e-7
 
@@ -138,13 +132,12 @@ def test_a_robot_that_has_no_solution_leaves_the_others_alone(found):
     broken[layout.HEAD_MASS] = np.nan
     what = _experiments(plants)["walk"]
     for together in (False, True):
-        whole = found[0].march(plants, what, together)
-        rows = found[0].march([plants[0], plants[1]._replace(q=broken), plants[2]], what, together)
-        assert np.isnan(rows[1][:, 1:]).any()
-        for k in (0, 2):
-            assert np.all(np.isfinite(rows[k]))
-            if not together:
-                np.testing.assert_array_equal(rows[k], whole[k])
+        first, other, last = found[0].march([plants[0], plants[1]._replace(q=broken), plants[2]], what, together)
+        assert np.isnan(other[:, 1:]).any()
+        assert np.all(np.isfinite([first, last]))
+        if not together:
+            whole = found[0].march(plants, what, together)
+            np.testing.assert_array_equal([first, last], [whole[0], whole[2]])
 
 
 def test_lanes_with_switches_and_samples_of_their_own(found):
@@ -153,7 +146,7 @@ def test_lanes_with_switches_and_samples_of_their_own(found):
     what = lanes.Experiment(
         lanes.PROGRESS,
         [rigs.pipe(p) for p in plants],
-        [_switches(simulate.of_gait(gait, 12.0)) for gait in gaits],
+        [simulate.of_gait(gait, 12.0) for gait in gaits],
         [gait.period_s * np.arange(1, 3 + k % 2) for k, gait in enumerate(gaits)],
         TOLERANCE_M,
     )

@@ -9,10 +9,14 @@ from scipy.integrate import solve_ivp
 from bifa import robot, simulate
 from bifa.simulate import SimulationError
 
+ON_S, OFF_S, STEP_PSI = 0.5, 4.0, 7.0
 
-def _lsoda_step(model, name, curve, mass, time, on, off, pressure, slope=0.0, force_kept=True):
+
+def _lsoda_step(model, actuator, time, slope, force_kept):
     """Eq. (1)-(3) as they stand, or, unless the air keeps its force, with a pressure in the place of (2)'s force;
     smooth but for x_th. `slope`: of the area over the stroke."""
+    name, moved = {"large": ("body", "head"), "small": ("small", "small")}[actuator]
+    curve, mass = getattr(model, f"{name}_stiffness"), model[f"{moved}_mass_kg"]
     b, nominal = model[f"{name}_damping_Ns_m"], model[f"{name}_area_N_psi"]
     fast, slow = model[f"{name}_alpha_n_per_s"], model[f"{name}_alpha_s_per_s"]
     vacuum = model["supply_negative_psi"]
@@ -33,7 +37,7 @@ def _lsoda_step(model, name, curve, mass, time, on, off, pressure, slope=0.0, fo
     options = {"method": "LSODA", "rtol": 1e-10, "atol": 1e-12, "max_step": 0.01}
     state = solve_ivp(rates(vacuum), (-10.0, 0.0), start, **options).y[:, -1]
     rows = []
-    for first, last, source in ((0.0, on, vacuum), (on, off, pressure), (off, time[-1] + 0.01, vacuum)):
+    for first, last, source in ((0.0, ON_S, vacuum), (ON_S, OFF_S, STEP_PSI), (OFF_S, time[-1] + 0.01, vacuum)):
         inside = time[(time >= first) & (time < last)]
         part = solve_ivp(rates(source), (first, last), state, t_eval=[*inside, last], **options).y
         rows.append(part[:, :-1])
@@ -48,23 +52,11 @@ def _lsoda_step(model, name, curve, mass, time, on, off, pressure, slope=0.0, fo
 def test_step_response_agrees_with_lsoda(actuator, slope, force_kept):
     model = robot.nominal()
     time = np.arange(0.0, 8.0, 0.01)
-    command = np.where((time >= 0.5) & (time < 4.0), 1.0, 0.0)
-    large = actuator == "large"
-    displacement, pressure = _lsoda_step(
-        model,
-        "body" if large else "small",
-        model.body_stiffness if large else model.small_stiffness,
-        model["head_mass_kg"] if large else model["small_mass_kg"],
-        time,
-        0.5,
-        4.0,
-        7.0,
-        slope,
-        force_kept,
-    )
+    command = np.where((time >= ON_S) & (time < OFF_S), 1.0, 0.0)
+    displacement, pressure = _lsoda_step(model, actuator, time, slope, force_kept)
     if slope:
         model = model.with_effects({"area_variation": {"slope": slope, "force_kept": float(force_kept)}})
-    record = simulate.step_response(model, actuator, time, command, 7.0, tolerance_m=1e-8)
+    record = simulate.step_response(model, actuator, time, command, STEP_PSI, tolerance_m=1e-8)
     np.testing.assert_allclose(record["displacement_mm"], displacement, atol=2e-3)
     np.testing.assert_allclose(record["pressure_psi"], pressure, atol=2e-3)
 
@@ -115,6 +107,7 @@ def test_anchor_holds_what_the_paper_says_and_slides_with_less():
         (lambda m: simulate.walk(m, robot.BASELINE, time_s=[1.0, 0.5]), "rise"),
         (lambda m: simulate.walk(m, robot.BASELINE, inclination_deg=100.0), "-90 to 90"),
         (lambda m: simulate.walk(m, robot.BASELINE, tolerance_m=0.0), "tolerance"),
+        (lambda m: simulate.terrain([simulate.Obstacle(0.1, 0.05, 0.08)]), "97 to 147"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused(call, told):

@@ -36,13 +36,8 @@ def checked(name: str) -> str:
     return name
 
 
-def path_of(name: str) -> Path:
-    """The gait file of a scenario, as `bifa upload` takes it."""
-    return FOLDER / f"{checked(name)}.toml"
-
-
 def load(name: str) -> LibraryGait:
     """The gait for a scenario; LibraryError for an unknown one."""
-    path = path_of(name)
+    path = FOLDER / f"{checked(name)}.toml"
     notes = parse_toml(path.read_text("utf-8"))["provenance"]
     return LibraryGait(name, notes["purpose"], load_gait(path), notes)

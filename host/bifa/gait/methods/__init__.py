@@ -2,17 +2,9 @@
 
 from .bayesian import bayesian_optimization
 from .cma_es import cma_es
-from .common import Evaluated, Objective, OnEvaluated
+from .common import Evaluated
 from .evolution import differential_evolution
 
 METHODS = {"cma": cma_es, "de": differential_evolution, "bo": bayesian_optimization}
 
-__all__ = [
-    "METHODS",
-    "Evaluated",
-    "Objective",
-    "OnEvaluated",
-    "bayesian_optimization",
-    "cma_es",
-    "differential_evolution",
-]
+__all__ = ["METHODS", "Evaluated"]

@@ -15,6 +15,7 @@ _SAMPLE, _SAMPLE_MOST = 1024, 8192  # points of the sample, which is doubled unt
 _ENOUGH = 60
 APART = 0.12  # of two starts, on some axis of the unit cube: another basin
 _NEIGHBORS, _COMPARED = 8, 2000
+POPULATION = 12  # of a run, in a generation
 _CLIMBS = 5  # at once, and as many in each restart
 _STEP, _NEAR_TOP = 0.06, 0.02  # initial standard deviations, of the unit cube: of any basin, and near its top
 _TRIAL = 10  # generations after which a run far behind the best is given up
@@ -29,13 +30,12 @@ def cma_es(
     evaluations: int,
     seed: int,
     on_progress: OnEvaluated | None = None,
-    population: int = 12,
 ) -> Evaluated:
     """Maximise `objective` in at most about `evaluations` calls, fewer where the landscape is simple; `wraps`
     (dimensions,) marks full turns."""
     recorder = RecordedObjective(objective, wraps, on_progress)
     _sample(recorder, len(wraps), seed, evaluations)
-    return climb_basins(recorder, wraps, evaluations, seed, population)
+    return climb_basins(recorder, wraps, evaluations, seed)
 
 
 def climb_basins(
@@ -43,7 +43,6 @@ def climb_basins(
     wraps: np.ndarray,
     evaluations: int,
     seed: int,
-    population: int = 12,
     step: float = _STEP,
     known: Sequence[np.ndarray] = (),
     behind: float = _BEHIND,
@@ -60,7 +59,7 @@ def climb_basins(
             break
         steps = [_NEAR_TOP] * len(known) + [step] * len(others)
         budget, run_seed = evaluations - recorder.count, seed + len(tried)
-        more = climb_together(recorder, starts, budget, run_seed, population, steps, behind, same)
+        more = climb_together(recorder, starts, budget, run_seed, steps, behind, same)
         ends, tried, known = ends.joined(more), [*tried, *others], ()
     return recorder.found(ends.ranked if len(ends.values) else None)
 
@@ -102,7 +101,6 @@ def climb_together(
     starts: np.ndarray,
     evaluations: int,
     seed: int,
-    population: int,
     steps: Sequence[float],
     behind: float = _BEHIND,
     same: float = 0.0,
@@ -111,7 +109,7 @@ def climb_together(
     One that after a while is below `behind` of the best is given up; all are, where two that ended agree within `same`,
     if that is not 0, and nothing that runs is ahead."""
     tops = np.array(starts, dtype=float)
-    runs = [_strategy(*start, seed + k, population) for k, start in enumerate(zip(starts, steps, strict=True))]
+    runs = [_strategy(*start, seed + k) for k, start in enumerate(zip(starts, steps, strict=True))]
     bests: list[list[float]] = [[] for _ in runs]  # of each, so far, after every generation
     alive, spent = list(range(len(runs))), 0
     while alive and spent < evaluations:
@@ -141,7 +139,7 @@ def _has_stalled(bests: Sequence[float]) -> bool:
     return len(bests) > _STALLED and bests[-1] - bests[-1 - _STALLED] <= _GAIN * abs(bests[-1])
 
 
-def _strategy(start: np.ndarray, step: float, seed: int, population: int) -> cma.CMAEvolutionStrategy:
+def _strategy(start: np.ndarray, step: float, seed: int) -> cma.CMAEvolutionStrategy:
     # The recorder folds points into the cube, so the search itself needs no bounds; seed 0 means "by the clock" to cma.
-    options = {"seed": seed + 1, "popsize": population, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
+    options = {"seed": seed + 1, "popsize": POPULATION, "verbose": -9, "tolfun": 1e-3, "tolx": 1e-4}
     return cma.CMAEvolutionStrategy(np.asarray(start), step, options)

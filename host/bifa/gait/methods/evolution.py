@@ -2,8 +2,11 @@
 
 import numpy as np
 from scipy import optimize
+from scipy.stats import qmc
 
 from .common import Evaluated, Objective, OnEvaluated, RecordedObjective
+
+_POPULATION = 50
 
 
 def differential_evolution(
@@ -12,7 +15,6 @@ def differential_evolution(
     evaluations: int,
     seed: int,
     on_progress: OnEvaluated | None = None,
-    population: int = 50,
 ) -> Evaluated:
     """Maximise `objective` with about `evaluations` calls; `wraps` (dimensions,) marks full turns.
 
@@ -20,12 +22,13 @@ def differential_evolution(
     """
     recorder = RecordedObjective(objective, wraps, on_progress)
     bounds = [(-0.25, 1.25) if wrap else (0.0, 1.0) for wrap in wraps]
-    generations = max(1, round(evaluations / population) - 1)
+    sample = qmc.LatinHypercube(len(bounds), rng=np.random.default_rng([seed, 1])).random(_POPULATION)
+    generations = max(1, round(evaluations / _POPULATION) - 1)
     optimize.differential_evolution(
         lambda columns: -recorder(columns.T),
         bounds,
         maxiter=generations,
-        init=_initial(bounds, population, seed),
+        init=qmc.scale(sample, *np.transpose(bounds)),
         mutation=(0.4, 0.9),
         recombination=0.8,
         tol=0.0,
@@ -36,11 +39,3 @@ def differential_evolution(
         rng=np.random.default_rng(seed),
     )
     return recorder.found()
-
-
-def _initial(bounds: list[tuple[float, float]], population: int, seed: int) -> np.ndarray:
-    from scipy.stats import qmc
-
-    lower, upper = np.transpose(bounds)
-    sample = qmc.LatinHypercube(len(bounds), rng=np.random.default_rng([seed, 1])).random(population)
-    return lower + sample * (upper - lower)

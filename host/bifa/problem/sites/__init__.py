@@ -12,7 +12,7 @@ from bifa.problem.sites.site import Range
 from bifa.robot import Model
 from bifa.robot.learnt import LearntCurve
 from bifa.simulate import Plant
-from bifa.simulate.learnt_curves import with_curve
+from bifa.simulate.plant import with_curve
 from lacuna.system import Channels, Correction, CorrectionSite
 
 SITES = {

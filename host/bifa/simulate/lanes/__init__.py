@@ -12,8 +12,8 @@ import numpy as np
 
 from bifa.simulate import layout
 from bifa.simulate.entries import entries
-from bifa.simulate.lanes.kernel import ANCHOR, PROGRESS, SEEN, STEP, WALK, Experiment, Kernel, Switches, kernels
-from bifa.simulate.locomotion import READ_BODY
+from bifa.simulate.lanes.kernel import ANCHOR, PROGRESS, SEEN, STEP, WALK, Experiment, Kernel, kernels
+from bifa.simulate.locomotion import READ_BODY, SLIP
 from bifa.simulate.plant import Plant
 from bifa.simulate.stepper import V_HEAD, V_TAIL, X_HEAD, X_TAIL, Mounting
 from bifa.simulate.tables import sealed
@@ -26,7 +26,6 @@ __all__ = [
     "STEP",
     "WALK",
     "Experiment",
-    "Switches",
     "load",
     "march",
     "width",
@@ -35,6 +34,7 @@ __all__ = [
 
 _WORTH_LANES = 3  # simulations: a step of all lanes costs a little more than two of a single one
 SEEN_OF_WALK = [X_HEAD, V_HEAD, X_TAIL, V_TAIL, READ_BODY, READ_BODY + 1, READ_BODY + 2]
+_PROGRESS_OF_WALK = [X_HEAD, SLIP]
 
 
 def width() -> int:
@@ -113,14 +113,12 @@ def sealed_plant(plant: Plant) -> Plant:
 
 
 def in_numba(what: Experiment, k: int, plant: Plant) -> np.ndarray:
-    times, chamber, command = what.switches[k]
+    commands = what.switches[k]
     place = (sealed_plant(plant), what.rigs[k], layout.state_size())
     end = (what.sample_s[k], what.tolerance_m)
     if what.kind == STEP:
-        return entries.step_record(*place, times, command, *end).T
+        return entries.step_record(*place, commands.time_s, commands.command, *end).T
     if what.kind == ANCHOR:
         return entries.anchor_record(*place, what.extended_psi, what.rate_m_s, what.load_cell_N_m, *end).T
-    if what.kind == PROGRESS:
-        return entries.progress_record(*place, times, chamber, command, *end).T
-    rows = entries.walk_record(*place, times, chamber, command, *end).T
-    return rows if what.kind == WALK else rows[SEEN_OF_WALK]
+    rows = entries.walk_record(*place, commands.time_s, commands.chamber, commands.command, *end).T
+    return rows if what.kind == WALK else rows[SEEN_OF_WALK if what.kind == SEEN else _PROGRESS_OF_WALK]

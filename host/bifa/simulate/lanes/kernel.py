@@ -16,6 +16,7 @@ from bifa.simulate import locomotion
 from bifa.simulate.lanes import build
 from bifa.simulate.plant import Plant
 from bifa.simulate.stepper import Mounting
+from bifa.simulate.timeline import Timeline
 
 WALK, SEEN, PROGRESS, STEP, ANCHOR = range(5)
 COLUMNS = (locomotion.COLUMNS, 7, 2, 3, 5)
@@ -46,17 +47,13 @@ class _Setting(ctypes.Structure):
     ]
 
 
-Switches = tuple[np.ndarray, np.ndarray, np.ndarray]  # times in s, chambers, commands; float, int64, int64
-NO_SWITCHES: Switches = (np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))
-
-
 @dataclass(frozen=True)
 class Experiment:
-    """What is done to each robot, `Switches` and sample times of each; and what is the same for all."""
+    """What is done to each robot, switches and sample times of each; and what is the same for all."""
 
     kind: int
     rigs: Sequence[Mounting]
-    switches: Sequence[Switches]
+    switches: Sequence[Timeline]
     sample_s: Sequence[np.ndarray]
     tolerance_m: float
     extended_psi: float = 0.0
@@ -84,9 +81,10 @@ class Kernel:
         setting.experiment, setting.together, setting.tolerance_m = what.kind, together, what.tolerance_m
         setting.extended_psi = what.extended_psi
         setting.rate_m_s, setting.load_cell_N_m = what.rate_m_s, what.load_cell_N_m
-        for name, k in (("switch_s", 0), ("chamber", 1), ("command", 2)):
-            jobs[name] = _addresses([one[k] for one in what.switches])
-        jobs["switches"] = [one[0].size for one in what.switches]
+        jobs["switch_s"] = _addresses([one.time_s for one in what.switches])
+        jobs["chamber"] = _addresses([one.chamber for one in what.switches])
+        jobs["command"] = _addresses([one.command for one in what.switches])
+        jobs["switches"] = [one.time_s.size for one in what.switches]
         jobs["sample_s"], jobs["samples"] = _addresses(what.sample_s), [times.size for times in what.sample_s]
         rows = _rows_for(jobs, COLUMNS[what.kind])
         self.call(self._march, setting, jobs)

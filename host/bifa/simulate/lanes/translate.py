@@ -16,11 +16,12 @@ or a table (`Shapes`).
 from __future__ import annotations
 
 import ast
+import builtins
 import inspect
 import math
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -74,8 +75,7 @@ class Translated:
 
     name: str
     returns: Kind
-    text: str = ""
-    arguments: list[str] = field(default_factory=list)
+    text: str
 
 
 def c_type(kind: Kind) -> str:
@@ -174,9 +174,7 @@ class _Body:
             self.count = 0
             self.jumped = False
             self.assigned_result = False
-            top = _Region("m", self.whole, None)
-            self.region = top
-            self.top = top
+            self.region = self.top = _Region("m", self.whole, None)
             self._block(self.tree.body)
             if (self.kinds, list(self.returned or ())) == before:
                 return self._finished(inline)
@@ -202,7 +200,7 @@ class _Body:
         head.append("  (void)m; (void)gone;" + "".join(f" (void)x_{name};" for name in self.kinds))
         tail = [f"  {self._return_code()}", "}", ""]
         lines = [line.replace("return@", self._return_code()) for line in self.lines]
-        return Translated(self.name, returns, "\n".join([*head, *lines, *tail]), arguments)
+        return Translated(self.name, returns, "\n".join([*head, *lines, *tail]))
 
     def _return_code(self) -> str:
         if self.returned is None:
@@ -274,9 +272,13 @@ class _Body:
         code, kind = self._value(node)
         if not isinstance(kind, tuple):
             raise self._no(node, "is one value, not several")
+        return self._members(code, kind)
+
+    def _members(self, code: str, kinds: tuple[Kind, ...]) -> list[_Coded]:
+        """Of the structure that a call returns."""
         name = self._fresh("r")
         self._emit(f"const __auto_type {name} = {code};")
-        return [(f"{name}.r{i}", one) for i, one in enumerate(kind)]
+        return [(f"{name}.r{i}", one) for i, one in enumerate(kinds)]
 
     def _do_augassign(self, node: ast.AugAssign) -> None:
         both = ast.BinOp(node.target, node.op, node.value)
@@ -346,19 +348,14 @@ class _Body:
             self.jumped = True
 
     def _returned_parts(self, node: ast.expr) -> list[_Coded]:
-        if isinstance(node, ast.Tuple):
-            self.single = False
-            return [self._value(one) for one in node.elts]
-        if isinstance(node, ast.IfExp) and isinstance(node.body, ast.Tuple):
+        if isinstance(node.body if isinstance(node, ast.IfExp) else node, ast.Tuple):
             self.single = False
             return self._tuple(node)
         code, kind = self._value(node)
-        if isinstance(kind, tuple):
-            self.single = False
-            name = self._fresh("r")
-            self._emit(f"const __auto_type {name} = {code};")
-            return [(f"{name}.r{i}", one) for i, one in enumerate(kind)]
-        return [(code, kind)]
+        if not isinstance(kind, tuple):
+            return [(code, kind)]
+        self.single = False
+        return self._members(code, kind)
 
     def _remember_result(self, node: ast.AST, parts: list[_Coded]) -> None:
         differs = self.region.mask != "m" or self.jumped or self.region.loop is not None
@@ -514,9 +511,8 @@ class _Body:
         """A constant, a function or a module that the source names."""
         if isinstance(node, ast.Attribute):
             return getattr(self._object(node.value), node.attr)
-        space = self.function.__globals__
         if isinstance(node, ast.Name):
-            for scope in (space, inspect.getclosurevars(self.function).builtins, vars(__import__("builtins"))):
+            for scope in (self.function.__globals__, vars(builtins)):
                 if node.id in scope:
                     return scope[node.id]
         raise self._no(node, f"uses {ast.unparse(node)}, which is undefined")
@@ -534,9 +530,9 @@ class _Body:
         if node.attr not in fields:
             raise self._no(node, f"reads {node.attr} of a {kind}")
         found = fields[node.attr]
-        if found in ("Active",):
+        if found == "Active":
             return code, found
-        direct = found in _SAME_IN_ALL or found in ("F",) or found.startswith("F[")
+        direct = found in _SAME_IN_ALL or found == "F" or found.startswith("F[")
         return f"{code}->{node.attr}" if direct else f"&{code}->{node.attr}", found
 
     def _size(self, node: ast.expr, code: str, kind: Kind) -> str:
