@@ -46,8 +46,11 @@ def sensitivity(
     for name, reach in _REACH.items():
         lower, upper, _ = RANGES[name]
         width = reach * base[name] if name == "period_s" else reach
-        scans[name] = base[name] + width * np.linspace(-1.0, 1.0, points)
-        walked = np.mod(scans[name], 360.0) if name.startswith("psi") else np.clip(scans[name], lower, upper)
+        walked = scans[name] = base[name] + width * np.linspace(-1.0, 1.0, points)
+        if name.startswith("psi"):
+            walked = np.mod(walked, 360.0)
+        else:
+            walked = scans[name] = np.clip(walked, lower, upper)
         rows += [Gait(**{**base, name: float(value)}) for value in walked]
     gaits = gait_rows(rows)
     own = on_model(runs, nominal, gaits, metric)

@@ -132,19 +132,19 @@ def _of_singles(
 
 
 def _by_condition(trials: Sequence[Record], scaled: Sequence[Channels]) -> dict[tuple[str, str], list[np.ndarray]]:
-    """By (experiment, channel) one array (repeats, samples) a condition, on the first repeat's time base; NaN where
-    nothing was measured."""
+    """By (experiment, channel) one array (repeats, samples) a condition, of the repeats that have the channel, on the
+    time base of the first of them; NaN where nothing was measured."""
     found: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     z = dict(zip((trial.name for trial in trials), scaled, strict=True))
     for members in groups_of_repeats(trials):
-        first = members[0]
-        for channel in z[first.name]:
+        for channel in dict.fromkeys(c for t in members for c in z[t.name]):
+            having = [t for t in members if channel in z[t.name]]
+            at = having[0].time_s
             rows = [
-                _compressed(at_times(first.time_s, t.time_s, _with_failures(z[t.name][channel], t.channels[channel])))
-                for t in members
-                if channel in z[t.name]
+                _compressed(at_times(at, t.time_s, _with_failures(z[t.name][channel], t.channels[channel])))
+                for t in having
             ]
-            found[first.experiment, channel].append(np.array(rows))
+            found[having[0].experiment, channel].append(np.array(rows))
     return found
 
 

@@ -166,6 +166,8 @@ def _strayed(fits: list[Fit]) -> list[str]:
 def impossible_signs(fitted: Fit, policy: Policy) -> list[str]:
     """A sentence for each effect with one size, absent at a bound, that the residual of `fitted` would push beyond that
     bound: if to first order it removes more than the policy's share of the residual."""
+    if fitted.structure.sites:  # nothing is grown on a learnt curve
+        return []
     system, found = fitted.structure.system, []
     able = [
         name

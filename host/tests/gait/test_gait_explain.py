@@ -1,5 +1,7 @@
 """The paper's three reasons, found again in the numbers; sensitivity and front."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,6 +59,13 @@ def test_sensitivity_scans_every_parameter_around_the_gait(runs, nominal_plant):
     period = scans[0]
     assert period.nominal_mm_s[0] < 2.0  # 15 % faster: the body no longer snaps
     assert period.nominal_mm_s[4] == pytest.approx(22.15 / 1.15, rel=0.05)
+
+
+def test_no_scan_leaves_what_a_gait_may_be(runs, nominal_plant):
+    edge = replace(ROBUST, duty_head=0.98)
+    scans = {scan.name: scan for scan in sensitivity(runs, nominal_plant, [nominal_plant], edge, Metric().quicker(), 3)}
+    assert scans["duty_head"].values.max() == scans["duty_head"].room[1] == 1.0
+    assert scans["psi12_deg"].values[2] == ROBUST.psi12_deg + 40.0  # a turn goes on
 
 
 def test_the_front_keeps_what_nothing_beats():

@@ -47,6 +47,16 @@ def sharing(rms, **how):
     return remainder({"a": noise(4, 0) + rms * SINE}, **how)
 
 
+def test_what_the_first_repeat_has_no_channel_of_is_seen_in_the_others():
+    """An optional channel, such as a second marker."""
+    shared = 2.0 * SINE + noise(2, 0)
+    trials = [Record("0", KEY[0], "a", TIME_S, {})]
+    trials += [Record(f"{k}", KEY[0], "a", TIME_S, {KEY[1]: TIME_S}) for k in (1, 2)]
+    floor = NoiseFloor({KEY: ChannelNoise(0.2, 0.0, 1.0, 6)})
+    scaled = [{}, *({KEY[1]: z} for z in shared)]
+    assert find_remainder(OneChannel(0.0), trials, scaled, floor, policy=POLICY).matters
+
+
 def test_relevance_what_a_prediction_within_a_tenth_of_the_floor_leaves_does_not_matter():
     assert sharing(0.40).found, "it is no chance"
     assert not sharing(0.40).matters, "RMS 1.08 of the floor"

@@ -198,6 +198,14 @@ def test_an_effect_that_asks_for_what_there_is_not_is_refused(with_new_effect):
         with_new_effect(area=lambda share, moon_phase: share)
 
 
+@pytest.mark.parametrize("hook", ["initial", "spring_state", "play_state", "sensor", "line"])
+def test_an_effect_that_remembers_without_a_state_is_refused(with_new_effect, hook):
+    with pytest.raises(
+        EffectError, match=rf"swelling\.{hook} returns what is remembered: swelling must declare states=1"
+    ):
+        with_new_effect(**{hook: lambda share: share})
+
+
 def test_an_effect_without_a_hook_is_refused(with_new_effect):
     with pytest.raises(EffectError, match="swelling acts nowhere"):
         with_new_effect()

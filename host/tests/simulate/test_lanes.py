@@ -323,9 +323,19 @@ def _uses_it(x):
     return 1.0 + _asks_for_the_moon(x)
 
 
+def _pair(x):
+    return x, 1.0
+
+
+def _one_pair_or_another(x):
+    return _pair(x) if x > 0.0 else _pair(-x)
+
+
 def test_what_has_no_form_in_lanes_is_refused_by_name_or_replaced():
     with pytest.raises(UntranslatableError, match=r"_asks_for_the_moon: line 2 calls math.gamma"):
         Translator(Shapes({}, {}, {}), {}).function(_uses_it, ("F",))
+    with pytest.raises(UntranslatableError, match=r"one_pair_or_another.*: a conditional of several values"):
+        Translator(Shapes({}, {}, {}), {}).function(_one_pair_or_another, ("F",))
     told = []
 
     def without(function, refusal):

@@ -676,6 +676,8 @@ class _Body:
             return f"({truth} ? ({c})({_as(a, ka, joined)}) : ({c})({_as(b, kb, joined)}))", joined
         if kind == "b":
             return f"({truth} ? {_as(a, ka, joined)} : {_as(b, kb, joined)})", joined
+        if isinstance(joined, tuple):
+            raise UntranslatableError(f"{self.name}: a conditional of several values that differs from lane to lane")
         joined = _varying(joined)
         select = "sel" if joined == "F" else "sel_mask"
         return f"{select}({_as(truth, kind, 'B')}, {_as(a, ka, joined)}, {_as(b, kb, joined)})", joined
