@@ -36,27 +36,33 @@ def apt(tmp_path):
     return folder
 
 
-def test_deb822_entries_become_source_entries(apt):
-    (apt / "sources.list.d" / "debian.sources").write_text(DEB822)
-    option = "[signed-by=/usr/share/keyrings/archive.gpg]"
-    assert source_entries(apt).splitlines() == [
-        f"deb-src {option} http://archive.example/debian stable main",
-        f"deb-src {option} http://archive.example/debian stable-updates main",
-    ]
+SIGNED = "[signed-by=/usr/share/keyrings/archive.gpg]"
+ONE_LINE = """\
+# deb http://comment.example/ stable main
+deb [arch=amd64] http://archive.example/debian stable main contrib
+deb-src http://sources.example/debian stable main
+"""
 
 
-def test_one_line_entries_become_source_entries(apt):
-    (apt / "sources.list").write_text(
-        "# deb http://comment.example/ stable main\n"
-        "deb [arch=amd64] http://archive.example/debian stable main contrib\n"
-        "deb-src http://sources.example/debian stable main\n"
-    )
-    assert source_entries(apt) == "deb-src [arch=amd64] http://archive.example/debian stable main contrib\n"
-
-
-def test_a_disabled_file_is_left_alone(apt):
-    (apt / "sources.list.d" / "other.list.disabled").write_text("deb http://other.example/ stable main\n")
-    assert source_entries(apt) == ""
+@pytest.mark.parametrize(
+    ("file", "text", "entries"),
+    [
+        (
+            "sources.list.d/debian.sources",
+            DEB822,
+            [
+                f"deb-src {SIGNED} http://archive.example/debian stable main",
+                f"deb-src {SIGNED} http://archive.example/debian stable-updates main",
+            ],
+        ),
+        ("sources.list", ONE_LINE, ["deb-src [arch=amd64] http://archive.example/debian stable main contrib"]),
+        ("sources.list.d/other.list.disabled", "deb http://other.example/ stable main\n", []),
+    ],
+    ids=["deb822", "one line each", "disabled"],
+)
+def test_entries_become_source_entries_and_a_disabled_file_is_left_alone(apt, file, text, entries):
+    (apt / file).write_text(text)
+    assert source_entries(apt).splitlines() == entries
 
 
 def test_no_archive_at_all_is_said(apt, tmp_path):

@@ -3,6 +3,7 @@
 import errno
 import os
 import sys
+from types import SimpleNamespace
 
 import pytest
 import serial
@@ -26,16 +27,11 @@ def platformio(program, tmp_path, monkeypatch):
     return pretend
 
 
-def test_a_port_found_by_itself_is_opened_before_anything_is_built(monkeypatch):
+@pytest.mark.parametrize("given", [None, "/dev/not-there"], ids=["found by itself", "given"])
+def test_a_port_that_is_not_there_is_said_before_anything_is_built(monkeypatch, given):
     monkeypatch.setattr(flash, "find_port", lambda: "/dev/not-there")
     with pytest.raises(ToolchainError, match="there is no port /dev/not-there"):
-        flash.choose_port(None)
-
-
-def test_a_port_that_is_not_there_is_said_before_anything_is_built(platformio):
-    platformio()
-    with pytest.raises(ToolchainError, match="there is no port /dev/not-there"):
-        flash.choose_port("/dev/not-there")
+        flash.choose_port(given)
 
 
 @pytest.mark.parametrize(
@@ -96,12 +92,11 @@ def test_the_command_ends_in_the_sentence_and_not_in_a_traceback():
 
 
 def test_usb_identities_sort_originals_first(monkeypatch):
-    class Found:
-        def __init__(self, device, vid, pid):
-            self.device, self.vid, self.pid, self.description = device, vid, pid, "n/a"
-            self.serial_number = None
-
-    found = [Found("b", 0x1A86, 0x7523), Found("c", 0x1234, 1), Found("a", 0x2A03, 0x0043), Found("s", None, None)]
+    identities = {"b": (0x1A86, 0x7523), "c": (0x1234, 1), "a": (0x2A03, 0x0043), "s": (None, None)}
+    found = [
+        SimpleNamespace(device=device, vid=vid, pid=pid, description="n/a", serial_number=None)
+        for device, (vid, pid) in identities.items()
+    ]
     monkeypatch.setattr(ports.list_ports, "comports", lambda: found)
     assert [port.device for port in ports.serial_ports()] == ["a", "b", "c"]
     assert [port.device for port in ports.uno_ports()] == ["a", "b"]

@@ -57,16 +57,18 @@ def closed():
     return f"http://127.0.0.1:{port}/"
 
 
-def test_a_described_package_is_an_answer(serve):
-    assert registry.answers([serve(200, b'{"name": "atmelavr"}')], DEADLINE_S)
-
-
 @pytest.mark.parametrize(
-    ("status", "body"),
-    [(403, b'{"name": "atmelavr"}'), (200, b"<html>sign in first</html>"), (200, b'{"message": "no"}'), (502, b"")],
+    ("status", "body", "is_answer"),
+    [
+        (200, b'{"name": "atmelavr"}', True),
+        (403, b'{"name": "atmelavr"}', False),
+        (200, b"<html>sign in first</html>", False),
+        (200, b'{"message": "no"}', False),
+        (502, b"", False),
+    ],
 )
-def test_a_page_of_something_in_between_is_none(serve, status, body):
-    assert not registry.answers([serve(status, body)], DEADLINE_S)
+def test_a_described_package_is_an_answer_and_a_page_of_something_in_between_is_none(serve, status, body, is_answer):
+    assert registry.answers([serve(status, body)], DEADLINE_S) == is_answer
 
 
 def test_one_good_mirror_suffices(serve, closed, silent):
