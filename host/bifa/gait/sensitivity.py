@@ -46,11 +46,10 @@ def sensitivity(
     for name, reach in _REACH.items():
         lower, upper, _ = RANGES[name]
         width = reach * base[name] if name == "period_s" else reach
-        walked = scans[name] = base[name] + width * np.linspace(-1.0, 1.0, points)
-        if name.startswith("psi"):
-            walked = np.mod(walked, 360.0)
-        else:
-            walked = scans[name] = np.clip(walked, lower, upper)
+        values = base[name] + width * np.linspace(-1.0, 1.0, points)
+        turns = name.startswith("psi")
+        scans[name] = values if turns else np.clip(values, lower, upper)
+        walked = np.mod(values, 360.0) if turns else scans[name]
         rows += [Gait(**{**base, name: float(value)}) for value in walked]
     gaits = gait_rows(rows)
     own = on_model(runs, nominal, gaits, metric)

@@ -55,7 +55,6 @@ _COMBINED = {
     # The next sensor of the chain sees this one's output.
     "follow": ("", "before = z{state}; after_psi = {call}; z{state} = after_psi; before_psi = before", "after_psi"),
 }
-_REMEMBERING = ("keep", "state", "first", "follow")
 
 
 def chain_source() -> str:
@@ -86,9 +85,9 @@ def _chain(hook: str, names: list[str]) -> list[str]:
     body = [begin] if begin else []
     for name in names:
         effect = effects.library()[name]
-        if combine in _REMEMBERING and not effect.states:
+        if "{state}" in each and not effect.states:
             raise EffectError(f"{name}.{hook} returns what is remembered: {name} must declare states=1")
-        state = f"[{layout.state_slot(name)} + actuator]" if effect.states else "_of_nothing"
+        state = f"[{layout.state_slot(name)} + actuator]" if effect.states else ""
         body.append(f"if active & {1 << layout.effect_bit(name)}:")
         body.append("    " + each.format(call=_call(hook, effect, state), value=value, state=state))
     if result:

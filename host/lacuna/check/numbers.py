@@ -1,4 +1,4 @@
-"""Comparing columns, and saying where."""
+"""Comparing columns, and saying where; and how noisy one is."""
 
 from __future__ import annotations
 

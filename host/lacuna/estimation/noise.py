@@ -118,7 +118,7 @@ def estimate_noise(
         elif correlated_s := system.noise_time_s(*key):
             channels[key] = _of_correlated(members, key[1], correlated_s, sensor, basis)
         else:
-            channels[key] = _offast_noise(members, key[1], sensor, basis)
+            channels[key] = _of_fast_noise(members, key[1], sensor, basis)
     return NoiseFloor(channels)
 
 
@@ -152,7 +152,7 @@ def _from_pairs(
     return ChannelNoise(float(sd), float(jitter_s), correlation_samples(scaled), len(pairs))
 
 
-def _offast_noise(
+def _of_fast_noise(
     members: Sequence[Record], channel: str, sensor: float, basis: Mapping[str, Channels]
 ) -> ChannelNoise:
     """Without repeats, told nothing: from the fast noise of residuals (without them of the records, as an upper bound,
