@@ -36,6 +36,7 @@ from lacuna.estimation.fit import (
 )
 from lacuna.estimation.noise import NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
+from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import intervals
 from lacuna.system import System
@@ -91,10 +92,9 @@ class Case:
 
     def _again(self, fitted: Fit, floor: NoiseFloor) -> Fit:
         """The same explanation fitted to the end against another floor."""
-        starts = [fitted.solution.point.values]
-        again = fit(fitted.structure, self.split.fit, floor, starts=starts, relative=_FINE)
-        solution = renewed(again.problem, again.solution, relative=_FINE)
-        return Fit(again.problem, solution, fitted.starts, fitted.starts_agreeing)
+        problem = fitted.problem.over(self.split.fit, floor)
+        solution = solve(problem, fitted.solution.point, relative=_FINE)
+        return Fit(problem, renewed(problem, solution, relative=_FINE), fitted.starts, fitted.starts_agreeing)
 
     def sharply(self, candidate: Candidate) -> Candidate:
         """The same against the floor that its own residuals show, for as long as that falls and the explanation
@@ -109,11 +109,11 @@ class Case:
             lower = sharpened_floor(candidate, self.split, floor)
             if not self.suffices(candidate) or lower.share_of(floor) >= LOWER:
                 break
-            candidate = self.judge(self._again(candidate.fitted, lower))
+            candidate = self.judge(self._again(candidate.fitted, lower), near=candidate.checked)
         return candidate
 
-    def judge(self, fitted: Fit) -> Candidate:
-        return judge(fitted, self.split, self.policy)
+    def judge(self, fitted: Fit, near: Fit | None = None) -> Candidate:
+        return judge(fitted, self.split, self.policy, near=near)
 
     @_once
     def on_known(self, candidate: Candidate) -> Fit:

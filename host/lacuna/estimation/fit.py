@@ -213,13 +213,18 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
 
 def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
     """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from
-    where `near` has them if it knows them."""
+    where `near` has them if it knows them all."""
     known, values = fitted.known_nuisances, fitted.solution.point.values
     asked = fitted.problem.over([t for t in trials if t.name not in known])
     if any(asked.nuisances):
         begun = _by_name(near) if near else {}
-        start = asked.start(values, [begun.get(t.name, _NONE) for t in asked.trials])
-        known |= _by_name(Fit(asked, solve(asked, start, free=(), max_iterations=_NUISANCE_ITERATIONS), 1, 1))
+        point = asked.start(values, [begun.get(t.name, _NONE) for t in asked.trials])
+        # a run's nuisance may be many times the noise away, where only plain least squares leads there
+        far = any(t.name not in begun for t in asked.trials)
+        for view in dict.fromkeys((PLAIN, asked.view) if far else (asked.view,)):
+            found = solve(asked.seen(view), point, free=(), max_iterations=_NUISANCE_ITERATIONS)
+            point = found.point
+        known |= _by_name(Fit(asked, found, 1, 1))
     # where all were asked, their residuals are still remembered
     problem = asked if len(asked.trials) == len(trials) else fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))

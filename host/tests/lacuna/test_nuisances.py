@@ -18,7 +18,7 @@ def simulate(record, theta):
     return {"x_mm": x + theta.zero_mm + drift + theta.cubic.per_mm2 * x**3}
 
 
-def system():
+def system(spread_mm=SPREAD_MM):
     return lacuna.System(
         simulate,
         [Parameter("gain", "mm", 1.0, 0.1, 10.0)],
@@ -26,20 +26,22 @@ def system():
             Effect("expansion", Parameter("mm_per_K", "mm/K", 0.05, -2.0, 2.0)),
             Effect("cubic", Parameter("per_mm2", "1/mm^2", 0.02, -0.5, 0.5)),
         ],
-        nuisances=[Parameter("zero_mm", "mm", 0.0, -5.0, 5.0, scale=SPREAD_MM)],
+        nuisances=[Parameter("zero_mm", "mm", 0.0, -20.0 * spread_mm, 20.0 * spread_mm, scale=spread_mm)],
     )
 
 
-def records(seed, of_condition):
+def records(seed, of_condition, spread_mm=SPREAD_MM, per_mm2=0.0):
     """Four runs at each temperature, with its own value of `of_condition` besides each run's own zero."""
+    x = 2.0 * np.sin(2.0 * np.pi * TIME_S)
     draw = np.random.default_rng(seed)
     return {
         f"{warmer_K:g} K, {run}": {
             "time_s": TIME_S,
             "warmer_K": warmer_K,
-            "x_mm": 2.0 * np.sin(2.0 * np.pi * TIME_S)
+            "x_mm": x
+            + per_mm2 * x**3
             + shift
-            + SPREAD_MM * draw.standard_normal()
+            + spread_mm * draw.standard_normal()
             + NOISE_MM * draw.standard_normal(len(TIME_S)),
             "condition": f"{warmer_K:g} K",
         }
@@ -79,6 +81,15 @@ def test_what_a_condition_sets_is_told_and_no_effect_named():
     found = lacuna.diagnose(system(), records(4, (0.7, -0.5, 0.6, -0.7, 0.5, -0.6)), progress=False)
     assert not found.effects
     assert len(followed(found)) == 1
+
+
+@pytest.mark.parametrize("spread_mm", [5.0, 100.0])
+def test_runs_that_differ_by_many_times_the_noise_hide_no_effect(spread_mm):
+    found = lacuna.diagnose(system(spread_mm), records(0, np.zeros(6), spread_mm, 0.03), progress=False)
+    assert [effect.name for effect in found.effects] == ["cubic"]
+    lower, upper = found.effects[0].interval["per_mm2"]
+    assert lower < 0.03 < upper
+    assert lacuna.diagnose(system(spread_mm), records(0, np.zeros(6), spread_mm), progress=False).verdict == "none"
 
 
 @pytest.mark.parametrize("parameters", [1, 2])
