@@ -12,6 +12,7 @@ import shlex
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent import futures
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +29,11 @@ from bifa.measure.instruments import CHANNELS
 from bifa.measure.plan import PULL_MM, PlannedTrial
 
 Signature = tuple[Any, ...]
+_Record = tuple[Path, dict[str, np.ndarray]]
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".tra", ".lvm", ".dat", ".asc")
 SETTLED_S = 0.5  # during which a file's size and time stay the same
+_READ_S = 0.3  # that a file is read for before others have their turn: the Uno vents unless its host is heard in 2 s
 
 _STAND = {
     "static_loading": "the {actuator} actuator in the testing machine, contracted",
@@ -86,7 +89,9 @@ class OwnInstruments:
         self._experiment = ""
         self._known: dict[Path, Signature] = {}
         self._seen: dict[Path, tuple[Signature, float]] = {}
-        self._record: tuple[Path, dict[str, np.ndarray]] | None = None
+        self._record: _Record | None = None
+        self._reader = futures.ThreadPoolExecutor(1, thread_name_prefix="bifa-record")
+        self._reading: futures.Future[_Record] | None = None
 
     def begin(self, turn: Turn, kept: Path) -> None:
         """What is asked from now on is for this trial; `kept`: the folder of the earlier trials' files."""
@@ -94,7 +99,7 @@ class OwnInstruments:
 
     def mount(self, experiment: str, **settings: Any) -> None:
         """See Instruments."""
-        self._experiment, self._record = experiment, None
+        self._experiment, self._record, self._reading = experiment, None, None
         self._declared = self._exports()
         stand = _STAND[experiment].format(**settings)
         slope = settings.get("inclination_deg")
@@ -130,8 +135,10 @@ class OwnInstruments:
     @property
     def ready(self) -> bool:
         """See AskedInstruments. Raises KeyboardInterrupt where the answer is to stop; no other word starts anything."""
+        if self._reading is not None:
+            return self._taken()
         if self._step in ("move", "save") and self._watch is not None and self._take_new():
-            self._step = "saved"
+            return True
         if self._step in ("", "saved"):
             return True
         answer = self._desk.answer()
@@ -265,8 +272,7 @@ class OwnInstruments:
         for path, signature in self._signatures():
             if self._known.get(path) != signature and self._is_settled(path, signature):
                 self._known[path] = signature
-                if self._take(path):
-                    return True
+                return self._take(path)
         return False
 
     def _take_correction(self) -> None:
@@ -296,15 +302,27 @@ class OwnInstruments:
         return self._take(path)
 
     def _take(self, path: Path) -> bool:
+        self._reading = self._reader.submit(self._read, path)
+        return self._taken()
+
+    def _read(self, path: Path) -> _Record:
+        columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
+        self._refuse_earlier(path)
+        return path, {**columns, "sync_time_s": edges}
+
+    def _taken(self) -> bool:
+        """Whether what is being read is the record, which a workbook may take many seconds to tell."""
+        assert self._reading is not None
         try:
-            columns, edges = read_instrument(path, CHANNELS[self._experiment], self._export)
-            self._refuse_earlier(path)
+            self._record = self._reading.result(_READ_S)
+        except futures.TimeoutError:
+            return False
         except DatasetError as error:
             self._desk.say(f"{error}. Correct it and save it again.")
-            return False
-        self._record = (path, {**columns, "sync_time_s": edges})
-        self._step = "saved"
-        return True
+        self._reading = None
+        if self._record is not None:
+            self._step = "saved"
+        return self._record is not None
 
     def _refuse_earlier(self, path: Path) -> None:
         """Refuse the file of an earlier trial: somebody saved or named the wrong one."""

@@ -2,16 +2,19 @@
 
 import re
 from functools import partial
+from threading import Event
 
 import numpy as np
 import pytest
 
+from bifa.measure import own_instruments
 from bifa.measure.bench_file import read_exports
 from bifa.measure.desk import Desk
+from bifa.measure.instrument_csv import read_instrument
 from bifa.measure.own_instruments import OwnInstruments, Turn
 from bifa.measure.plan import PlannedTrial
 from harness.exports import EXPORTS
-from harness.waiting import until
+from harness.waiting import PATIENCE_S, until
 
 
 class Typing(Desk):
@@ -51,8 +54,8 @@ def test_an_earlier_trials_record_is_refused(said, tmp_path):
         path.write_text("time_s,displacement_mm,force_N\n1,2,3\n2,3,4\n")
         path.with_suffix(".sync.csv").write_text("sync_time_s\n1\n2\n")
     typing = Typing(said.append, str(tmp_path / "again.csv"))
-    assert not recorded(OwnInstruments(typing), tmp_path / "raw").ready
-    assert "an earlier trial, anchor_first.csv" in said[-1]
+    own = recorded(OwnInstruments(typing), tmp_path / "raw")
+    assert until(lambda: not own.ready and "an earlier trial, anchor_first.csv" in said[-1])
 
 
 # -- the watched folder ---------------------------------------------------------------------------------------
@@ -141,6 +144,28 @@ def test_what_systems_leave_behind_is_no_record(watching, said, stray):
     own, folder = watching()
     (folder / stray).write_text("x")
     assert not looked(own, lambda: said, 0.9)
+
+
+def test_who_looks_is_not_kept_while_a_large_file_is_read(watching, said, monkeypatch):
+    """The Uno has to hear of its host meanwhile, or it vents what is held."""
+    asked, told = Event(), Event()
+
+    def read_at_length(*given):
+        asked.set()
+        told.wait()
+        return read_instrument(*given)
+
+    monkeypatch.setattr(own_instruments, "read_instrument", read_at_length)
+    own, folder = watching('[instrument.machine]\npreset = "testxpert"\n')
+    (folder / "pull.TRA").write_bytes(EXPORTS["testxpert"].write(RECORD))
+    (folder / "pull.sync.csv").write_text(SYNC)
+    try:
+        assert looked(own, asked.is_set, PATIENCE_S)
+        assert not own.ready
+    finally:
+        told.set()
+    assert looked(own, seconds=PATIENCE_S), said
+    np.testing.assert_allclose(own.stop()["force_N"], RECORD["force_N"], atol=2e-3)
 
 
 def test_a_record_that_has_its_own_sync_needs_no_second_file(watching, said):
