@@ -82,13 +82,15 @@ def _best_grown(
     jobs = [(p.problem, p.start, lost) for p in promises]
     solutions = workers.map("learning a curve for", names, _coarse, jobs)
     fits = [Fit(p.problem, solution, 1, 1) for p, solution in zip(promises, solutions, strict=True)]
-    best = min((judge(fit, split, policy) for fit in fits), key=lambda c: c.checked.cost, default=None)
+    best = min(
+        (judge(fit, split, policy, near=before.checked) for fit in fits), key=lambda c: c.checked.cost, default=None
+    )
     left = max(before.checked.cost - 0.5 * effective_samples(before.checked), 0.0)
     if best is None or before.checked.cost - best.checked.cost < policy.curve * left:
         return None
     # to the end, from where the coarse fit stands: a curve leads the others nowhere else
     problem, begun = best.fitted.problem, best.fitted.solution.point
-    refined = judge(Fit(problem, solve(problem, begun, **_REFINED), 1, 1), split, policy)
+    refined = judge(Fit(problem, solve(problem, begun, **_REFINED), 1, 1), split, policy, near=before.checked)
     best = min(best, refined, key=lambda c: c.checked.cost)
     # a fit may not buy small residuals with large ones, which its cost compresses
     return best if best.checked_error < before.checked_error else None

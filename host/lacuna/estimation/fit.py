@@ -213,7 +213,8 @@ def reweigh(fitted: Fit, floor: NoiseFloor, *, max_iterations: int) -> Fit:
 
 def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = None) -> Fit:
     """The fitted parameters on other trials: only the trials' own nuisances are estimated, each trial's once, from
-    where `near` has them if it knows them all."""
+    where `near` has them if it knows them all. The cost is of these trials alone: what the parameters themselves
+    cost, their own fit has counted."""
     known, values = fitted.known_nuisances, fitted.solution.point.values
     asked = fitted.problem.over([t for t in trials if t.name not in known])
     if any(asked.nuisances):
@@ -228,7 +229,8 @@ def evaluate_on(fitted: Fit, trials: Sequence[Record], *, near: Fit | None = Non
     # where all were asked, their residuals are still remembered
     problem = asked if len(asked.trials) == len(trials) else fitted.problem.over(trials)
     point = Point(values, tuple(known.get(t.name, _NONE) for t in problem.trials))
-    solution = Solution(point, cost_of(problem, point), True, (), np.zeros((0, 0)), ())
+    cost = cost_of(problem, point) - problem.structure_prior_cost(point)
+    solution = Solution(point, cost, True, (), np.zeros((0, 0)), ())
     return Fit(problem, solution, fitted.starts, fitted.starts_agreeing)
 
 

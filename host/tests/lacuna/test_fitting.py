@@ -86,6 +86,17 @@ def test_the_nuisances_of_other_trials_are_estimated_once_and_as_if_they_were_al
     assert alone.cost == pytest.approx(prior + 0.5 * residuals @ residuals, abs=0.02)
 
 
+def test_what_parameters_cost_by_their_prior_is_counted_once():
+    system = hide({}, seed=5, repeats=3)
+    first, *others = system.parameters
+    known = replace(first, value=1.2 * first.value, prior_sd=0.01 * first.value)
+    system = replace(system, parameters=(known, *others))
+    fitted = fit(Structure(system), system.trials[:4], estimate_noise(system, system.trials))
+    assert fitted.problem.structure_prior_cost(fitted.solution.point) > 1.0
+    halves = [evaluate_on(fitted, trials).cost for trials in (system.trials[4:6], system.trials[6:8])]
+    assert evaluate_on(fitted, system.trials[4:8]).cost == pytest.approx(sum(halves))
+
+
 @pytest.mark.parametrize("view", [View(), View(1 / 60, 10.0, 30.0), View(soft_limit=2.0)])
 def test_derivatives_are_those_of_the_residuals_however_they_are_looked_at(view):
     system = hide({}, seed=6, repeats=1)
