@@ -101,7 +101,7 @@ def of_parameter(p: Parameter, ordered: bool = False) -> Coordinate:
 def of_size(p: Parameter, absent: float) -> Coordinate:
     """Of a parameter that sizes an effect."""
     far = abs(absent) >= _FAR * abs(p.value) and absent * p.value > 0.0
-    return INVERSE if far and min(p.lower, p.upper) * max(p.lower, p.upper) >= 0.0 else PLAIN
+    return INVERSE if far and (p.lower >= 0.0 or p.upper <= 0.0) else PLAIN
 
 
 def of_effect(effect: Effect) -> tuple[Effect, dict[str, Coordinate]]:

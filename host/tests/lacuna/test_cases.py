@@ -1,11 +1,12 @@
 """Systems on which the engine's logic was once wrong, rewritten with invented numbers: each says what is true."""
 
 import numpy as np
+import pytest
 from heater import said_of
 
 import lacuna
 from lacuna import Effect, Parameter
-from lacuna.coordinates import LIMITS
+from lacuna.coordinates import INVERSE, LIMITS, PLAIN, of_size
 from lacuna.diagnosis.split import split_trials
 from lacuna.system import Record, middle_conditions
 
@@ -97,6 +98,11 @@ def test_fits_with_a_limit_begin_where_it_is_declared_and_on_both_sides_of_it():
         lacuna.System(lambda r, t: r.time_s, GAIN, [e]).effects[e.name].start_factors for e in (limit, plain, own)
     ]
     assert begins == [LIMITS, (0.1, 0.4, 1.2), (0.5,)]
+
+
+@pytest.mark.parametrize("ends", [(0.0, np.inf), (1.0, 1e9), (-np.inf, np.inf)])
+def test_a_limit_of_one_sign_is_fitted_as_its_inverse(ends):
+    assert of_size(Parameter("limit", "W", 8.0, *ends), 1e6) is (INVERSE if ends[0] >= 0.0 else PLAIN)
 
 
 def test_of_three_repeated_conditions_the_middle_one_is_never_fitted_unless_one_says_which():
