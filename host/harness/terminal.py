@@ -29,7 +29,10 @@ class Terminal:
         return self
 
     def __exit__(self, *_) -> None:
-        self.program.close(force=True)
+        try:
+            self.program.close(force=True)
+        except pexpect.ExceptionPexpect:  # it was killed, which takes a busy machine more than a tenth of a second
+            self.program.ptyproc.wait()
 
     def look(self) -> list[str]:
         """The lines of the screen as they are now."""
