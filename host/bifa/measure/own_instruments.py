@@ -318,11 +318,11 @@ class OwnInstruments:
         except futures.TimeoutError:
             return False
         except DatasetError as error:
+            self._reading = None
             self._desk.say(f"{error}. Correct it and save it again.")
-        self._reading = None
-        if self._record is not None:
-            self._step = "saved"
-        return self._record is not None
+            return False
+        self._reading, self._step = None, "saved"
+        return True
 
     def _refuse_earlier(self, path: Path) -> None:
         """Refuse the file of an earlier trial: somebody saved or named the wrong one."""

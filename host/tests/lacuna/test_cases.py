@@ -100,9 +100,11 @@ def test_fits_with_a_limit_begin_where_it_is_declared_and_on_both_sides_of_it():
     assert begins == [LIMITS, (0.1, 0.4, 1.2), (0.5,)]
 
 
-@pytest.mark.parametrize("ends", [(0.0, np.inf), (1.0, 1e9), (-np.inf, np.inf)])
-def test_a_limit_of_one_sign_is_fitted_as_its_inverse(ends):
-    assert of_size(Parameter("limit", "W", 8.0, *ends), 1e6) is (INVERSE if ends[0] >= 0.0 else PLAIN)
+@pytest.mark.parametrize(
+    ("ends", "fitted"), [((0.0, np.inf), INVERSE), ((1.0, 1e9), INVERSE), ((-np.inf, np.inf), PLAIN)]
+)
+def test_a_limit_of_one_sign_is_fitted_as_its_inverse(ends, fitted):
+    assert of_size(Parameter("limit", "W", 8.0, *ends), 1e6) is fitted
 
 
 def test_of_three_repeated_conditions_the_middle_one_is_never_fitted_unless_one_says_which():
