@@ -17,7 +17,6 @@ from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import effective_samples
 from lacuna.system import Record
 
-LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
 _CONTINUED = 1e-3  # of the cost: where a refit with fewer effects may stop
 
 

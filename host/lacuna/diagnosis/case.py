@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from functools import wraps
 from typing import Any, TypeVar
 
-from lacuna.diagnosis.candidate import LOWER, Candidate, judge, sharpened_floor
+from lacuna.diagnosis.candidate import Candidate, judge, sharpened_floor
 from lacuna.diagnosis.nuisances import Followed, by_condition, find_followed, met_by_chance
 from lacuna.diagnosis.policy import Policy
 from lacuna.diagnosis.race import continued, helps_at_once
@@ -34,14 +34,13 @@ from lacuna.estimation.fit import (
     renewed,
     spread_starts,
 )
-from lacuna.estimation.noise import NoiseFloor, estimate_noise
+from lacuna.estimation.noise import LOWER, SHARPENED, NoiseFloor, estimate_noise
 from lacuna.estimation.settle import settle
 from lacuna.estimation.solve import solve
 from lacuna.estimation.structure import Structure
 from lacuna.estimation.uncertainty import intervals
 from lacuna.system import System
 
-_SHARPENED = 5  # times at most
 _ROUGH, _FINE = 1e-3, 1e-4  # of the cost: where a fit may stop that another follows, and one that is reported
 _HOPELESS = 5.0  # times what may be: no refit to some trials more takes so much away,
 _DOUBTFUL = 1.5  # and no last digits of it so much
@@ -104,7 +103,7 @@ class Case:
         since a run has to be predicted without knowing it (`predictive`)."""
         if any(p.factor_of for parameters in candidate.fitted.problem.nuisances for p in parameters):
             return candidate
-        for _ in range(_SHARPENED):
+        for _ in range(SHARPENED):
             floor = candidate.fitted.problem.floor
             lower = sharpened_floor(candidate, self.split, floor)
             if not self.suffices(candidate) or lower.share_of(floor) >= LOWER:

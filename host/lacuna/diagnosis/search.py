@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from lacuna.diagnosis.candidate import LOWER, Candidate, judge, refitted_without, sharpened_floor
+from lacuna.diagnosis.candidate import Candidate, judge, refitted_without, sharpened_floor
 from lacuna.diagnosis.case import Case
 from lacuna.diagnosis.learn import free_form
 from lacuna.diagnosis.race import NEAR, joined, race
@@ -14,7 +14,7 @@ from lacuna.diagnosis.score import Promise, Scores, Screened, score
 from lacuna.diagnosis.split import Split
 from lacuna.diagnosis.workers import Workers
 from lacuna.estimation.fit import reweigh, starting_point
-from lacuna.estimation.noise import NoiseFloor
+from lacuna.estimation.noise import LOWER, NoiseFloor
 from lacuna.estimation.solve import cost_of
 from lacuna.system import Effect
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lacuna.estimation.graduated import solve_graduated
-from lacuna.estimation.noise import NoiseFloor, estimate_noise
+from lacuna.estimation.noise import LOWER, SHARPENED, NoiseFloor, estimate_noise
 from lacuna.estimation.problem import PLAIN, SOFT_LIMIT, Point, Problem
 from lacuna.estimation.solve import ENOUGH, RELATIVE, Solution, cost_of, solve
 from lacuna.estimation.structure import Structure
@@ -267,11 +267,19 @@ def _drawn(structure: Structure, around: np.ndarray, draw: np.random.Generator) 
 
 
 def fit_base(system: System, trials: Sequence[Record]) -> Fit:
-    """Fit the base model, then take the noise floor again from what repeats differ by in the residual, and refit."""
-    structure = Structure(system)
-    first = fit(structure, trials, estimate_noise(system, trials), max_iterations=30, graduated=True)
-    sharper = estimate_noise(system, trials, first.residuals())
-    return fit(structure, trials, sharper, starts=[first.solution.point.values], max_iterations=10)
+    """Fit the base model, then take the noise floor from what repeats differ by in the residual and refit, for as long
+    as the floor falls: the first one has in it whatever else differs between runs."""
+    floor = estimate_noise(system, trials)
+    found = fit(Structure(system), trials, floor, max_iterations=30, graduated=True)
+    for _ in range(SHARPENED):
+        sharper = floor.lowered_by(estimate_noise(system, trials, found.residuals()))
+        fallen, floor = sharper.share_of(floor), sharper
+        problem = found.problem.over(trials, floor)
+        solution = solve(problem, found.solution.point, max_iterations=10)
+        found = Fit(problem, solution, found.starts, found.starts_agreeing)
+        if fallen >= LOWER:
+            break
+    return found
 
 
 def starting_point(fitted: Fit, structure: Structure) -> np.ndarray:

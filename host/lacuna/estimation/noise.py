@@ -24,6 +24,8 @@ from lacuna.estimation.sampling import correlation_samples, evenly, sample_perio
 from lacuna.system import Channels, Record, System, by_channel, groups_of_repeats
 
 # Gauss-Hermite quadrature: the mean over a normally distributed shift in time, in standard deviations of it.
+LOWER = 0.9  # a floor that falls below this share of the old one changes the weights
+SHARPENED = 5  # times at most that one is taken again
 _SHIFT_NODES, _SHIFT_WEIGHTS = hermegauss(8)
 _SHIFT_WEIGHTS /= _SHIFT_WEIGHTS.sum()
 _LONGEST_JITTER_S = 0.5

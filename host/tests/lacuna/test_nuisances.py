@@ -6,6 +6,8 @@ import pytest
 import lacuna
 from lacuna import Effect, Parameter
 from lacuna.diagnosis.nuisances import Followed, met_by_chance
+from lacuna.estimation.fit import fit_base
+from lacuna.records import read
 
 TIME_S = np.linspace(0.0, 1.0, 60)
 TEMPERATURES_K = (-10.0, -4.0, 0.0, 3.0, 7.0, 12.0)
@@ -90,6 +92,14 @@ def test_runs_that_differ_by_many_times_the_noise_hide_no_effect(spread_mm):
     lower, upper = found.effects[0].interval["per_mm2"]
     assert lower < 0.03 < upper
     assert lacuna.diagnose(system(spread_mm), records(0, np.zeros(6), spread_mm), progress=False).verdict == "none"
+
+
+@pytest.mark.parametrize("spread_mm", [SPREAD_MM, 5.0, 100.0])
+def test_a_base_fit_leaves_the_noise_however_far_apart_runs_begin(spread_mm):
+    tables = read(records(1, np.zeros(6), spread_mm))
+    fitted = fit_base(system(spread_mm), [table.record(["x_mm"]) for table in tables])
+    left_mm = np.concatenate([left["x_mm"] for left in fitted.residuals().values()])
+    assert np.sqrt(np.mean(left_mm**2)) == pytest.approx(NOISE_MM, rel=0.05)
 
 
 @pytest.mark.parametrize("parameters", [1, 2])
