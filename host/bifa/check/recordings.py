@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bifa.data import EXPERIMENTS, Dataset, Trial
+from bifa.data.dataset import conditions_of
 from bifa.data.layout import is_command
 from bifa.data.lost import codes, held, runs
 
@@ -160,6 +161,7 @@ def _commanded_pressure(trial: Trial) -> Iterator[Finding]:
 
 
 def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
+    called = conditions_of(dataset)
     for group in dataset.repeats():
         numbers, lacking = {trial.repeat for trial in group}, REPEATS_WANTED - len(group)
         if lacking > 0:
@@ -167,7 +169,7 @@ def _missing_repeats(dataset: Dataset) -> Iterator[Finding]:
             why = "no noise floor can be estimated from it" if len(group) == 1 else "the noise floor is less certain"
             which = f"repeat {absent[0]} is" if len(absent) == 1 else f"repeats {', '.join(map(str, absent))} are"
             text = f"{which} missing; {why}"
-            yield Finding("missing repeats", text, condition=group[0].label)
+            yield Finding("missing repeats", text, condition=called[group[0].file])
 
 
 def _missing_experiments(dataset: Dataset) -> Iterator[Finding]:

@@ -74,19 +74,22 @@ def _print_findings(console: "Console", findings: "Sequence[Finding]") -> None:
 
 
 def _print_contents(console: "Console", dataset: "Dataset") -> None:
+    from bifa.data.dataset import conditions_of
     from bifa.printable import counted
     from bifa.report.page import PageTable
     from bifa.report.terminal import print_lines, print_table
     from bifa.report.words import parameter_words, quantity
     from bifa.robot import nominal
 
-    rows = []
+    rows, called = [], conditions_of(dataset)
     for group in dataset.repeats():
         samples = [len(trial.time_s) for trial in group]
         rates = [trial.rate_hz for trial in group]
         seconds = sum(float(trial.time_s[-1] - trial.time_s[0]) for trial in group)
         repeats = ", ".join(str(trial.repeat) for trial in group)
-        rows.append([group[0].label, repeats, f"{sum(samples)}", f"{sum(rates) / len(rates):.1f}", f"{seconds:.1f}"])
+        rows.append(
+            [called[group[0].file], repeats, f"{sum(samples)}", f"{sum(rates) / len(rates):.1f}", f"{seconds:.1f}"]
+        )
     columns = ["experiment and settings", "repeats", "samples", "rate, Hz", "duration, s"]
     print_table(console, PageTable(columns, rows, f"{dataset.name}: {counted(len(dataset.trials), 'trial')}"))
     units = {name: parameter.unit for name, parameter in nominal().parameters.items()}

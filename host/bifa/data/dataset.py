@@ -1,7 +1,7 @@
 """A data set in memory: what was known beforehand, and the trials."""
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -178,6 +178,26 @@ class Dataset:
         yield from (tuple(group) for group in groups.values())
 
 
+def conditions_of(dataset: Dataset) -> dict[str, str]:
+    """What the condition of each trial is called, by file: its label, and by what gaits of one label differ."""
+    alike: dict[str, list[tuple[Trial, ...]]] = defaultdict(list)
+    for group in dataset.repeats():
+        alike[group[0].label].append(group)
+    called: dict[str, str] = {}
+    for label, groups in alike.items():
+        gaits = [group[0].gait or {} for group in groups]
+        names = [name for name in {name: None for gait in gaits for name in gait} if not _is_same(name, gaits)]
+        for group, gait in zip(groups, gaits, strict=True):
+            parts = [f"{name} {gait[name]:.4g}" for name in names if name in gait]
+            called |= {trial.file: ", ".join([label, *parts]) for trial in group}
+    return called
+
+
+def _is_same(name: str, gaits: Sequence[Mapping[str, float]]) -> bool:
+    return len({gait.get(name) for gait in gaits}) == 1
+
+
 def labels_of(dataset: Dataset) -> dict[str, str]:
     """What each trial is called in a few words, its repeat among them, by file."""
-    return {trial.file: f"{trial.label} (run {trial.repeat})" for trial in dataset.trials}
+    called = conditions_of(dataset)
+    return {trial.file: f"{called[trial.file]} (run {trial.repeat})" for trial in dataset.trials}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from bifa.data.dataset import Dataset, Trial
+from bifa.data.dataset import Dataset, Trial, conditions_of
 from bifa.data.layout import is_command
 from bifa.report.chart import Axis, Chart, Column, Key, Panel, Series, thinned
 from bifa.report.picture import draw_chart
@@ -21,15 +21,17 @@ _REPEATS = ("ink", "after", "before", "quiet")
 def plot_dataset(dataset: Dataset, folder: Path) -> list[Path]:
     """Write one PNG per condition into `folder`; returns their paths."""
     written: list[Path] = []
+    called = conditions_of(dataset)
     for number, group in enumerate(dataset.repeats(), start=1):
-        path = folder / f"{number:02d}_{re.sub(r'[^A-Za-z0-9.]+', '_', group[0].label)}.png"
-        draw_chart(condition_chart(group), path)
+        condition = called[group[0].file]
+        path = folder / f"{number:02d}_{re.sub(r'[^A-Za-z0-9.]+', '_', condition)}.png"
+        draw_chart(condition_chart(group, condition), path)
         written.append(path)
     return written
 
 
-def condition_chart(group: Sequence[Trial]) -> Chart:
-    """Repeats of one condition: against displacement for a static loading or a pull, against time for the others; a
+def condition_chart(group: Sequence[Trial], condition: str) -> Chart:
+    """Repeats of one `condition`: against displacement for a static loading or a pull, against time for the others; a
     panel a quantity. A chamber has its own colour; where there is none, a repeat has."""
     first = group[0]
     quasi_static = first.experiment in ("static_loading", "anchor_pull")
@@ -51,7 +53,7 @@ def condition_chart(group: Sequence[Trial]) -> Chart:
                 series.append(Series((key.label,), x, lifted, key.color, style))
         across = Axis(f"{channel_words(abscissa)}, {unit_of(abscissa)}")
         panels.append(Panel(series, across, _upward(what, names)))
-    title = f"{first.label} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
+    title = f"{condition} ({len(group)} {'run' if len(group) == 1 else 'runs'})"
     return Chart([Column(panels)], list(keys.values()), title, title=title, across=1, height=160)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bifa.data.dataset import conditions_of
 from bifa.identify.identification import Identification
 from bifa.printable import counted
 from bifa.report.compared_curves import compared_curves
@@ -43,8 +44,9 @@ def fit_page(found: Identification) -> Page:
 
 def curves(found: Identification) -> list[ChartedSection]:
     """What was measured beside the model, a section an experiment."""
-    labels = {trial.file: trial.label for trial in found.system.dataset.trials}
-    return compared_curves(found.fit.problem.trials, {BASE: found.fit.predictions()}, labels)
+    return compared_curves(
+        found.fit.problem.trials, {BASE: found.fit.predictions()}, conditions_of(found.system.dataset)
+    )
 
 
 def draw_curves(found: Identification, folder: Path) -> list[Path]:

@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from bifa.data import DatasetError, read_dataset
+from bifa.data import Dataset, DatasetError, Trial, read_dataset
+from bifa.data.dataset import conditions_of
 from harness.data_sets import assert_same, make_dataset
 from harness.native import ROOT
 
@@ -40,6 +41,21 @@ def test_what_was_written_is_read_and_its_repeats_are_grouped_by_condition(folde
     groups = list(dataset.repeats())
     assert [[trial.repeat for trial in group] for group in groups] == [[1, 2]] * 4
     assert [len({trial.condition for trial in group}) for group in groups] == [1] * 4
+
+
+def test_gaits_of_one_period_are_called_by_what_they_differ_in():
+    gaits = [{"period_s": 2.0, "psi12_deg": psi12, "duty_body": duty} for psi12, duty in ((270, 0.5), (200, 0.652918))]
+    walks = [
+        Trial(f"{k}_{n}.csv", "locomotion", {}, gait=gait, repeat=n) for k, gait in enumerate(gaits) for n in (1, 2)
+    ]
+    other = Trial("brisk.csv", "locomotion", {}, gait={**gaits[0], "period_s": 1.5})
+    assert conditions_of(Dataset(None, "a day", {}, (*walks, other))) == {
+        "0_1.csv": "walk, period 2 s, psi12_deg 270, duty_body 0.5",
+        "0_2.csv": "walk, period 2 s, psi12_deg 270, duty_body 0.5",
+        "1_1.csv": "walk, period 2 s, psi12_deg 200, duty_body 0.6529",
+        "1_2.csv": "walk, period 2 s, psi12_deg 200, duty_body 0.6529",
+        "brisk.csv": "walk, period 1.5 s",
+    }
 
 
 def edit_lines(change):

@@ -41,7 +41,7 @@ def test_predicted_pressures_are_drawn_too_and_nothing_simulated_is_called_measu
 def test_a_walk_s_chambers_have_their_colors_and_commands_rows_of_their_own():
     gait = {"period_s": 2.0}
     group = [Trial(f"{n}.csv", "locomotion", columns(2.0), gait=gait, repeat=n) for n in (1, 2)]
-    chart = condition_chart(group)
+    chart = condition_chart(group, group[0].label)
     assert chart.title == "walk, period 2 s (2 runs)"
     assert {key.label: key.color for key in chart.keys} == {"body": "body", "head": "head", "tail": "tail"}
     (column,) = chart.columns
@@ -54,7 +54,7 @@ def test_a_walk_s_chambers_have_their_colors_and_commands_rows_of_their_own():
 def test_repeats_of_a_test_stand_are_told_apart():
     record = {"time_s": np.arange(3.0), "displacement_mm": np.arange(3.0), "force_N": np.arange(3.0)}
     group = [Trial(f"{n}.csv", "static_loading", record, actuator="large", repeat=n) for n in (1, 2)]
-    chart = condition_chart(group)
+    chart = condition_chart(group, "static loading")
     assert [key.label for key in chart.keys] == ["run 1", "run 2"]
     assert chart.columns[0].panels[0].x.label == "displacement, mm"
     assert chart.columns[0].panels[0].y.label == "force, N"
