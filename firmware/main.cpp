@@ -1,4 +1,4 @@
-// Wiring only: which part knows which.
+// Connects the parts to one another; contains no other logic.
 #include <avr/interrupt.h>
 #include <avr/sleep.h>
 
@@ -19,13 +19,13 @@ bifa::HostPort port(controller);
 
 const uint16_t kSupplyEvery_ms = 100;
 
-/// Something has happened that the main loop may have to attend to: a byte arrived, or time passed. It would wake for
-/// every tick, conversion and sent byte otherwise, some thousand times a second for nothing.
+/// Set when the main loop may have something to do: a byte arrived, or time passed. Otherwise it would run after every
+/// tick, conversion and sent byte, some thousand times a second for nothing.
 volatile bool attend = true;
-/// How often it looks without a byte: about as often as the EEPROM can take one.
+/// How often the main loop runs without a byte: about as often as the EEPROM can accept one.
 const uint8_t kAttendEvery_ms = 5;
 
-/// Tells the regulator its set-point when that has changed, and again from time to time.
+/// Sends the regulator its set-point when it has changed, and repeats it periodically.
 void tell_supply() {
   static uint16_t told = 0xFFFF;
   static uint32_t told_ms = 0;
@@ -57,11 +57,11 @@ void board::on_emergency_stop() { controller.stop_in_interrupt(); }
 void board::on_round(const bifa::RawRound& round) { controller.converted_in_interrupt(round); }
 void bifa::outdate_input() { port.outdate(); }
 
-/// Instead of Arduino's, which would start three timers for PWM and the converter as nothing here uses them.
+/// Replaces Arduino's main(), which would set up three timers for PWM and the converter, all unused here.
 int main() {
   board::pins_begin();
   board::uart_begin();
-  sleep_enable();  // for good: a hundred wakings a sample are too many to do it each time
+  sleep_enable();  // permanently: doing it at each of a hundred wake-ups per sample would cost too much
   sei();
   const bifa::StartCause cause = board::start_cause();
   port.begin(board::boot_nonce(), cause);
@@ -70,7 +70,7 @@ int main() {
   board::tick_begin();
   board::watchdog_begin();
   while (true) {
-    while (!attend) sleep_cpu();  // an interrupt between the two costs a tick at most
+    while (!attend) sleep_cpu();  // an interrupt between test and sleep costs at most a tick
     attend = false;
     board::watchdog_feed();
     port.poll();

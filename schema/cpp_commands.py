@@ -1,4 +1,4 @@
-"""Writes lib/commands/command_table.{h,cpp} and lib/link/message_table.{h,cpp}."""
+"""Generate lib/commands/command_table.{h,cpp}, lib/text/phrase_table.cpp and lib/link/message_table.{h,cpp}."""
 
 from cpp_parameters import C_TYPE, NOTICE, constant, text_list
 from frame import OPEN_SEED, frame
@@ -6,7 +6,7 @@ from tables import NAME_BYTES, CommandTable, Message
 
 
 def words(name: str, entries: list[str], packed: dict[str, str] | None = None) -> str:
-    """The definition of a list of texts in flash."""
+    """Return the C++ definition of a list of strings in flash; `packed` maps entries to their packed form."""
     return f"const char {name}[] BIFA_FLASH =\n{text_list(entries, packed or {})}"
 
 
@@ -87,7 +87,7 @@ const uint8_t kCommandWords[kCommandCount] BIFA_FLASH = {{
 
 
 def stop_frame(table: CommandTable) -> bytes:
-    """The only bytes that the stop message ever has: it is open, and its sequence number is 0."""
+    """Return the stop message's frame, always the same bytes: it is of kind `open`, and its sequence number is 0."""
     number = next(c.message.number for c in table.commands if c.name == "stop_now")
     return frame(bytes([number, 0]), OPEN_SEED)
 
@@ -97,7 +97,8 @@ def _struct_name(message: Message) -> str:
 
 
 def _cases(messages: list[Message], rest: str, form: str) -> str:
-    """The cases of a switch over messages: each calls the member that is named after it, with its fields and `rest`."""
+    """Return the cases of a switch over messages. Each calls the member named after its message, with the message's
+    fields and `rest`; `form` is the template of the statement around the call."""
 
     def call(message: Message) -> str:
         fields = [f"fields_as<{_struct_name(message)}>(fields)"] if message.fields else []

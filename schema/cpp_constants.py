@@ -1,4 +1,4 @@
-"""Writes lib/constants/constants.h."""
+"""Generate lib/constants/constants.h."""
 
 from cpp_parameters import C_TYPE, NOTICE, constant
 from tables import Constant
@@ -19,5 +19,5 @@ namespace bifa {{
 
 
 def _name(given: Constant) -> str:
-    """`kDeadTime_ms`."""
+    """Return the C++ name with its unit, such as `kDeadTime_ms`."""
     return "_".join(part for part in (constant(given.name), given.unit) if part)

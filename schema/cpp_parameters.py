@@ -1,4 +1,4 @@
-"""Writes lib/parameters/parameter_table.h and .cpp."""
+"""Generate lib/parameters/parameter_table.{h,cpp}."""
 
 from tables import WIRE_BYTES, ParameterTable
 
@@ -7,18 +7,18 @@ C_TYPE = {"u8": "uint8_t", "u16": "uint16_t", "i16": "int16_t", "u32": "uint32_t
 
 
 def constant(name: str) -> str:
-    """`period_s` -> `kPeriodS`."""
+    """Return the C++ name of a constant: `period_s` -> `kPeriodS`."""
     return "k" + "".join(part[:1].upper() + part[1:] for part in name.split("_"))
 
 
 def text(value: str) -> str:
-    """A literal of C++; the codes of packed texts are written in octal, which ends after three digits."""
+    """Return a C++ string literal. Codes of packed phrases become octal escapes, which end after three digits."""
     plain = value.replace("\\", "\\\\").replace('"', '\\"').replace("\0", "\\0")
     return '"' + "".join(c if c.isascii() else f"\\{ord(c):03o}" for c in plain) + '"'
 
 
 def text_list(entries: list[str], packed: dict[str, str]) -> str:
-    """Lines of a list of texts in flash, each ended by a zero; a packed one stands in full beside it."""
+    """Return the source lines of zero-terminated strings in flash, with the plain text of packed ones in comments."""
     lines = [f'    {text(packed.get(entry, entry))[:-1]}\\0"' for entry in entries]
     lines[-1] += ";"
     notes = [f"  // {entry}" if packed.get(entry, entry) != entry else "" for entry in entries]

@@ -1,4 +1,4 @@
-"""Writes the tables in docs/protocol.md, between the markers `<!-- table NAME -->` and `<!-- end -->`."""
+"""Generate the tables in docs/protocol.md, between the markers `<!-- table NAME -->` and `<!-- end -->`."""
 
 import re
 
@@ -15,7 +15,7 @@ def _messages(messages: list[Message], usages: dict[str, str | None]) -> str:
 
 
 def page(text: str, commands: CommandTable) -> str:
-    """`text` with its tables as they are now."""
+    """Return `text` with its tables regenerated. Raises ValueError unless it has exactly one place for each table."""
     usages = {c.name: c.usage for c in commands.commands}
     results = [f"| {i} | `{name}` | {words} |" for i, (name, words) in enumerate(commands.results)]
     tables = {
@@ -31,5 +31,5 @@ def page(text: str, commands: CommandTable) -> str:
         pattern = rf"(<!-- table {name} -->\n).*?(<!-- end -->)"
         text, count = re.subn(pattern, lambda m, table=table: f"{m[1]}{table}\n{m[2]}", text, flags=re.S)
         if count != 1:
-            raise ValueError(f"docs/protocol.md: expected one place for the table {name}, found {count}")
+            raise ValueError(f"docs/protocol.md: expected the markers of table {name} once, found them {count} times")
     return text

@@ -1,4 +1,4 @@
-"""The form of a frame, as far as the generator needs it: two checks and COBS (docs/protocol.md)."""
+"""Encoding of a frame, as far as the generator needs it: two CRCs, COBS and a mask (docs/protocol.md)."""
 
 import binascii
 
@@ -14,13 +14,13 @@ def _reflected_crc16(data: bytes, crc: int) -> int:
 
 
 def mask(code: bytes) -> bytes:
-    """`code` under the least mask that leaves neither 0x00 nor `!` in it, with the mask in front."""
+    """Return `code` XORed with the smallest mask that leaves neither 0x00 nor `!` in it, preceded by that mask."""
     least = next(m for m in range(1, 256) if m != ord("!") and not {m, m ^ ord("!")} & set(code))
     return bytes([least]) + bytes(byte ^ least for byte in code)
 
 
 def frame(message: bytes, seed: int) -> bytes:
-    """The message and its two checks as they go to the Uno, without the delimiters; at most 100 bytes."""
+    """Return the message and its two checks as sent to the Uno, without the delimiters; at most 100 bytes."""
     first = binascii.crc_hqx(message, seed & 0xFFFF)
     second = _reflected_crc16(message, seed >> 16)
     body = message + first.to_bytes(2, "little") + second.to_bytes(2, "little")

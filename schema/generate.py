@@ -1,4 +1,4 @@
-"""Generates what follows from the tables of this folder; `--check` only says whether the tree is up to date.
+"""Generate the files derived from the tables in this folder; `--check` only reports whether they are up to date.
 
 python schema/generate.py
 """
@@ -21,7 +21,7 @@ ROOT = Path(__file__).parent.parent
 
 
 def generated() -> dict[Path, str]:
-    """Every generated file with its text."""
+    """Return the text of every generated file, by path."""
     parameters = parameter_table()
     commands = command_table()
     set_size = sum(WIRE_BYTES[p.wire] for p in parameters.parameters)

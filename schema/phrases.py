@@ -1,6 +1,6 @@
-"""Packs texts for the Uno's flash: a phrase that stands often in them becomes one byte, 0x80 and up.
+"""Pack texts for the Uno's flash: a frequent phrase is replaced by one byte, 0x80 and up.
 
-What is packed is read in one pass (lib/text/print.cpp): phrases themselves hold plain characters only.
+Packed texts are expanded in a single pass (lib/text/print.cpp), so phrases contain only plain characters.
 """
 
 import re
@@ -14,7 +14,7 @@ MOST = 0x100 - FIRST
 
 
 def packed_texts(parameters: ParameterTable, commands: CommandTable) -> tuple[list[str], dict[str, str]]:
-    """The phrases, and each text that the Uno only prints with its packed form: helps and results."""
+    """Return the phrases, and the packed form of each text that the Uno does nothing with but print: helps, results."""
     helps = [c.help for c in commands.commands if c.usage] + [p.help for p in parameters.parameters]
     texts = [*helps, *(text for _, text in commands.results)]
     phrases, packed = pack(texts)
@@ -22,10 +22,10 @@ def packed_texts(parameters: ParameterTable, commands: CommandTable) -> tuple[li
 
 
 def pack(texts: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The phrases, in the order of their codes, and the texts with those codes in place of them.
+    """Return the phrases in the order of their codes, and the texts with the phrases replaced by those codes.
 
-    Greedy: each time the phrase that saves most, the first in the alphabet of several; ends where none saves a byte.
-    Raises ValueError for a text that is not plain ASCII.
+    Greedy: each round takes the phrase that saves most (in a tie, the first alphabetically), until none saves a byte
+    or all codes are in use. Raises ValueError for a text that is not printable ASCII.
     """
     for text in texts:
         if not (text.isascii() and text.isprintable()):
@@ -42,7 +42,7 @@ def pack(texts: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _savings(packed: list[str]) -> list[tuple[int, str]]:
-    """What each phrase would save, in bytes: all but one of every place, less its own characters and their end."""
+    """Return the bytes each phrase would save: its length less 1 at every occurrence, minus its text and terminator."""
     plain = [run for text in packed for run in re.split(f"[{chr(FIRST)}-{chr(FIRST + MOST - 1)}]", text)]
     seen = Counter(run[i:end] for run in plain for i in range(len(run)) for end in range(i + 2, len(run) + 1))
     often = (phrase for phrase, count in seen.items() if count > 1)

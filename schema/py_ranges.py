@@ -1,4 +1,4 @@
-"""Writes host/bifa/ranges.py."""
+"""Generate host/bifa/ranges.py."""
 
 from decimal import Decimal
 

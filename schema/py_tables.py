@@ -1,4 +1,4 @@
-"""Writes host/bifa/link/table.py."""
+"""Generate host/bifa/link/table.py."""
 
 from tables import NAME_BYTES, WIRE_BYTES, CommandTable, Constant, Message, ParameterTable
 

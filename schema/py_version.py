@@ -1,4 +1,4 @@
-"""Writes the version.py of each Python package: the firmware and the host are released together, under one version."""
+"""Generate version.py of each Python package. Firmware and host are released together, under one version."""
 
 from tables import CommandTable
 

@@ -1,4 +1,4 @@
-"""Reads the tables of this folder and checks that they make sense."""
+"""Read the tables in this folder and validate them."""
 
 import hashlib
 import json
@@ -56,9 +56,9 @@ class Field:
 
 @dataclass(frozen=True)
 class Message:
-    """What travels in one frame; `fields` follow the number of the message and its sequence number.
+    """The contents of one frame; `fields` follow the message number and the sequence number.
 
-    `answer`: the report that answers it, where that is not "done".
+    `answer`: name of the report that answers it, if that is not "done".
     """
 
     name: str
@@ -69,14 +69,14 @@ class Message:
     answer: str | None = None
 
     def size(self, set_size: int) -> int:
-        """Bytes of all fields."""
+        """Return the size of all fields in bytes; `set_size` is that of a parameter set."""
         widths = {**WIRE_BYTES, "name": NAME_BYTES, "set": set_size}
         return sum(widths[f.wire] * f.count for f in self.fields)
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command; `usage` is its form on the console, `message` that in a frame; either may be None."""
+    """A command; `usage` is its form on the console, `message` its form in a frame; either may be None."""
 
     name: str
     usage: str | None
@@ -84,7 +84,7 @@ class Command:
     help: str
 
     def words(self) -> tuple[int, int]:
-        """Least and most words of the line, the command itself included: what stands in brackets may be left out."""
+        """Return the least and greatest number of words of a line, command included; bracketed ones are optional."""
         words = self.usage.split(" ")
         return len(words) - sum(word.startswith("[") for word in words), len(words)
 
@@ -101,7 +101,7 @@ class CommandTable:
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the firmware's that the host has to know."""
+    """A constant of the firmware that the host needs as well."""
 
     name: str
     wire: str
@@ -122,7 +122,7 @@ def _to_wire(value: int | Decimal, decimals: int) -> int:
 
 
 def constants() -> tuple[Constant, ...]:
-    """The constants of constants.toml."""
+    """Read the constants in constants.toml."""
     found = tuple(Constant(**row) for row in _load("constants.toml")["constant"])
     for constant in found:
         if not 0 <= constant.value < 1 << 8 * WIRE_BYTES[constant.wire]:
@@ -131,22 +131,22 @@ def constants() -> tuple[Constant, ...]:
 
 
 def parameter_table() -> ParameterTable:
-    """The parameters, the factory presets and the storage format of parameters.toml."""
+    """Read the parameters, the factory presets and the storage format in parameters.toml."""
     raw = _load("parameters.toml")
     parameters = []
     for row in raw["parameter"]:
         bounds = {key: _to_wire(row[key], row["decimals"]) for key in ("minimum", "maximum", "default")}
         parameter = Parameter(**{**row, **bounds})
         if not 0 <= parameter.minimum <= parameter.default <= parameter.maximum:
-            raise ValueError(f"{parameter.name}: the default lies outside its range")
+            raise ValueError(f"{parameter.name}: needs 0 <= minimum <= default <= maximum")
         if parameter.maximum >= 1 << 8 * WIRE_BYTES[parameter.wire]:
             raise ValueError(f"{parameter.name}: the maximum does not fit {parameter.wire}")
         if not 1 <= parameter.since <= raw["storage_format"]:
-            raise ValueError(f"{parameter.name}: since must be a storage format")
+            raise ValueError(f"{parameter.name}: `since` must be a storage format, at most the current one")
         parameters.append(parameter)
     formats = [p.since for p in parameters]
     if formats != sorted(formats):
-        raise ValueError("new parameters go at the end, so that an older record is the beginning of a new one")
+        raise ValueError("order parameters by `since`, so that an older record is a prefix of a new one")
     presets = [
         Preset(
             row["name"],
@@ -171,7 +171,7 @@ def _message(row: dict) -> Message:
 
 
 def command_table() -> CommandTable:
-    """Commands, reports and results of commands.toml."""
+    """Read the commands, reports, results and words in commands.toml."""
     raw = _load("commands.toml")
     commands = tuple(
         Command(row["name"], row.get("usage"), _message(row) if "message" in row else None, row["help"])
@@ -182,14 +182,14 @@ def command_table() -> CommandTable:
     if len({m.number for m in messages}) != len(messages):
         raise ValueError("two messages have the same number")
     if unknown := {m.answer for m in messages if m.answer} - {m.name for m in reports}:
-        raise ValueError(f"no report is called {', '.join(sorted(unknown))}")
+        raise ValueError(f"no report is named {', '.join(sorted(unknown))}")
     results = tuple((row["name"], row["text"]) for row in raw["result"])
     version = tuple(int(part) for part in raw["firmware_version"].split("."))
     return CommandTable(raw["protocol_version"], version, commands, reports, results, raw["words"])
 
 
 def table_hash(parameters: ParameterTable, commands: CommandTable) -> int:
-    """32 bits that change whenever anything changes that the two ends must agree on."""
+    """Return a 32-bit hash of everything that host and Uno must agree on."""
     agreed = {
         "parameters": [[p.name, p.wire, p.decimals, p.minimum, p.maximum] for p in parameters.parameters],
         "messages": [

@@ -1,4 +1,4 @@
-// What the suites of the sensors' watch have in common: samples, as it sees them.
+// Shared by the suites of SensorWatch: sequences of samples.
 #pragma once
 
 #include "sensor.h"
@@ -20,7 +20,7 @@ Fault look(SensorWatch& watch, int16_t pressure_mpsi, uint16_t sum = kHalfScale,
   return watch.look(sum, pressure_mpsi, kTrip_mpsi, chamber).fault;
 }
 
-/// The first fault in so many samples alike.
+/// The first fault in `samples` identical samples.
 Fault samples_of(SensorWatch& watch, uint16_t samples, int16_t pressure_mpsi, uint16_t sum,
                  ChamberState chamber = kOff) {
   Fault fault = Fault::kNone;

@@ -1,6 +1,6 @@
-// RUN_SUITE(run): the program around a Unity suite, on this computer and in the (simulated) Uno alike.
+// RUN_SUITE(run): the program around a Unity suite, for this computer and for the (simulated) Uno.
 //
-//   #include <unity.h>     // here too: PlatformIO looks for libraries in the suite's own includes
+//   #include <unity.h>     // needed here: PlatformIO looks for libraries in the suite's own includes
 //   #include "suite.h"
 //   static void run() { RUN_TEST(...); }
 //   RUN_SUITE(run)
@@ -13,7 +13,7 @@
 #include <Arduino.h>
 #include <avr/sleep.h>
 
-// Asleep without interrupts nothing can happen any more: simavr ends there, a real Uno waits for its reset.
+// Sleeping with interrupts disabled never ends: simavr exits there, a real Uno waits for a reset.
 #define RUN_SUITE(run) \
   void setup() {       \
     UNITY_BEGIN();     \
@@ -28,7 +28,7 @@
 
 #else
 
-// PlatformIO reads the results from the output; it would take a count of failures for the number of a signal.
+// PlatformIO reads the results from the output; it would interpret a count of failures as a signal number.
 #define RUN_SUITE(run) \
   int main() {         \
     UNITY_BEGIN();     \

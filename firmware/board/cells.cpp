@@ -1,4 +1,4 @@
-// The chip's EEPROM: reads at once; a write goes on by itself for 3.4 ms.
+// The chip's EEPROM: reads are immediate; a write continues in the background for 3.4 ms.
 #include <avr/io.h>
 
 #include "critical.h"

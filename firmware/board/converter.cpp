@@ -14,8 +14,8 @@ const uint8_t kMonitorChannel = 3;
 const uint8_t kReferenceAvcc = 1 << REFS0;
 const uint8_t kStart = 1 << ADEN | 1 << ADSC | 1 << ADIE | 1 << ADPS2 | 1 << ADPS1 | 1 << ADPS0;  // 125 kHz
 
-// There and back again (0 1 2 2 1 0 ...), so that the means of the three sensors belong to the same instant. Then the
-// monitor.
+// Channels are converted forwards and backwards (0 1 2 2 1 0 ...), so that the means of the three sensors refer to the
+// same instant; then the monitor.
 const uint8_t kConversions = bifa::kChamberCount * bifa::kOversampling;
 bifa::RawRound round;
 uint8_t conversion;

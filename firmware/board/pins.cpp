@@ -21,7 +21,7 @@ void pins_begin() {
   DDRB |= kValvesOnB | kLed;
   DDRD &= static_cast<uint8_t>(~kEmergencyStop);
   PORTD |= kEmergencyStop;
-  EICRA = (EICRA & ~(1 << ISC00)) | 1 << ISC01;  // falling edge; the tick looks at the level
+  EICRA = (EICRA & ~(1 << ISC00)) | 1 << ISC01;  // falling edge; the tick polls the level
   EIFR = 1 << INTF0;
   EIMSK |= 1 << INT0;
 }
@@ -35,7 +35,7 @@ bool emergency_stop_pressed() { return !(PIND & kEmergencyStop); }
 
 }  // namespace board
 
-/// D4 to D9, as the pattern has them: bits 0 to 3 on port D from bit 4, bits 4 and 5 on port B from bit 0.
+/// Writes the pattern to D4 to D9: bits 0 to 3 go to port D from bit 4, bits 4 and 5 to port B from bit 0.
 void bifa::set_valves(ValvePattern pattern) {
   using namespace board;
   const uint8_t bits = pattern.bits();

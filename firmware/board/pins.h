@@ -3,10 +3,10 @@
 
 namespace board {
 
-/// Valves off and driven; the emergency stop (D2) pulled up and watched; LED (D13) off.
+/// Drives all valves off, enables the pull-up and interrupt of the emergency stop (D2), and turns the LED (D13) off.
 void pins_begin();
 
-/// All valve pins low, whoever calls.
+/// Sets all valve pins low; may be called from anywhere.
 void vent();
 
 bool emergency_stop_pressed();

@@ -9,8 +9,9 @@ namespace board {
 namespace {
 
 const uint8_t kAddress = 0x62;
-// A transfer takes 0.1 ms. Wire measures its time-out by Arduino's clock, except that for the end of a transfer, which it
-// awaits in its interrupt, counting cycles, while a stop has to wait. So the clock runs at a sixteenth: 0.5 ms and 32 us.
+// A transfer takes 0.1 ms. Wire measures its time-out by Arduino's clock, but waits for the end of a transfer in its
+// interrupt by counting cycles, which delays a stop. The clock therefore runs at a sixteenth of its speed: the
+// time-outs are 0.5 ms and 32 us.
 const uint32_t kTimeout_us = 32;
 Adafruit_MCP4725 dac;
 bool begun = false;

@@ -1,4 +1,4 @@
-// The way to the pressure regulator: MCP4725 on I2C. It takes nothing but a SupplyCode, which ends at 14 psi.
+// Output to the pressure regulator: MCP4725 on I2C. It accepts only a SupplyCode, which is limited to 14 psi.
 #pragma once
 
 #include "supply.h"
@@ -7,7 +7,7 @@ namespace board {
 
 void regulator_begin();
 
-/// Sets the DAC's output (never its EEPROM). False: it does not answer, or the bus is stuck.
+/// Sets the DAC's output (never its EEPROM). Returns false if the DAC does not answer or the bus is stuck.
 bool regulator_write(bifa::SupplyCode code);
 
 }  // namespace board

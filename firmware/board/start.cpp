@@ -10,22 +10,22 @@ namespace board {
 
 namespace {
 
-// What is left of the life before: RAM that no start-up code clears. The Uno's bootloader (Optiboot 4.4) clears MCUSR,
-// and after an external reset it ends by a watchdog reset of its own, so MCUSR alone tells nothing there.
+// RAM that no start-up code clears keeps information across a reset. The Uno's bootloader (Optiboot 4.4) clears MCUSR,
+// and after an external reset it ends by a watchdog reset of its own, so MCUSR alone is not conclusive.
 #define KEPT __attribute__((section(".noinit")))
 const uint16_t kAlive = 0xA11E;
 const uint16_t kHung = 0xD06E;
 uint16_t life KEPT;  ///< kAlive or kHung, unless the power was off
 uint16_t nonce KEPT;
-bool direct_starts_show KEPT;  ///< this bootloader's wait was seen once, so a start without it is one
+bool direct_starts_show KEPT;  ///< this bootloader's wait has been seen once, so a start without it is a direct one
 uint8_t flags KEPT;            ///< MCUSR
 uint8_t no_wait KEPT;          ///< 0: the bootloader waited for a program just now
 
-const uint8_t kHungAfter_ms = 200;  ///< the watchdog's 0.25 s are 0.23 to 0.32 s
+const uint8_t kHungAfter_ms = 200;  ///< the watchdog's nominal 0.25 s may be 0.23 to 0.32 s
 volatile uint8_t unfed_ms = 0;
 volatile bool ticked = false;
 
-/// The reset follows.
+/// Vents and waits for the watchdog's reset.
 void give_up() __attribute__((noreturn));
 void give_up() {
   cli();
@@ -36,8 +36,9 @@ void give_up() {
 
 }  // namespace
 
-// Before the C++ start-up: after a watchdog reset the watchdog runs on with its shortest time. A reset leaves the general
-// registers alone, and these four hold constants while Optiboot 4.4 waits for a program, also when one comes.
+// Runs before the C++ start-up, because after a watchdog reset the watchdog continues with its shortest time. A reset
+// leaves the general registers unchanged, and these four hold constants while Optiboot 4.4 waits for a program, also if
+// one arrives.
 extern "C" void look_at_start() __attribute__((naked, used, section(".init3")));
 extern "C" void look_at_start() {
   asm volatile(
@@ -75,7 +76,7 @@ bifa::StartCause start_cause() {
 
 uint16_t boot_nonce() { return nonce; }
 
-// System reset mode: the other one waits for its interrupt, which never comes while interrupts are off.
+// System reset mode: interrupt mode would wait for its interrupt, which never comes while interrupts are off.
 void watchdog_begin() { wdt_enable(WDTO_250MS); }
 
 void watchdog_feed() {

@@ -34,16 +34,16 @@ void tick_begin() {
 
 void strobe_end() {
   TCCR1A = kClearAtTick;
-  TCCR1C = 1 << FOC1B;  // and now
+  TCCR1C = 1 << FOC1B;  // force the pin low now
 }
 
 }  // namespace board
 
-// Interrupts may nest: a stop byte does not wait for the oscillators.
+// Interrupts may nest, so that a stop byte does not wait for the oscillators.
 ISR(TIMER1_COMPA_vect, ISR_NOBLOCK) {
   using namespace board;
   watchdog_tick();
-  if (under_way) return;  // never twice, also when one hangs
+  if (under_way) return;  // never re-entered, even if one hangs
   under_way = true;
   converter_tick();
   if (round_begins) converter_begin_round();

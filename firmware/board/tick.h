@@ -1,11 +1,11 @@
-// Timer 1: the millisecond, and on D10 (OC1B) the strobe whose edge the timer itself makes, free of jitter.
+// Timer 1: the millisecond tick, and the strobe on D10 (OC1B), whose edge the timer hardware sets, free of jitter.
 #pragma once
 
 namespace board {
 
 void tick_begin();
 
-/// The strobe falls.
+/// Ends the strobe's pulse.
 void strobe_end();
 
 }  // namespace board

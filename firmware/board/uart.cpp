@@ -17,8 +17,8 @@ const uint8_t kRest = 1 << RXEN0 | 1 << TXEN0 | 1 << RXCIE0;
 const uint8_t kSending = kRest | 1 << UDRIE0;
 
 uint8_t ring[kRingBytes];
-volatile uint8_t head;  // where the next byte goes in
-volatile uint8_t tail;  // where the next byte comes out
+volatile uint8_t head;  // where the next byte is written
+volatile uint8_t tail;  // where the next byte is read
 
 uint8_t after(uint8_t place) { return place + 1 == kRingBytes ? 0 : place + 1; }
 

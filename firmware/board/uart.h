@@ -1,4 +1,4 @@
-// The serial port at 250000 baud: every byte that arrives goes to on_byte(), what is sent waits in a ring.
+// The serial port at 250000 baud: every byte received goes to on_byte(), bytes to be sent wait in a ring buffer.
 #pragma once
 
 namespace board {

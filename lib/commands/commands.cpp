@@ -8,7 +8,7 @@ const char kStartPreset[kNameSize + 1] = "startup";
 
 namespace {
 
-/// In the order of Verdict.
+/// Results in the order of Verdict.
 const Result kResults[] BIFA_FLASH = {
     Result::kOk,   Result::kLatched, Result::kRefused, Result::kFault,
     Result::kFull, Result::kOrder,   Result::kUnrest,  Result::kOffset,
@@ -46,7 +46,7 @@ ParameterSet Commands::at_power_up() {
 }
 
 Result Commands::run() {
-  // What waited for a boundary of the walk before: there may have been no sample since that ended.
+  // A set may still be waiting for a cycle boundary of the previous walk, if no sample has been taken since it ended.
   if (pending_ && controller_.state() != State::kRunning) use(wanted_);
   return result_of(controller_.run());
 }

@@ -1,4 +1,4 @@
-// What commands do, for the console and for frames alike.
+// Implementation of the commands, shared by the console and frames.
 #pragma once
 
 #include "command_table.h"
@@ -7,53 +7,53 @@
 
 namespace bifa {
 
-/// Name of the preset that `save` without a name writes, and that is loaded at start.
+/// Name of the preset that is written by `save` without a name and loaded at start.
 extern const char kStartPreset[kNameSize + 1];
 
 class Commands {
  public:
   explicit Commands(Controller& controller) : controller_(controller) {}
 
-  /// Starts the controller with the settings and the start preset from EEPROM, or with the baseline; call once.
+  /// Starts the controller with the settings and the start preset from EEPROM, or else the baseline; call once.
   void begin(StartCause cause);
 
   Result run();
   Result stop();
   Result clear();
   Result hold(uint8_t chamber, uint8_t state);
-  // A schedule as a whole: clear, entries, start. The first error makes start fail, until the schedule is cleared.
+  // A schedule is entered as a whole: clear, entries, start. After an error, start fails until the schedule is cleared.
   Result schedule_clear();
   Result schedule_add(uint32_t time_ms, uint8_t chamber, uint8_t state);
   Result schedule_start();
 
-  /// What is begun and not finished is void, a set that was not committed and timed holds: they were another session's.
+  /// Discards what an earlier session left unfinished: an uncommitted set and timed holds.
   void abandon();
 
-  /// Changes one parameter (value in wire units) at once, also in a set that waits for the cycle boundary.
+  /// Changes one parameter (value in wire units) at once, also in a set waiting for the cycle boundary.
   Result set(ParameterId id, uint32_t value);
 
-  // A new set as a whole: begin, fields, commit. The first error makes commit fail, and the old set goes on. While
-  // walking the new set takes over at the next cycle boundary.
+  // A new set is entered as a whole: begin, fields, commit. The first error makes commit fail, and the old set stays in
+  // use. While walking, the new set takes effect at the next cycle boundary.
   Result begin_set();
   Result field(uint8_t parameter, uint32_t value);
   Result commit(uint16_t check);
 
-  /// The running set, or the one that will take over at the next cycle boundary.
+  /// The running set, or the one that will take effect at the next cycle boundary.
   const ParameterSet& wanted() const { return wanted_; }
   bool is_pending() const { return pending_; }
-  /// The set that power-up loads: the start preset, or the baseline.
+  /// The set that power-up loads: the start preset, or else the baseline.
   ParameterSet at_power_up();
-  /// A new sample shows where in the cycle the robot is.
+  /// Call with each new sample, which shows where in the cycle the robot is.
   void follow(const Sample& sample);
 
-  // EEPROM: Result::kOk while store().busy() means that the result comes later.
+  // EEPROM commands: Result::kOk while store().busy() means that the result follows later.
   Result save(const char* name);
   Result load(const char* name);
   Result forget(const char* name);
   Result defaults();
   Result zero(bool factory);
 
-  /// Preset number `index`, factory presets first; `name` has kNameSize + 1 bytes.
+  /// Name of preset number `index`, factory presets first; `name` has kNameSize + 1 bytes.
   bool preset_at(uint8_t index, char* name, bool& stored);
   uint8_t preset_count();
 

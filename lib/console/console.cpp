@@ -8,13 +8,13 @@ namespace bifa {
 namespace {
 const char kBackspace = 0x08;
 const char kDelete = 0x7F;
-// A frame of telemetry (31 bytes) may stand in the ring already; what lacks then for a long line takes 1.2 ms.
+// A frame of telemetry (31 bytes) may already be in the ring; the bytes of a long line beyond this room take 1.2 ms.
 const uint8_t kRoomForSample = 60;
 
 FlashText usage_of(uint8_t command) { return flash_text(kCommandTexts, 2 * command); }
 FlashText help_of(uint8_t command) { return flash_text(kCommandTexts, 2 * command + 1); }
 FlashText name_of(ParameterId id) { return text_of(id, ParameterText::kName); }
-/// The command whose usage begins with that word; kCommandCount if there is none.
+/// The command whose usage begins with `name`; kCommandCount if there is none.
 uint8_t find_command(const char* name) {
   for (uint8_t i = 0; i < kCommandCount; ++i) {
     const char* usage = reinterpret_cast<const char*>(usage_of(i));
@@ -35,7 +35,7 @@ bool takes_words(uint8_t command, uint8_t count) {
 void print_word(const char* list, uint8_t index) { print(flash_text(list, index)); }
 uint8_t decimals_of(ParameterId id) { return flash_byte(&descriptor(id).decimals); }
 void print_number_of(ParameterId id, uint32_t value) { print_decimal(value, decimals_of(id)); }
-/// With three decimals at least, so that two values read alike.
+/// Prints at least three decimals, so that two values line up.
 void print_places(ParameterId id, uint32_t value) {
   const uint8_t kLeast = 3;
   print_decimal(value, decimals_of(id), kLeast);
@@ -60,7 +60,7 @@ void Console::greet() {
 void Console::feed(uint8_t byte) {
   const char c = static_cast<char>(byte);
   if (c == '\r') {
-    // Many terminals send only this for the Enter key; programs send it before the line feed.
+    // Many terminals send only a carriage return for the Enter key; programs send it before the line feed.
     if (!echo_) return;
     after_return_ = true;
     end_line();
@@ -95,7 +95,7 @@ void Console::end_line() {
   if (echo_) print_line_end();
   line_[length_] = '\0';
   length_ = 0;
-  // Whatever stands before it: what is left of a frame, noise, a line whose end was lost.
+  // A stop counts whatever precedes it: fragments of a frame, noise, a line whose end was lost.
   if ((spoilt_ || too_long_) && stop_matched_ == kStopLetters) {
     stop();
   } else if (too_long_) {
@@ -118,12 +118,12 @@ void Console::match_stop(char c) {
 
 void Console::execute() {
   word_count_ = 0;
-  words_[0] = line_;  // no command if there is no word
+  words_[0] = line_;  // an empty command if there is no word
   for (char* at = line_; *at != '\0';) {
     while (*at == ' ' || *at == '\t') *at++ = '\0';
     if (*at == '\0') break;
     if (word_count_ == kWords) {
-      ++word_count_;  // one too many for any command
+      ++word_count_;  // more than any command has
       break;
     }
     words_[word_count_++] = at;
@@ -170,7 +170,7 @@ void Console::poll(const LinkCounters& counters) {
     if (state == State::kFault) print_fault(commands_.controller().status().fault);
   }
   if (!waiting_) return;
-  commands_.controller().host_heard();  // what it says is not read before the EEPROM has been written
+  commands_.controller().host_heard();  // its input is not read until the EEPROM has been written
   if (commands_.store().busy()) return;
   waiting_ = false;
   answer(commands_.store().result());
@@ -306,7 +306,7 @@ void Console::show_parameter(ParameterId id, const ParameterSet& saved) {
   const uint32_t value = value_of(commands_.wanted(), id);
   print_name(id);
   print_value(id, value);
-  print(BIFA_TEXT(" ("));  // so that the value stands alone between spaces, unit or not
+  print(BIFA_TEXT(" ("));  // so that the value is separated by spaces with or without a unit
   print_range(id);
   print(BIFA_TEXT(", default "));
   print_value(id, value_of(factory_preset(0), id));
@@ -368,13 +368,13 @@ void Console::hold() {
 
 const char* Console::preset_name() {
   if (word_count_ < 2) return kStartPreset;
-  // Padded with zeros, over the words that are done with.
+  // Copied to the beginning of line_, padded with zeros, over words that are no longer needed.
   const char* from = words_[1];
   for (uint8_t i = 0; i <= kNameSize; ++i) {
     line_[i] = *from;
     if (*from != '\0') ++from;
   }
-  if (line_[kNameSize] != '\0') line_[0] = '\0';  // too long for any
+  if (line_[kNameSize] != '\0') line_[0] = '\0';  // longer than any name
   return line_;
 }
 
@@ -411,7 +411,7 @@ void Console::presets() {
 
 void Console::sample(const Sample& sample) {
   if (!streaming_ && !plotting_) return;
-  // A line is printed whole or not at all, and telemetry makes nothing wait for long.
+  // A line is printed completely or not at all, and telemetry must not block anything for long.
   if (output_room() < kRoomForSample) return commands_.controller().lose_sample();
   if (streaming_) print_stream(sample);
   if (plotting_) print_plot(sample);

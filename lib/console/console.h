@@ -1,5 +1,5 @@
-// The text console: lines in, lines out. Every line is answered by exactly one line that begins "ok" or "error", after
-// any lines of information, which begin "[".
+// The text console. Every line is answered by exactly one line that begins with "ok" or "error", after any lines of
+// information, which begin with "[".
 #pragma once
 
 #include "commands.h"
@@ -12,21 +12,21 @@ const uint8_t kLongestLine = 63;
 
 class Console {
  public:
-  // Out of line: what it clears costs two bytes of code each instead of four.
+  // Not inlined: clearing a member then costs two bytes of code instead of four.
   __attribute__((noinline)) Console(Commands& commands, const Session& session)
       : commands_(commands), session_(session) {}
 
-  /// What a person sees at start.
+  /// Prints the greeting at start.
   void greet();
 
-  /// Takes one byte of text. Only while not waiting().
+  /// Takes one byte of text; call only while not waiting().
   void feed(uint8_t byte);
-  /// Bytes were lost: the present line is answered with an error, unless it ends in "stop".
+  /// Call if bytes were lost: the present line is answered with an error, unless it ends in "stop".
   void spoil() { spoilt_ = true; }
 
-  /// Whether the last command is still busy (EEPROM) and its answer is owed.
+  /// Whether the last command is still busy (EEPROM) and has not been answered.
   bool waiting() const { return waiting_; }
-  /// Answers the command that was waited for, once it is finished; tells of stops and faults as they come.
+  /// Answers the pending command once it is finished; reports stops and faults as they occur.
   void poll(const LinkCounters& counters);
 
   /// Prints a sample if streaming or plotting is on.
@@ -41,7 +41,7 @@ class Console {
   void finish_later(Result started);
   bool is(uint8_t word, FlashText text) const;
 
-  // One for each command of the schema; the words of its line are words_, as many as it takes.
+  // One for each command of the schema; words_ holds the words of its line, as many as it takes.
   friend void dispatch<Console>(CommandId, Console&);
   void help();
   void version();
@@ -82,9 +82,9 @@ class Console {
   Commands& commands_;
   const Session& session_;
   uint8_t length_ = 0;
-  uint8_t stop_matched_ = 0;  ///< how many letters of "stop" the line ends in, blanks aside
+  uint8_t stop_matched_ = 0;  ///< how many letters of "stop" the line ends in, ignoring blanks
   uint8_t word_count_ = 0;
-  uint8_t command_ = 0;  ///< of the line that is carried out
+  uint8_t command_ = 0;  ///< of the line being executed
   LinkCounters counters_ = {};
   State last_state_ = State::kIdle;
   bool spoilt_ = false;

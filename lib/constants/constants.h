@@ -6,12 +6,12 @@
 
 namespace bifa {
 
-const uint8_t kDeadTime_ms = 3;  ///< for how long both valves of a chamber stay off when one follows the other: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
-const uint8_t kSamplePeriod_ms = 10;  ///< from one strobe and sample of the pressures to the next
-const uint8_t kMarkPause = 10;  ///< strobes that a mark leaves out
-const uint8_t kScheduleEntries = 16;  ///< timed holds that fit
-const uint16_t kSessionTimeout_ms = 2000;  ///< of silence in a session, after which air is vented where host_timeout_s is 0: the host may have been killed
-const uint32_t kConverterCounts = 4096;  ///< of the MCP4725, 12 bits
-const uint32_t kRegulatorSpan_mpsi = 130000;  ///< full scale of the SMC ITV1050 (0.9 MPa at 5 V): on the converter it would burst pouches and sensors
+const uint8_t kDeadTime_ms = 3;  ///< time for which both valves of a chamber stay off between two states: a fast 3/2 poppet valve (MHE3) closes in 2 to 3 ms
+const uint8_t kSamplePeriod_ms = 10;  ///< interval between pressure samples and their strobes
+const uint8_t kMarkPause = 10;  ///< number of strobes left out as a mark
+const uint8_t kScheduleEntries = 16;  ///< capacity for timed holds
+const uint16_t kSessionTimeout_ms = 2000;  ///< silence in a session after which air is vented if host_timeout_s is 0: the host may have been killed
+const uint32_t kConverterCounts = 4096;  ///< resolution of the MCP4725, 12 bits
+const uint32_t kRegulatorSpan_mpsi = 130000;  ///< full scale of the SMC ITV1050 (0.9 MPa at 5 V), which would burst pouches and sensors
 
 }  // namespace bifa

@@ -52,7 +52,7 @@ Verdict Controller::hold(Chamber chamber, ChamberState state) {
 Verdict Controller::clear() {
   const Critical guard;
   if (emergency_stop_ || cause_stands()) return Verdict::kCauseStands;
-  if (!supervisor_.is_latched()) return Verdict::kDone;  // what the watches have counted stays
+  if (!supervisor_.is_latched()) return Verdict::kDone;  // the watches keep their counts
   if (supervisor_.outdated()) return Verdict::kLatched;
   schedule_.stop();
   supervisor_.clear();
@@ -109,7 +109,7 @@ void Controller::calibrate(const Calibration& calibration) {
 
 void Controller::mark_strobe() {
   const Critical guard;
-  // In the last millisecond of a period the next strobe can no longer be called off.
+  // In the last millisecond of a period the next strobe can no longer be cancelled.
   strobes_left_out_ = kMarkPause + (since_sample_ms_ == kSamplePeriod_ms - 1 ? 1 : 0);
   marked_ = sampling_.sequence + 1 + strobes_left_out_;
 }
@@ -185,7 +185,7 @@ bool Controller::tick(bool emergency_stop_pressed) {
     since_sample_ms_ = 0;
     begin_sample();
   }
-  watch_host();  // before anything that could open a valve
+  watch_host();  // first, before anything that could open a valve
   step_oscillators();
   follow_schedule();
   {
@@ -204,7 +204,7 @@ void Controller::converted_in_interrupt(const RawRound& round) {
 void Controller::step_oscillators() {
   if (supervisor_.state() != State::kRunning) return;
   oscillators_.step();
-  const Critical guard;  // a stop may have come since: then walk() does nothing
+  const Critical guard;  // after a stop in between, walk() does nothing
   supervisor_.walk(oscillators_.outputs());
 }
 
@@ -246,7 +246,7 @@ void Controller::finish_sample() {
   sample_waits_ = true;
 }
 
-/// In the last round.
+/// The pressure in the last round.
 int16_t Controller::pressure_mpsi(uint8_t chamber) const {
   return sensor_mpsi(round_.sum[chamber]) - calibration_.offset_mpsi[chamber];
 }
@@ -266,7 +266,7 @@ void Controller::watch(const int16_t (&pressure_mpsi)[kChamberCount]) {
 void Controller::watch_host() {
   const uint16_t timeout_ms = host_timeout_ms_ == 0 && in_session_ ? kSessionTimeout_ms : host_timeout_ms_;
   if (timeout_ms == 0) return;
-  ++host_silence_ms_;  // all that moves air begins with 0, so that a wrap means nothing
+  ++host_silence_ms_;  // reset whenever air starts to move, so an overflow is harmless
   if (host_silence_ms_ < timeout_ms || !(supervisor_.moves_air() || schedule_.running())) return;
   trip(Fault::kHostSilent, kNoChannel, static_cast<int16_t>(host_silence_ms_ / kSilenceUnit_ms),
        static_cast<int16_t>(timeout_ms / kSilenceUnit_ms));

@@ -1,7 +1,7 @@
-// The controller behind one facade: what the console, the frames and the board call, and nothing else.
+// The controller's facade: the complete interface for the console, the frames and the board.
 //
-// tick() and the *_in_interrupt functions run in interrupts; everything else in the main loop. What both touch is
-// guarded inside, so callers need no guard of their own.
+// tick() and the *_in_interrupt functions run in interrupts, everything else in the main loop. Shared data are guarded
+// inside, so callers need no guard of their own.
 #pragma once
 
 #include "calibration.h"
@@ -18,101 +18,101 @@
 
 namespace bifa {
 
-/// What became of a request.
+/// Outcome of a request.
 enum class Verdict : uint8_t {
   kDone,
-  kLatched,      ///< stopped, or a fault stands: clear first
+  kLatched,      ///< stopped, or a fault is latched: clear first
   kRefused,      ///< not in this state
-  kCauseStands,  ///< clear: the emergency stop is still pressed, or the cause of the fault is still there
+  kCauseStands,  ///< clear: the emergency stop is still pressed, or the cause of the fault is still present
   kFull,         ///< the schedule is full
-  kOrder,        ///< the schedule's times must not go backwards
-  kUnrest,       ///< the pressures have not rested for long enough
+  kOrder,        ///< the schedule's times must not decrease
+  kUnrest,       ///< the pressures have not been steady for long enough
   kOffset,       ///< a pressure is too far from zero to be an offset
 };
 
-/// What a person or the host wants to know at once.
+/// The controller's status, for the console and the host.
 struct Status {
   State state;
   bool emergency_stop;  ///< the input is active now
   bool scheduled;       ///< timed holds are running
-  FaultReport fault;    ///< fault.fault is kNone without one
+  FaultReport fault;    ///< fault.fault is kNone if there is none
   int16_t pressure_mpsi[kChamberCount];
   uint8_t valves;  ///< bits of ValvePattern
   uint32_t uptime_ms;
-  uint16_t
-      samples_lost;  ///< that the main loop did not take in time, or that were asked for but not sent, in either form
+  uint16_t samples_lost;  ///< not taken by the main loop in time, or requested but not sent, as text or frames
 };
 
-/// Why the chip started. kRestart: by itself, because it hung with interrupts off or its supply dipped.
+/// Why the chip started. kRestart: by itself, after a hang with interrupts off or a dip of its supply.
 enum class StartCause : uint8_t { kPower, kExternal, kBrownOut, kWatchdog, kRestart };
 
 class Controller {
  public:
   // ---- main loop ----
 
-  /// Once, before the first tick. When the chip restarted by itself the controller begins in a fault.
+  /// Call once, before the first tick. If the chip restarted by itself, the controller begins in a fault.
   void begin(StartCause cause, const ParameterSet& set, const Calibration& calibration);
 
-  Verdict run();   ///< from idle, unless timed holds run; the oscillators start settled, the body at phase 0
-  Verdict stop();  ///< to idle; all chambers vent (a latched stop or fault stays)
-  /// From idle or holding. When all chambers are off again the controller is idle.
+  Verdict run();   ///< from idle, unless timed holds run; the oscillators start settled, with the body at phase 0
+  Verdict stop();  ///< to idle; all chambers vent (a latched stop or fault remains)
+  /// From idle or holding. Once all chambers are off again, the controller is idle.
   Verdict hold(Chamber chamber, ChamberState state);
-  /// Not on behalf of a command that came before the last stop or fault (see hear_from_now_on()).
+  /// Refused for a command that was sent before the last stop or fault (see hear_from_now_on()).
   Verdict clear();
 
-  /// Takes effect at the next tick, also while running, without a jump of the phases. The set must be valid (is_valid()).
+  /// Takes effect at the next tick, also while running, without a phase jump. The set must be valid (is_valid()).
   void apply(const ParameterSet& set);
 
-  /// Timed holds, executed on the tick; time 0 is the first tick after the start. stop(), a stop, a fault end them.
+  /// Timed holds, executed on the tick; time 0 is the first tick after the start. stop(), a stop or a fault ends them.
   Verdict schedule_add(uint32_t time_ms, Chamber chamber, ChamberState state);
-  Verdict schedule_clear();  ///< if they run all chambers vent: nobody else would end what they began
+  Verdict schedule_clear();  ///< if they are running, all chambers vent, since nothing else would end their holds
   Verdict schedule_start();  ///< from idle or holding, once
 
-  /// Takes the present pressures as zero: only while idle, if they have rested for 4 s (Rest), and if each is within
-  /// kGreatestOffset_mpsi.
+  /// Takes the present pressures as zero: only while idle, if they have been steady for 4 s (Rest), and if each is
+  /// within kGreatestOffset_mpsi.
   Verdict measure_zero(Calibration& measured) const;
-  void calibrate(const Calibration& calibration);  ///< it must be valid (is_valid())
+  void calibrate(const Calibration& calibration);  ///< must be valid (is_valid())
   const Calibration& calibration() const { return calibration_; }
 
-  /// Leaves out the next kMarkPause strobes, not the samples: an instrument that stamps the strobe sees the pause.
+  /// Omits the next kMarkPause strobes, but not the samples: an instrument that stamps the strobe sees the pause.
   void mark_strobe();
-  /// The number of the sample whose strobe is the first after the last such pause; 0 before any.
+  /// The number of the sample with the first strobe after the last such pause; 0 if there has been none.
   uint16_t marked() const;
 
-  /// The next sample, if there is a new one.
+  /// Takes the next sample; returns false if there is no new one.
   bool take_sample(Sample& sample);
-  /// One that was asked for could not be sent.
+  /// Counts a requested sample that could not be sent.
   void lose_sample();
   Status status() const;
   State state() const { return supervisor_.state(); }
   uint32_t uptime_ms() const;
 
-  /// All commands from now on come after the last stop or fault, until the next one; call it with interrupts off.
+  /// All commands from now on count as sent after the last stop or fault, until the next one; call with interrupts off.
   void hear_from_now_on() { supervisor_.hear_from_now_on(); }
 
-  /// Call it whenever the host has said something that makes sense.
+  /// Call whenever the host has sent a valid frame or command.
   void host_heard();
 
-  /// Whether a host has a session. It may be killed, so where `host_timeout_s` is 0 kSessionTimeout_ms stands for it.
+  /// Whether a host has a session. Since a host may be killed, kSessionTimeout_ms then replaces a `host_timeout_s` of
+  /// 0.
   void in_session(bool yes);
 
-  /// What the DAC has to be told now. Whoever tells it reports how that ended.
+  /// The value to write to the DAC now; the caller reports the outcome with supply_told().
   SupplyCode supply() const;
   void supply_told(bool answered);
 
   // ---- interrupts ----
 
-  /// Every millisecond. Returns true if a round of conversions is to begin with the next tick, and the strobe to rise
-  /// then if it strobes() (every tenth tick). Other interrupts may nest in it: what they share is guarded inside.
+  /// Call every millisecond. Returns true (every tenth tick) if a round of conversions is to begin with the next tick;
+  /// the strobe then rises if strobes(). Other interrupts may nest in it: shared data are guarded inside.
   bool tick(bool emergency_stop_pressed);
 
-  /// After a tick that returned true: whether the strobe really is to rise, or is left out for a mark.
+  /// After a tick that returned true: whether the strobe is to rise; false if it is omitted for a mark.
   bool strobes() const { return strobes_left_out_ == 0; }
 
-  /// A round of the converter is complete.
+  /// Call when a round of conversions is complete.
   void converted_in_interrupt(const RawRound& round);
 
-  /// The byte `!`, the stop message or the emergency stop: all valves are off when it returns.
+  /// For the byte `!`, the stop message and the emergency stop: all valves are off on return.
   void stop_in_interrupt() { supervisor_.stop(); }
 
  private:
@@ -127,12 +127,12 @@ class Controller {
   bool cause_stands() const;
   uint16_t set_point_mpsi() const;
 
-  // What is small comes first: an AVR reaches 64 bytes from an object's beginning with its shortest instructions.
+  // Small members come first: an AVR's shortest instructions reach 64 bytes from the beginning of an object.
   uint32_t uptime_ms_ = 0;
   uint8_t since_sample_ms_ = 0;
-  uint8_t strobes_left_out_ = 0;  ///< still to be left out
+  uint8_t strobes_left_out_ = 0;  ///< strobes still to be omitted
   uint16_t marked_ = 0;
-  volatile bool emergency_stop_ = false;  ///< latched, too, for as long as it is pressed
+  volatile bool emergency_stop_ = false;  ///< the stop is latched again for as long as it is pressed
 
   uint16_t wanted_mpsi_ = 0;
   SupplyCode wanted_code_;
@@ -142,7 +142,7 @@ class Controller {
 
   RawRound round_ = {};
   volatile bool round_complete_ = false;
-  Sample sampling_ = {};  ///< its conversions are under way
+  Sample sampling_ = {};  ///< the sample being converted
   Sample sample_ = {};
   bool sample_waits_ = false;
   uint16_t samples_lost_ = 0;

@@ -8,24 +8,24 @@ namespace bifa {
 
 class Schedule {
  public:
-  /// False if there is no room left.
+  /// Appends an entry; returns false if there is no room left.
   bool add(uint32_t time_ms, Chamber chamber, ChamberState state);
   void clear();
-  /// Whether `time_ms` may come after what is there.
+  /// Whether an entry at `time_ms` may be appended.
   bool in_order(uint32_t time_ms) const { return count_ == 0 || time_ms >= entries_[count_ - 1].time_ms; }
 
-  /// Time 0 is the next tick.
+  /// Starts the schedule; time 0 is the next tick.
   void start();
   void stop() { running_ = false; }
   bool running() const { return running_; }
-  /// Every millisecond, and as long as it returns true: takes what is due. After the last entry it stops by itself.
+  /// Takes the next entry that is due; call every millisecond until it returns false. Stops after the last entry.
   bool take(Chamber& chamber, ChamberState& state);
   void tick() { ++now_ms_; }
 
  private:
   struct Entry {
     uint32_t time_ms;
-    uint8_t what;  ///< chamber in the upper half, state in the lower: memory is short
+    uint8_t what;  ///< chamber in the upper half, state in the lower, to save memory
   };
 
   Entry entries_[kScheduleEntries] = {};

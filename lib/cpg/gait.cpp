@@ -15,10 +15,10 @@ const uint32_t kGainScale = 179193;
 
 struct Fraction {
   uint32_t whole;  ///< numerator / denominator * 2^32, rounded down
-  uint8_t rest;    ///< and the next 8 bits
+  uint8_t rest;    ///< the next 8 bits
 };
 
-/// Divides bit by bit, for a proper fraction; denominator < 2^31.
+/// Divides bit by bit; the quotient must be a proper fraction, the denominator < 2^31.
 __attribute__((noinline)) Fraction divide(uint32_t numerator, uint32_t denominator) {
   Fraction quotient = {0, 0};
   for (uint8_t bit = 0; bit < 40; ++bit) {

@@ -4,7 +4,7 @@
 
 #include "sine.h"
 
-// step() runs a thousand times a second: its parts are not called, and it is in turn small enough to become part of its
+// step() runs a thousand times a second, so its parts are inlined; it is small enough to be inlined in turn into its
 // only caller, the tick.
 #define BIFA_INLINE inline __attribute__((always_inline))
 
@@ -12,15 +12,15 @@ namespace bifa {
 
 namespace {
 
-/// The upper half of an error (both machines are little-endian). Loading no more than that spares an AVR registers.
+/// The upper half of an error (both machines are little-endian). Loading only that half saves registers on an AVR.
 BIFA_INLINE uint16_t upper(const uint32_t& error) {
   uint16_t half;
   memcpy(&half, reinterpret_cast<const uint8_t*>(&error) + 2, sizeof half);
   return half;
 }
 
-/// Eq. (10): u = 1 beyond the threshold. The lowest bit makes a duty of 0 (threshold 0) always and a duty of 1
-/// (threshold 2^32 - 1) never positive.
+/// Eq. (10): u = 1 beyond the threshold. Setting the lowest bit makes a duty of 0 (threshold 0) always positive and a
+/// duty of 1 (threshold 2^32 - 1) never.
 BIFA_INLINE bool is_positive(uint32_t phase, uint32_t threshold) { return (phase | 1) > threshold; }
 
 }  // namespace
@@ -62,13 +62,13 @@ BIFA_INLINE Oscillators::Pulls Oscillators::pulls(uint16_t head_error, uint16_t 
   return {static_cast<int16_t>(body_head + body_tail), static_cast<int16_t>(head_tail - body_head)};
 }
 
-/// What the extrapolated pull adds to a phase.
+/// Phase increment due to the extrapolated pull.
 BIFA_INLINE uint32_t Oscillators::advance(int16_t pull, int16_t last) const {
   const int16_t extrapolated = pull + (pull - last) / 2;
   return static_cast<uint32_t>((static_cast<int32_t>(extrapolated) * gait_.gain) >> 8);
 }
 
-/// Lets the oscillators pull at each other for a step; returns by how much that moves the body.
+/// Applies the coupling for one step; returns by how much it advances the body.
 BIFA_INLINE uint32_t Oscillators::couple() {
   if (motion_ == Motion::kSettled) return 0;
   const uint16_t head_error = upper(head_error_);
@@ -92,7 +92,7 @@ BIFA_INLINE uint32_t Oscillators::couple() {
       head = static_cast<uint32_t>(static_cast<int32_t>(head) >> 1);
     }
   }
-  // The pulls add up to nothing, so the tail's is -(body + head), and the mean of the phases runs at exactly f.
+  // The pulls sum to zero, so the tail's is -(body + head), and the mean of the phases advances at exactly f.
   head_error_ += head - body;
   tail_error_ -= head + body + body;
   return body;

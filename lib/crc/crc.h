@@ -1,5 +1,5 @@
-// The two 16-bit checks of frames, each a few instructions; together they miss one random error in 2^31, not in 2^32:
-// their polynomials share the factor x + 1 (docs/protocol.md).
+// The two 16-bit checks of frames, each a few instructions. Together they miss one random error in 2^31, not in 2^32,
+// because their polynomials share the factor x + 1 (docs/protocol.md).
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// What the main loop and the interrupts share is touched under this guard.
+// Guard for data shared between the main loop and interrupts.
 #pragma once
 
 #include <stdint.h>
@@ -7,8 +7,8 @@
 
 namespace bifa {
 
-/// Keeps interrupts off for as long as it lives; nests. Keep it short: a stop byte waits meanwhile. Both ends are
-/// barriers to the compiler, which would otherwise move what is plain memory out of the guard.
+/// Keeps interrupts off during its lifetime; nests. Keep it short: a stop byte waits meanwhile. Both ends are compiler
+/// barriers; without them the compiler could move plain memory accesses out of the guard.
 class Critical {
  public:
 #ifdef __AVR__
@@ -29,7 +29,7 @@ class Critical {
   BIFA_AT_ONCE static void barrier() { __asm__ volatile("" ::: "memory"); }
   const uint8_t status_;
 #else
-  // Elsewhere nothing interrupts; tests see whether it is there.
+  // On other machines nothing interrupts; tests check that the guard is used.
   Critical() {
     ++depth();
     ++entered();
@@ -38,12 +38,12 @@ class Critical {
   Critical(const Critical&) = delete;
   Critical& operator=(const Critical&) = delete;
 
-  /// How many live now.
+  /// How many are alive now.
   static unsigned& depth() {
     static unsigned depth = 0;
     return depth;
   }
-  /// How many there have been.
+  /// How many there have been in total.
   static unsigned& entered() {
     static unsigned entered = 0;
     return entered;

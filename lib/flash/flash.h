@@ -1,4 +1,4 @@
-// Constants that live in flash: on an AVR they would otherwise be copied into its 2 KB of RAM.
+// Constants kept in flash: on an AVR they would otherwise be copied into its 2 KB of RAM.
 #pragma once
 
 #include <stdint.h>
@@ -13,7 +13,7 @@
 
 namespace bifa {
 
-/// A character of a text in flash: a type of its own, so that such a text cannot be read as if it were in RAM.
+/// A character of a text in flash: a distinct type, so that such a text cannot be read as if it were in RAM.
 struct FlashChar;
 /// A zero-terminated text in flash.
 using FlashText = const FlashChar*;
@@ -34,7 +34,7 @@ inline void flash_copy(void* to, const void* from, uint16_t size) { memcpy(to, f
 inline bool flash_equal(const char* text, const char* in_flash) { return strcmp(text, in_flash) == 0; }
 #endif
 
-/// Text number `index` of a list in flash, in which each ends in a zero.
+/// Text number `index` of a list of zero-terminated texts in flash.
 FlashText flash_text(const char* texts, uint8_t index);
 
 }  // namespace bifa

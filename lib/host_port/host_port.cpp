@@ -15,8 +15,8 @@ void HostPort::poll() {
   session_.poll();
   console_.poll({frames_bad_, receiver_.lost()});
   uint8_t byte;
-  // A bounded number, so that a flood keeps neither telemetry nor EEPROM waiting; and one line at most, whose answer may
-  // take a twentieth of a second, so that the watchdog is not kept waiting either.
+  // A bounded number of bytes, so that a flood does not starve telemetry and EEPROM writes; and at most one line, whose
+  // answer may take a twentieth of a second, so that the watchdog is fed in time.
   for (uint8_t budget = 32; budget > 0 && !console_.waiting() && next(byte); --budget) {
     take(byte);
     if (!in_frame_ && (byte == '\n' || byte == '\r')) break;
@@ -29,7 +29,7 @@ void HostPort::poll() {
   console_.sample(sample);
 }
 
-/// The next byte; if it came after the last stop or fault so does the command that it ends.
+/// Takes the next byte; if it arrived after the last stop or fault, so did the command that it completes.
 bool HostPort::next(uint8_t& byte) {
   {
     const Critical guard;

@@ -1,6 +1,6 @@
-// Everything behind the serial port: tells text from frames, feeds the console and the session, keeps the store going.
+// Everything behind the serial port: separates text from frames, feeds the console and the session, and runs the store.
 //
-// The board calls byte_in_interrupt(), tick_in_interrupt() and, as often as it can, poll(); that is all there is to it.
+// The board only has to call byte_in_interrupt(), tick_in_interrupt() and, as often as it can, poll().
 #pragma once
 
 #include "console.h"
@@ -14,22 +14,23 @@ class HostPort {
   explicit HostPort(Controller& controller)
       : commands_(controller), session_(commands_), console_(commands_, session_) {}
 
-  /// Loads what is in EEPROM, starts the controller and greets. `boot_nonce` differs from that of the last start.
+  /// Loads the EEPROM's contents, starts the controller and prints the greeting. `boot_nonce` differs from start to
+  /// start.
   void begin(uint16_t boot_nonce, StartCause cause);
 
-  /// In the receive interrupt. If the byte asks for a stop all valves are off on return.
+  /// Call in the receive interrupt. If the byte completes a stop, all valves are off on return.
   void byte_in_interrupt(uint8_t byte, bool damaged = false) {
     if (receiver_.push(byte, damaged)) commands_.controller().stop_in_interrupt();
   }
-  /// In the interrupt of the 1 kHz timer.
+  /// Call in the interrupt of the 1 kHz timer.
   void tick_in_interrupt() { receiver_.tick(); }
-  /// Commands that wait came before a stop or a fault, which they must not undo; call it with interrupts off.
+  /// Marks waiting commands as older than a stop or fault, which they must not undo; call with interrupts off.
   void outdate() { receiver_.outdate(); }
 
-  /// In the main loop: handles what has arrived, answers, sends telemetry, goes on writing the EEPROM.
+  /// Call in the main loop: handles received bytes, answers, sends telemetry, continues writing the EEPROM.
   void poll();
 
-  /// Whether poll() has something to do at once, so that the board must not go to sleep.
+  /// Whether poll() has work to do, so that the board must not go to sleep.
   bool has_input() const { return receiver_.has_input(); }
 
  private:

@@ -18,7 +18,7 @@ bool Receiver::push(uint8_t byte, bool damaged) {
   silence_ms_ = 0;
 
   if (byte == '!' && (!in_frame_ || frame_length_ == 0)) {
-    if (in_frame_) put(kDelimiter);  // no frame begins so: the delimiter was a stray one
+    if (in_frame_) put(kDelimiter);  // no frame begins with `!`: the delimiter was a stray byte
     in_frame_ = false;
     return true;
   }
@@ -33,7 +33,7 @@ bool Receiver::push(uint8_t byte, bool damaged) {
   }
 
   if (byte == kDelimiter) {
-    if (frame_length_ == 0) return false;  // two delimiters in a row: still before the frame
+    if (frame_length_ == 0) return false;  // two delimiters in a row: the frame has not begun
     in_frame_ = false;
     put(byte);
     return false;
@@ -61,7 +61,7 @@ void Receiver::put(uint8_t byte) {
 bool Receiver::pop(uint8_t& byte) {
   if (head_ == tail_) return false;
   if (outdated_ > 0) {
-    const Critical guard;  // a stop may count anew
+    const Critical guard;  // a stop may set it at any time
     --outdated_;
   }
   byte = queue_[tail_];
@@ -70,7 +70,7 @@ bool Receiver::pop(uint8_t& byte) {
 }
 
 uint16_t Receiver::lost() const {
-  const Critical guard;  // two bytes, between which one may be lost
+  const Critical guard;  // two bytes: an interrupt between them may change the count
   return lost_;
 }
 

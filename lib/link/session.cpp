@@ -6,7 +6,7 @@ namespace bifa {
 
 namespace {
 
-/// A preset's name as it travels, with an end.
+/// A preset's name as transmitted, plus a terminating zero.
 struct Name {
   char text[kNameSize + 1];
   __attribute__((noinline)) explicit Name(const char* bytes) : text() { memcpy(text, bytes, kNameSize); }
@@ -25,7 +25,7 @@ void Session::take(const Frame& frame, const LinkCounters& counters) {
     case MessageId::kConnect:
       return connect(frame);
     case MessageId::kStopNow:
-      return;  // acted on when it arrived
+      return;  // executed when it arrived
     default:
       break;
   }
@@ -72,7 +72,7 @@ void Session::in_order(const Frame& frame, const LinkCounters& counters) {
   ++expected_;
   if (query(frame, counters)) return;
   Result& result = results_[frame.sequence % kRemembered];
-  const bool saves_for_another = commands_.store().busy();  // the console, or a session before: no answer of this one
+  const bool saves_for_another = commands_.store().busy();  // for the console or an earlier session
   result = carry_out(static_cast<MessageId>(frame.message), frame.fields, *this);
   waiting_ = result == Result::kOk && !saves_for_another && commands_.store().busy();
   if (!waiting_) done(frame.sequence);

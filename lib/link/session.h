@@ -1,4 +1,4 @@
-// The Uno's end of a session: every command once and in order, every command answered.
+// The Uno's end of a session: every command is executed once and in order, and answered.
 #pragma once
 
 #include "commands.h"
@@ -6,7 +6,7 @@
 
 namespace bifa {
 
-/// What the port counts, up to 65535.
+/// The port's counters, up to 65535.
 struct LinkCounters {
   uint16_t frames_bad;
   uint16_t bytes_lost;
@@ -16,24 +16,24 @@ class Session {
  public:
   explicit Session(Commands& commands) : commands_(commands) {}
 
-  /// `boot_nonce` differs from that of the last start.
+  /// `boot_nonce` differs from start to start.
   void begin(uint16_t boot_nonce, StartCause cause) {
     boot_nonce_ = boot_nonce;
     cause_ = cause;
   }
 
-  /// Seed of the checks of this session's messages.
+  /// Seed for the checks of this session's messages.
   uint32_t seed() const { return session_seed(key_); }
 
-  // Out of line: inlined, what these put on the stack would stand under all that the main loop calls.
+  // Not inlined: their stack frames would otherwise add to everything that the main loop calls.
 
-  /// A frame whose checks are right; `counters` are reported in status.
+  /// Handles a frame whose checks match; `counters` are reported in status.
   __attribute__((noinline)) void take(const Frame& frame, const LinkCounters& counters);
 
-  /// Answers the EEPROM command that is being waited for, once it is finished.
+  /// Answers the pending EEPROM command once it is finished.
   void poll();
 
-  /// Sends a sample if the host wants them, unless there is no room now.
+  /// Sends a sample if streaming is on and there is room.
   __attribute__((noinline)) void sample(const Sample& sample);
 
   uint16_t repeated() const { return repeated_; }
@@ -41,17 +41,17 @@ class Session {
   StartCause cause() const { return cause_; }
 
  private:
-  static const uint8_t kRemembered = 4;  ///< results kept for repeats: the host's window
+  static const uint8_t kRemembered = 4;  ///< results kept for repeated commands: the size of the host's window
 
   void hello();
   void connect(const Frame& frame);
   void in_order(const Frame& frame, const LinkCounters& counters);
-  /// Commands that only ask: they are answered by what they ask for, as often as they come.
+  /// Answers a command that only reads data, with that data, as often as it is sent.
   bool query(const Frame& frame, const LinkCounters& counters);
   void send(MessageId message, uint8_t sequence, const void* fields, uint8_t size);
   void done(uint8_t sequence);
 
-  // One for each message of the schema; those that are answered by a report first.
+  // One for each message of the schema; those answered by a report come first.
   template <typename Handler, typename... About>
   friend bool answer(MessageId, const uint8_t*, Handler&, const About&...);
   template <typename Handler>
@@ -86,7 +86,7 @@ class Session {
   uint16_t key_ = 0;  ///< 0: no session is open
   uint8_t expected_ = 0;
   Result results_[kRemembered];
-  bool waiting_ = false;  ///< for the EEPROM; the command is the one before the expected
+  bool waiting_ = false;  ///< for the EEPROM; the pending command is the one before `expected_`
   bool streaming_ = false;
   uint16_t repeated_ = 0;
 };

@@ -1,4 +1,4 @@
-// What is kept per board: where each sensor's zero lies.
+// Calibration of a board: the zero offset of each sensor.
 #pragma once
 
 #include <stdint.h>
@@ -7,7 +7,7 @@
 
 namespace bifa {
 
-/// Zero offsets, in mpsi, that are subtracted from what the sensors say.
+/// Zero offsets, in mpsi, that are subtracted from the sensors' readings.
 struct Calibration {
   int16_t offset_mpsi[kChamberCount];
 };

@@ -5,10 +5,10 @@
 
 namespace bifa {
 
-/// Keeps the extremes of the last three thirds of a second and of the one that is under way.
+/// Keeps the extremes of the last three complete thirds of a second and of the current one.
 class LastSecond {
  public:
-  /// A new sample, 100 a second.
+  /// Adds a sample; 100 a second.
   void add(const int16_t (&pressure_mpsi)[kChamberCount]);
 
   int16_t lowest_mpsi(uint8_t chamber) const;

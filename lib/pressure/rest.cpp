@@ -3,7 +3,7 @@
 namespace bifa {
 
 namespace {
-const uint8_t kShift = 5;  ///< the means follow within about a third of a second
+const uint8_t kShift = 5;  ///< the means have a time constant of about a third of a second
 const int16_t kMoved_mpsi = 40;
 }  // namespace
 
@@ -11,7 +11,7 @@ void Rest::add(const int16_t (&raw_mpsi)[kChamberCount]) {
   if (samples_ < kLong_samples) ++samples_;
   for (uint8_t i = 0; i < kChamberCount; ++i) {
     const int16_t mean_mpsi = static_cast<int16_t>(sums_[i] >> kShift);
-    // From one rail to the other is more than 16 bits hold.
+    // The difference from one rail to the other does not fit 16 bits.
     sums_[i] += static_cast<int32_t>(raw_mpsi[i]) - mean_mpsi;
     const int32_t moved_mpsi = static_cast<int32_t>(mean_mpsi) - place_[i];
     if (moved_mpsi <= kMoved_mpsi && moved_mpsi >= -kMoved_mpsi) continue;

@@ -1,14 +1,14 @@
-// Whether the pressures rest, and where.
+// Whether the pressures are at rest, and at which values.
 #pragma once
 
 #include "chamber.h"
 
 namespace bifa {
 
-/// Slow means of the raw pressures, and for how long they have stayed where they are.
+/// Slow means of the raw pressures, and how long they have not moved.
 class Rest {
  public:
-  /// A new sample, 100 a second.
+  /// Adds a sample; 100 a second.
   void add(const int16_t (&raw_mpsi)[kChamberCount]);
 
   /// Whether no mean has moved by more than 0.04 psi, a count of the converter, for 4 s.
@@ -19,7 +19,7 @@ class Rest {
   static const uint16_t kLong_samples = 400;
 
   int32_t sums_[kChamberCount] = {};   ///< the means, mpsi * 2^kShift
-  int16_t place_[kChamberCount] = {};  ///< where the means have rested for so many samples
+  int16_t place_[kChamberCount] = {};  ///< where the means have rested for `samples_` samples
   uint16_t samples_ = 0;
 };
 

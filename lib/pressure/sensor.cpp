@@ -3,7 +3,7 @@
 namespace bifa {
 
 int16_t sensor_mpsi(uint16_t sum) {
-  // p = (n + 1/2) 37.5 psi / 1024 - 18.75 psi, where a conversion n stands for the middle of its step.
+  // p = (n + 1/2) 37.5 psi / 1024 - 18.75 psi, since a conversion n represents the middle of its step.
   const uint32_t scaled = (sum + kOversampling / 2) * 37500UL;
   return static_cast<int16_t>(static_cast<int32_t>((scaled + 512UL * kOversampling) / (1024UL * kOversampling)) -
                               18750);

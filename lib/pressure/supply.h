@@ -1,4 +1,4 @@
-// The set-point of the positive supply, on its way to the regulator. There is no way to make one above 14 psi.
+// The set-point of the positive supply as sent to the regulator. It cannot be constructed above 14 psi.
 #pragma once
 
 #include <stdint.h>
@@ -14,7 +14,7 @@ class SupplyCode {
   /// No pressure.
   constexpr SupplyCode() : counts_(0) {}
 
-  /// The count for a pressure, at most that for 14 psi.
+  /// The count for a pressure, limited to that of 14 psi.
   static SupplyCode of(uint32_t pressure_mpsi) {
     if (pressure_mpsi > kGreatestSupply_mpsi) pressure_mpsi = kGreatestSupply_mpsi;
     return SupplyCode(static_cast<uint16_t>(pressure_mpsi * kConverterCounts / kRegulatorSpan_mpsi));

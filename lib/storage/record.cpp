@@ -4,7 +4,7 @@
 
 namespace bifa {
 
-// Defined once: such constants lie in RAM, and each file that had its own would take 13 bytes more.
+// Defined once: such constants are kept in RAM, and every file with its own copy would take 13 bytes more.
 const char kSettingsName[kNameSize + 1] = "#settings";
 
 namespace {

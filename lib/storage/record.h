@@ -1,4 +1,4 @@
-// One record in EEPROM: a preset or the settings, with everything needed to doubt it.
+// One record in EEPROM: a preset or the settings, with everything needed to validate it.
 #pragma once
 
 #include "eeprom.h"
@@ -7,16 +7,16 @@
 namespace bifa {
 
 const uint8_t kNameSize = 12;   ///< longest name; shorter ones are padded with zeros
-const uint8_t kSlotBytes = 48;  ///< distance of two records
+const uint8_t kSlotBytes = 48;  ///< bytes from one record to the next
 const uint8_t kSlotCount = kEepromBytes / kSlotBytes;
 const uint8_t kRecordValid = 0xA5;  ///< the mark of a complete record, written last
 const uint8_t kRecordVoid = 0x00;
 
-extern const char kSettingsName[kNameSize + 1];  ///< not a name that anybody can give
-/// Sequence numbers above this are no honest ones: the cells wear out long before.
+extern const char kSettingsName[kNameSize + 1];  ///< not a valid name for a preset
+/// Sequence numbers above this are invalid: the cells wear out long before reaching it.
 const uint32_t kSequenceLimit = 0xFFFFFF00UL;
 
-/// A record as its bytes lie in EEPROM, in the present format. In an older format the payload ends earlier.
+/// A record as stored in EEPROM, in the present format. In an older format the payload ends earlier.
 struct Record {
   uint8_t mark;
   uint8_t format;
@@ -32,20 +32,20 @@ inline uint16_t slot_address(uint8_t slot) { return static_cast<uint16_t>(slot) 
 /// Whether `name` may be given to a preset: 1 to 12 of a-z, 0-9, _ and -, zero-padded.
 bool is_name(const char* name);
 
-/// The sequence number in a slot, whatever else it holds.
+/// The sequence number in a slot, regardless of its other contents.
 uint32_t sequence_of(uint8_t slot);
 
 /// Bytes of a parameter set in a storage format.
 uint8_t payload_size(uint8_t format);
 
-/// Reads a slot into `record`, brought to the present format: fields that the old one lacks take their defaults.
-/// False, unless mark, format, CRC, name and sequence are good.
+/// Reads a slot into `record`, converted to the present format: fields that an older format lacks take their defaults.
+/// Returns false unless mark, format, CRC, name and sequence are valid.
 bool read_record(uint8_t slot, Record& record);
 
-/// Puts format, mark and CRC into a record whose sequence, name and payload are set.
+/// Sets format, mark and CRC of a record whose sequence, name and payload are set.
 void seal(Record& record);
 
-/// Whether a slot holds a record of a later format than this firmware knows: left alone.
+/// Whether a slot holds a record of a later format than this firmware knows; such records are left alone.
 bool is_from_the_future(uint8_t slot);
 
 }  // namespace bifa

@@ -78,7 +78,7 @@ uint8_t Store::count() {
   return count;
 }
 
-/// Whether a slot with a good mark has this name.
+/// Whether a slot with a valid mark has this name.
 bool Store::is_named(uint8_t slot, const char* name) {
   const uint16_t address = slot_address(slot);
   if (eeprom_read(address) != kRecordValid) return false;
@@ -102,8 +102,8 @@ Result Store::save_settings(const void* payload) {
 }
 
 Result Store::save_record(const char* name, const void* payload) {
-  scan();                                                   // a repair may have been under way
-  if (sequence_ >= kSequenceLimit) return Result::kEeprom;  // what would be written could not be read again
+  scan();                                                   // a repair may have been in progress
+  if (sequence_ >= kSequenceLimit) return Result::kEeprom;  // a record with the next number could not be read back
   memcpy(record_.name, name, kNameSize);
   memcpy(record_.payload, payload, sizeof record_.payload);
   record_.sequence = sequence_ + 1;
@@ -117,7 +117,7 @@ Result Store::save_record(const char* name, const void* payload) {
 
 Result Store::forget(const char* name) {
   if (busy()) return Result::kBusy;
-  bool known = false;  // also by a later firmware, whose records are taken
+  bool known = false;  // also if written by a later firmware, whose records are kTaken
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
     known = known || (has(slot, kLive | kTaken) && is_named(slot, name));
   }
@@ -136,7 +136,7 @@ Result Store::erase_all() {
   return Result::kOk;
 }
 
-/// Marks every slot of that name to be voided, or every slot at all.
+/// Marks every slot of that name for voiding, or all slots if `name` is null.
 void Store::doom(const char* name) {
   for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
     if (name == nullptr || is_named(slot, name)) marks_[slot] |= kDoomed;
@@ -155,7 +155,7 @@ void Store::repair() {
   }
 }
 
-/// Begins a copy of the record in the next free slot.
+/// Starts a copy of the record in the next free slot.
 void Store::next_copy() {
   at_ = 0;
   for (uint8_t tries = 0; tries < kSlotCount; ++tries) {
@@ -177,14 +177,14 @@ void Store::poll() {
   }
 }
 
-/// First the mark is voided, then come the other bytes, then all are compared, and the mark is written last.
+/// Voids the mark, writes the other bytes, compares all of them, and writes the mark last.
 void Store::step_write() {
   const uint16_t address = slot_address(slot_);
   const uint8_t* bytes = reinterpret_cast<const uint8_t*>(&record_);
   while (at_ < sizeof record_) {
     const uint8_t value = at_ == 0 ? kRecordVoid : bytes[at_];
     const uint16_t place = address + at_++;
-    if (eeprom_read(place) == value) continue;  // what is there already costs no wear
+    if (eeprom_read(place) == value) continue;  // skip unchanged bytes to save wear
     eeprom_write(place, value);
     return;
   }
@@ -203,7 +203,7 @@ void Store::step_write() {
   if (--copies_ > 0) next_copy();
 }
 
-/// Voids the doomed slots, those with older copies first, so that none of these comes back to life.
+/// Voids the doomed slots, those with older copies first, so that an older copy never becomes the newest one.
 void Store::step_void() {
   for (uint8_t pass = 0; pass < 2; ++pass) {
     for (uint8_t slot = 0; slot < kSlotCount; ++slot) {
@@ -213,13 +213,13 @@ void Store::step_void() {
         continue;
       }
       if (has(slot, kFailed)) return end(Result::kEeprom);
-      marks_[slot] |= kFailed;  // unless it reads back as void the next time
+      marks_[slot] |= kFailed;  // cleared if it reads back as void the next time
       eeprom_write(slot_address(slot), kRecordVoid);
       return;
     }
   }
   end(Result::kOk);
-  repair();  // the next one; a cell that cannot be written is not tried for ever
+  repair();  // continue with the next record; a cell that cannot be written is not retried for ever
 }
 
 void Store::end(Result result) {

@@ -1,9 +1,9 @@
 // Named parameter sets and the settings in EEPROM: two copies of each, so that neither a power cut nor a bad cell
 // loses one.
 //
-// A save writes two new copies into free slots, each read back, its mark last; only then the old copies are voided.
-// So at every moment the old or the new one is there whole. Free slots are taken in turn, which spreads the wear.
-// Everything is written one byte at a time from poll(), without waiting.
+// A save writes two new copies into free slots, each read back and its mark written last; only then are the old copies
+// voided. So at every moment the old or the new version is complete. Free slots are used in rotation, for wear
+// levelling. Everything is written one byte at a time from poll(), without blocking.
 #pragma once
 
 #include "command_table.h"
@@ -15,40 +15,40 @@ const uint8_t kPresetLimit = 8;  ///< besides the settings: (8 + 1) x 2 copies l
 
 class Store {
  public:
-  /// Looks through the EEPROM; call once at start. A record of which only one copy is good gets its second again.
+  /// Scans the EEPROM; call once at start. If only one copy of a record is good, the second is rewritten.
   void begin();
 
-  /// The newest good copy of a parameter set. False: none, or its values are out of range.
+  /// Loads the newest good copy of a parameter set. Returns false if there is none, or if its values are out of range.
   bool load(const char* name, ParameterSet& set);
-  /// The settings (any bytes, as many as a parameter set has). False: none.
+  /// Loads the settings (arbitrary bytes, as many as a parameter set has). Returns false if there are none.
   bool load_settings(uint8_t* payload);
 
-  /// How many different names are kept, the settings not counted.
+  /// How many different names are stored, not counting the settings.
   uint8_t count();
-  /// The name of one of them; `name` has kNameSize + 1 bytes.
+  /// The name number `index` of these; `name` has kNameSize + 1 bytes.
   bool name_at(uint8_t index, char* name);
 
-  /// Start a job; Result::kOk means "started": poll() until busy() is over, then see result().
+  /// These start a job; Result::kOk means "started": call poll() until busy() is false, then see result().
   Result save(const char* name, const ParameterSet& set);
   Result save_settings(const void* payload);
   Result forget(const char* name);
   Result erase_all();
 
-  /// Goes on with the job by at most one byte.
+  /// Continues the job by at most one byte.
   void poll();
   bool busy() const { return job_ == Job::kSave || job_ == Job::kVoid; }
-  /// How the last job ended.
+  /// Result of the last job.
   Result result() const { return result_; }
 
  private:
   enum class Job : uint8_t { kNone, kSave, kRepair, kVoid };
-  /// What is known of a slot; several may be true.
+  /// Properties of a slot; several may apply.
   enum Mark : uint8_t {
     kGood = 1,    ///< holds a good record
-    kLive = 2,    ///< which is the newest of its name
-    kTaken = 4,   ///< written by the job, or belongs to a later firmware: not free
-    kDoomed = 8,  ///< is to be voided by the job
-    kFailed = 16  ///< did not keep what the job wrote
+    kLive = 2,    ///< its record is the newest of its name
+    kTaken = 4,   ///< not free: written by the job, or belongs to a later firmware
+    kDoomed = 8,  ///< will be voided by the job
+    kFailed = 16  ///< did not retain what the job wrote
   };
 
   bool has(uint8_t slot, uint8_t mark) const { return marks_[slot] & mark; }
@@ -63,13 +63,13 @@ class Store {
   void step_void();
   void end(Result result);
 
-  uint32_t sequence_ = 0;  ///< of the newest record of all
+  uint32_t sequence_ = 0;  ///< of the newest of all records
   uint8_t cursor_ = 0;     ///< where to look for the next free slot
   Job job_ = Job::kNone;
   Result result_ = Result::kOk;
   uint8_t slot_ = 0;
   uint8_t at_ = 0;      ///< byte of the record to be written next
-  uint8_t copies_ = 0;  ///< still to be written
+  uint8_t copies_ = 0;  ///< copies still to be written
   uint8_t marks_[kSlotCount];
   Record record_;  ///< being written
 };

@@ -1,4 +1,4 @@
-// What can go wrong, and what is kept of it.
+// The faults, and the report that is kept of one.
 #pragma once
 
 #include <stdint.h>
@@ -10,26 +10,26 @@ namespace bifa {
 enum class Fault : uint8_t {
   kNone,
   kOverPressure,   ///< value: pressure, limit: the trip (mpsi)
-  kSensorRange,    ///< value: pressure, limit: end of the sensor's range (mpsi); broken wire or saturated
-  kSensorStuck,    ///< value: pressure (mpsi), limit: for how long it did not move (ms)
+  kSensorRange,    ///< value: pressure, limit: end of the sensor's range (mpsi); broken wire, or saturated
+  kSensorStuck,    ///< value: pressure (mpsi), limit: how long it did not change (ms)
   kRegulator,      ///< value: the regulator's monitor, limit: the set-point (mpsi)
-  kSupplyControl,  ///< the DAC does not answer; value: failures in a row, limit: how many are borne
+  kSupplyControl,  ///< the DAC does not answer; value: consecutive failures, limit: how many are tolerated
   kHostSilent,     ///< value: silence, limit: host_timeout_s (both in 10 ms)
   kWatchdog,       ///< the firmware hung and was restarted
-  kBrownOut,       ///< the supply of the board broke down
-  kRestart,        ///< one of the two: the bootloader hides which
+  kBrownOut,       ///< the board's supply voltage dropped
+  kRestart,        ///< one of the preceding two; the bootloader hides which
 };
 
 const uint8_t kNoChannel = 3;
 
-/// The first fault, latched until it is cleared; later ones do not overwrite it.
+/// The first fault, latched until it is cleared; later faults do not overwrite it.
 struct FaultReport {
   Fault fault;
   uint8_t channel;  ///< number of the chamber, or kNoChannel
   int16_t value;
   int16_t limit;
   uint32_t time_ms;                    ///< since start
-  int16_t lowest_mpsi[kChamberCount];  ///< of the last second before
+  int16_t lowest_mpsi[kChamberCount];  ///< during the second before
   int16_t highest_mpsi[kChamberCount];
 };
 

@@ -1,12 +1,12 @@
-// Conditions that have to last before they count.
+// Conditions that must last before they count.
 #pragma once
 
 #include <stdint.h>
 
 namespace bifa {
 
-/// Counts how often in a row a condition was met; one time not met and it begins anew, so that two short spikes far
-/// apart never add up.
+/// Counts how often in a row a condition was met; the count restarts whenever it is not met, so that two short spikes
+/// far apart never add up.
 class Persistence {
  public:
   /// Returns whether the condition has now been met `needed` times in a row.
@@ -23,8 +23,8 @@ class Persistence {
   uint8_t count_ = 0;
 };
 
-/// Adds up for how long a condition is met, and forgets slowly: `step` for each time that it is met, minus one for each
-/// that it is not.
+/// Leaky sum of how long a condition is met: plus `step` for each time that it is met, minus one for each time that it
+/// is not.
 class Accumulation {
  public:
   /// Returns whether the sum has reached `limit` (at most 255 - `step`).

@@ -23,7 +23,7 @@ SensorWatch::Finding SensorWatch::look(uint16_t sum, int16_t pressure_mpsi, int1
   if (out_of_range_.met(lost, kRangeStep, kRangeStep * (kRangeTime_ms / kSamplePeriod_ms))) {
     return {Fault::kSensorRange, sensor_mpsi(sum < kSensorLow ? kSensorLow : kSensorHigh)};
   }
-  if (lost) return {Fault::kNone, 0};  // it says nothing of the pressure, least of all that it is good
+  if (lost) return {Fault::kNone, 0};  // an out-of-range sample carries no information about the pressure
   if (above_.met(pressure_mpsi > trip_mpsi, kTripStep, kTripStep * (kTripTime_ms / kSamplePeriod_ms))) {
     return {Fault::kOverPressure, trip_mpsi};
   }

@@ -1,4 +1,4 @@
-// What one pressure channel must not do.
+// Fault detection for one pressure channel.
 #pragma once
 
 #include "chamber.h"
@@ -8,31 +8,32 @@
 
 namespace bifa {
 
-/// Over-pressure: so far above the set-point, for so long. Shorter times add up, and are forgotten in four times as long.
+/// Over-pressure: this far above the set-point, for this long. Shorter times add up, and decay four times as slowly.
 const int16_t kTripMargin_mpsi = 2000;
 const uint16_t kTripTime_ms = 200;
 const uint8_t kTripStep = 4;
-/// The sensor's range ends at 15 psi: from here on it could not tell over-pressure from itself.
+/// The sensor's range ends at 15 psi; with a higher trip, over-pressure could not be told from saturation.
 const int16_t kGreatestTrip_mpsi = 14800;
-/// After the set-point is lowered the trip follows it no faster than air can leave.
+/// After the set-point is lowered, the trip falls no faster than the air can escape.
 const int16_t kTripFall_mpsi_per_sample = 20;
 
-/// Out of range: for so long; shorter times add up, and are forgotten in four times as long.
+/// Out of range: for this long; shorter times add up, and decay four times as slowly.
 const uint16_t kRangeTime_ms = 50;
 const uint8_t kRangeStep = 4;
-/// A valve has switched and for so long, however often it switches again, not the least bit of the reading has moved.
+/// Stuck: a valve has switched, and for this long, however often it switches again, not one bit of the reading has
+/// changed.
 const uint16_t kStuckTime_ms = 2000;
 
-/// A reading that goes up by more than this in one sample and down in the next, or down and up, follows no air: an open
-/// input. A valve may make it turn twice. Three a tenth of a second, for a second or so, are too many.
+/// Open input: a reading that rises by more than this in one sample and falls in the next, or the reverse, does not
+/// follow air. A valve may cause two reversals. Three per tenth of a second, for about a second, are too many.
 const int16_t kJump_mpsi = 1000;
 const uint8_t kJumpStep = 3;
 const uint8_t kJumpLimit = 100;
 
-/// The limit of over-pressure, which follows the set-point.
+/// The over-pressure limit, which follows the set-point.
 class TripLimit {
  public:
-  /// Once a sample; `set_point_mpsi` at most 14000.
+  /// Call once per sample; `set_point_mpsi` at most 14000.
   void follow(uint16_t set_point_mpsi);
   int16_t mpsi() const { return limit_mpsi_; }
 
@@ -43,19 +44,19 @@ class TripLimit {
 /// Watches one sensor.
 class SensorWatch {
  public:
-  /// What a sample shows.
+  /// The fault that a sample shows, if any.
   struct Finding {
     Fault fault;
     int16_t limit;
   };
 
-  /// `sum`: raw, `pressure_mpsi`: what it means, `chamber`: what its valves do.
+  /// `sum`: raw reading, `pressure_mpsi`: the same as a pressure, `chamber`: present state of its valves.
   Finding look(uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi, ChamberState chamber);
 
-  /// Whether the cause of a fault is there in this very sample, as far as it can tell: one out of range denies nothing.
+  /// Whether the cause of a fault is present in this sample. A sample out of range rules nothing out.
   static bool stands(Fault fault, uint16_t sum, int16_t pressure_mpsi, int16_t trip_mpsi);
 
-  /// Forgets what was counted.
+  /// Resets all counts.
   void reset();
 
  private:

@@ -8,7 +8,7 @@ namespace bifa {
 enum class State : uint8_t {
   kIdle,     ///< vented, ready
   kRunning,  ///< walking
-  kHolding,  ///< chambers held as told
+  kHolding,  ///< chambers held as commanded
   kStopped,  ///< vented by a stop or the emergency stop, until cleared
   kFault,    ///< vented by a fault, until cleared
 };

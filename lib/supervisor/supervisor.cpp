@@ -62,7 +62,7 @@ void Supervisor::tick() {
   write(ValvePattern(now));
 }
 
-/// What was sent before nobody can have meant for this stop or fault.
+/// Vents, and marks everything sent so far as outdated: it cannot have been meant as an answer to this stop or fault.
 void Supervisor::latch() {
   vent();
   outdated_ = true;

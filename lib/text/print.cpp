@@ -7,7 +7,7 @@ namespace bifa {
 
 namespace {
 
-// To subtract them is six times as fast as to divide, and eight numbers make a line of telemetry.
+// Subtracting these is six times as fast as dividing, and a line of telemetry has eight numbers.
 const uint32_t kLong[] BIFA_FLASH = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000, 1000000000};
 const uint16_t kShort[] BIFA_FLASH = {1, 10, 100, 1000, 10000};
 inline uint32_t flash_number(const uint32_t* address) { return flash_long(address); }
@@ -28,7 +28,7 @@ void print_digits(Number value, uint8_t decimals, uint8_t last, const Number (&p
   } while (place > last || value != 0);
 }
 
-/// Prints what stands in flash up to the next phrase or the end, and returns where that is.
+/// Prints text from flash up to the next phrase or the end, and returns that position.
 const char* print_plain(const char* at) {
   for (uint8_t c; (c = flash_byte(at)) != '\0' && c < kFirstPhrase; ++at) print(static_cast<char>(c));
   return at;

@@ -8,11 +8,12 @@ namespace bifa {
 void print(char character);
 void print(FlashText text);
 void print(const char* text);
-/// A carriage return as well: bare terminals begin the next line at the margin then. Texts with line ends have both too.
+/// Prints a line feed and a carriage return, so that bare terminals start the next line at the margin; texts that
+/// contain line ends have both, too.
 void print_line_end();
 
-/// Prints value / 10^decimals without trailing zeros: (5700000, 6) -> "5.7"; but `least` decimals (at most `decimals`)
-/// in any case: (5700000, 6, 3) -> "5.700".
+/// Prints value / 10^decimals without trailing zeros: (5700000, 6) -> "5.7"; but always at least `least` decimals (at
+/// most `decimals`): (5700000, 6, 3) -> "5.700".
 void print_decimal(uint32_t value, uint8_t decimals, uint8_t least = 0);
 void print_signed(int32_t value, uint8_t decimals);
 

@@ -1,4 +1,4 @@
-// The three chambers and what each may be told to do.
+// The three chambers and the states that each can be commanded to.
 #pragma once
 
 #include <stdint.h>
@@ -8,7 +8,7 @@ namespace bifa {
 enum class Chamber : uint8_t { kBody, kHead, kTail };
 const uint8_t kChamberCount = 3;
 
-/// The one state of a chamber's pair of valves. There is no value for "both": it cannot be said.
+/// The state of a chamber's pair of valves. There is no value for "both", so it cannot be expressed.
 enum class ChamberState : uint8_t {
   kOff,       ///< both valves de-energised: the chamber vents
   kVacuum,    ///< u = 0

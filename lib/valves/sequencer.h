@@ -1,4 +1,4 @@
-// One chamber's pair of valves in time: break before make, and a least stay in each state.
+// Timing of one chamber's pair of valves: break before make, and a minimum dwell time in each state.
 #pragma once
 
 #include "chamber.h"
@@ -6,23 +6,23 @@
 
 namespace bifa {
 
-/// How long a valve stays energised at least, however short the command. Venting does not wait for it.
+/// Minimum time that a valve stays energised, however short the command. Venting does not wait for it.
 const uint8_t kDwell_ms = 20;
 
 class ValveSequencer {
  public:
-  /// Every millisecond, with what the chamber is to do; returns what it does.
+  /// Call every millisecond with the wanted state; returns the actual state.
   ChamberState tick(ChamberState wanted);
 
-  /// Off at once.
+  /// Switches off at once.
   void vent();
 
   ChamberState state() const { return state_; }
 
  private:
   ChamberState state_ = ChamberState::kOff;
-  // Ticks until the next change may come. A change may come just before a tick, so the first tick after it is one more:
-  // that makes every time a lower bound.
+  // Ticks until the next change is allowed. A change may occur just before a tick, so one more tick is counted: every
+  // time is then a lower bound.
   uint8_t rest_ = 0;
 };
 

@@ -1,5 +1,5 @@
-// What stands on the six valve pins. It can only be made from chamber states, so that both valves of a chamber are
-// never energised together, whatever a caller does.
+// Levels of the six valve pins. A pattern can only be constructed from chamber states, so that both valves of a chamber
+// are never energised together, whatever a caller does.
 #pragma once
 
 #include "chamber.h"
@@ -14,13 +14,13 @@ class ValvePattern {
   explicit ValvePattern(const ChamberStates& states)
       : bits_(pair(states.of[0]) | pair(states.of[1]) << 2 | pair(states.of[2]) << 4) {}
 
-  /// Bit 2i: the positive valve of chamber i; bit 2i + 1: its vacuum valve. As on D4 to D9.
+  /// Bit 2i: the positive valve of chamber i; bit 2i + 1: its vacuum valve; in the order of D4 to D9.
   uint8_t bits() const { return bits_; }
 
   bool operator==(const ValvePattern& other) const { return bits_ == other.bits_; }
 
  private:
-  // Any other number that is forced into the enum (damaged RAM) means off.
+  // Any other value in the enum (from damaged RAM) means off.
   static uint8_t pair(ChamberState state) {
     return state == ChamberState::kPositive ? 1 : state == ChamberState::kVacuum ? 2 : 0;
   }
@@ -28,7 +28,7 @@ class ValvePattern {
   uint8_t bits_;
 };
 
-/// Puts the pattern on the pins at once; called with interrupts off. The board provides it.
+/// Writes the pattern to the pins at once; called with interrupts off. The board defines it.
 void set_valves(ValvePattern pattern);
 
 }  // namespace bifa

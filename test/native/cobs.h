@@ -1,4 +1,4 @@
-// Consistent Overhead Byte Stuffing, as people would write it: the oracle of the Uno's.
+// Consistent Overhead Byte Stuffing, in its most readable form: the reference for the Uno's implementation.
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// The oscillators' edges, and that this computer and the chip compute the same, bit for bit.
+// Edge cases of the oscillators, and that this computer and the chip compute identical bits.
 #include <unity.h>
 
 #include "../suite.h"
@@ -28,7 +28,7 @@ ParameterSet quick() {
   return set;
 }
 
-/// Outputs over some steps: those that were ever on, and those that always were.
+/// Collects the outputs over some steps: those that were ever on, and those that always were.
 void collect(Oscillators& oscillators, uint16_t steps, uint8_t& ever, uint8_t& always) {
   ever = 0;
   always = kAll;

@@ -1,4 +1,4 @@
-// The receiver and the decoder, on this computer and in the chip, where the checks are the chip's own instructions.
+// The receiver and the decoder, on this computer and in the chip, where the CRCs use the chip's own instructions.
 #include <unity.h>
 
 #include "../suite.h"
@@ -91,7 +91,7 @@ static void test_no_frame_begins_with_a_stop_so_a_stray_delimiter_does_not_hide_
   TEST_ASSERT_EQUAL_UINT8_ARRAY(expected, out, sizeof expected);
 }
 
-// What a host sends to stop, after a frame of another message: any one byte of it all replaced, lost or doubled.
+// The host's stop after a frame of another message, with any single byte of the whole replaced, lost or doubled.
 static void test_a_stop_survives_any_single_damaged_byte() {
   const uint8_t before[] = {0, 0, 0x02, 0x13, 0x12, 0x07, 0x44, 0x5A, 0x7E, 0x10, 0};
   uint8_t sent[sizeof before + 2 + kStopFrameBytes + 2];
@@ -102,7 +102,7 @@ static void test_a_stop_survives_any_single_damaged_byte() {
   sent[size - 2] = 0;
   sent[size - 1] = '!';
   for (uint8_t place = 0; place < size; ++place) {
-    for (uint16_t value = 0; value < 0x100; ++value) {  // its own value: undamaged
+    for (uint16_t value = 0; value < 0x100; ++value) {  // includes its own value: undamaged
       Receiver receiver;
       bool stop = push(receiver, sent, place);
       stop = receiver.push(static_cast<uint8_t>(value)) || stop;

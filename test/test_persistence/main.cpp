@@ -1,4 +1,4 @@
-// Conditions that have to last: in a row, or added up.
+// Conditions that must last: consecutively, or summed.
 #include <unity.h>
 
 #include "../suite.h"
@@ -19,7 +19,7 @@ void test_a_condition_in_a_row_counts_once_it_has_lasted_and_as_long_as_it_lasts
   }
 }
 
-/// Times in a row after which it is met.
+/// Consecutive times after which the condition counts as met.
 uint8_t times_to_meet(Accumulation& accumulation) {
   for (uint8_t times = 1; times < 100; ++times) {
     if (accumulation.met(true, 4, 20)) return times;

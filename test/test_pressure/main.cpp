@@ -31,8 +31,8 @@ void test_every_sum_of_conversions_gives_a_pressure_and_more_volts_more_of_it() 
   TEST_ASSERT_INT16_WITHIN(1, 18731, last);
 }
 
-#ifndef __AVR__  // whose double has 24 bits
-// Against the formulas in the datasheets, in floating point.
+#ifndef __AVR__  // where double has 24 bits
+// Compared with the formulas in the datasheets, in floating point.
 void test_pressures_are_the_nearest_thousandths_of_a_psi() {
   for (uint16_t sum = 0; sum <= 1023 * 8; ++sum) {
     const double exact = (sum / 8.0 + 0.5) * 37500 / 1024 - 18750;
@@ -91,7 +91,7 @@ void test_last_second_remembers_a_single_sample_for_a_second_and_forgets_it_soon
   TEST_ASSERT_EQUAL_INT16(-100, last.lowest_mpsi(1));
 }
 
-// ---- the rest that a zero is taken from ----
+// ---- steady pressures, for taking a zero ----
 
 void add(bifa::Rest& rest, int16_t pressure, uint16_t samples) {
   const int16_t pressures[] = {pressure, static_cast<int16_t>(-pressure), 0};
@@ -115,7 +115,7 @@ void test_a_mean_that_moves_by_more_than_a_count_begins_its_rest_anew() {
   bifa::Rest rest;
   add(rest, 41, 400);
   TEST_ASSERT_FALSE(rest.is_long());
-  // The slow mean, and when it passes 40.
+  // Follow the slow mean until it passes 40.
   int32_t sum = 0;
   uint16_t samples = 0;
   for (; sum / 32 <= 40; ++samples) sum += 50 - sum / 32;
@@ -136,7 +136,7 @@ void test_a_mean_is_rounded() {
   TEST_ASSERT_EQUAL_INT16(-1, rest.mean_mpsi(2));
 }
 
-// 16 bits do not hold what lies between: on the chip the mean went the wrong way.
+// The difference does not fit 16 bits: on the chip, the mean used to move the wrong way.
 void test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went() {
   const int32_t rail = 18731;
   bifa::Rest rest;
@@ -152,7 +152,7 @@ void test_a_jump_from_rail_to_rail_moves_the_mean_towards_where_it_went() {
   TEST_ASSERT_TRUE(rest.is_long());
 }
 
-// Against all that it was ever told: the samples of the last three parts and of the one under way.
+// Compared with a complete record: the samples of the last three parts and of the current one.
 void test_last_second_holds_the_last_three_thirds_and_the_one_under_way() {
   LastSecond last;
   for (int16_t n = 0; n < 9 * 34 + 7; ++n) {

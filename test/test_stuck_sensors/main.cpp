@@ -1,4 +1,4 @@
-// Sensors whose reading does not move, and open inputs, whose reading moves as no air does.
+// Sensors whose reading does not change, and open inputs, whose reading changes faster than air pressure can.
 #include <unity.h>
 
 #include "../sensor_looks.h"
@@ -36,7 +36,7 @@ void test_a_reading_that_moved_after_the_switch_may_rest() {
 
 // ---- an open input ----
 
-/// Turns (up, down) of so many counts after which it is found; 255 if it is not.
+/// Reversals (up, down) of `counts` after which the fault is found; 255 if it is not.
 uint8_t turns_to_fault(uint16_t counts, uint8_t quiet) {
   SensorWatch watch;
   samples_of(watch, 2, 0, kHalfScale);
@@ -50,12 +50,12 @@ uint8_t turns_to_fault(uint16_t counts, uint8_t quiet) {
 
 void test_a_reading_that_turns_back_by_more_than_a_psi_from_sample_to_sample_is_an_open_input() {
   const uint16_t a_psi = 218;                                 // 1000 mpsi * 8 * 1024 / 37500
-  TEST_ASSERT_EQUAL_UINT8(34, turns_to_fault(a_psi + 1, 0));  // 3 * 34 >= 100; the first jump is no turn
+  TEST_ASSERT_EQUAL_UINT8(34, turns_to_fault(a_psi + 1, 0));  // 3 * 34 >= 100; the first jump is not a reversal
   TEST_ASSERT_EQUAL_UINT8(255, turns_to_fault(a_psi, 0));
   TEST_ASSERT_EQUAL_UINT8(255, turns_to_fault(a_psi + 1, 1));  // a valve, once in a while
 }
 
-/// So many turns, then calm, then turns again until it is found.
+/// `turns` reversals, then `calm` samples, then reversals until the fault is found; returns how many.
 uint8_t turns_after(uint8_t turns, uint16_t calm) {
   SensorWatch watch;
   samples_of(watch, 2, 0, kHalfScale);
@@ -69,7 +69,7 @@ uint8_t turns_after(uint8_t turns, uint16_t calm) {
   return 100;
 }
 
-/// Up by so many counts, down by so many, again and again.
+/// Repeatedly up by `up` counts and down by `down`.
 bool is_open_input(int16_t up, int16_t down) {
   SensorWatch watch;
   int16_t sum = kHalfScale;
@@ -108,7 +108,7 @@ void test_a_watch_that_is_reset_has_forgotten_turns_and_switches() {
 }
 
 void test_turns_add_up_and_are_forgotten_in_three_times_as_long() {
-  TEST_ASSERT_EQUAL_UINT8(24, turns_after(20, 30));  // 60 - 30, one more for the jump that is no turn; 29 + 72 >= 100
+  TEST_ASSERT_EQUAL_UINT8(24, turns_after(20, 30));  // 60 - 30 - 1 (the jump that is no reversal) + 72 >= 100
   TEST_ASSERT_EQUAL_UINT8(34, turns_after(20, 70));
   TEST_ASSERT_EQUAL_UINT8(15, turns_after(20, 2));
   TEST_ASSERT_EQUAL_UINT8(1, turns_after(33, 1));  // 99 - 2 + 3: exactly 100

@@ -1,4 +1,4 @@
-// The states, the valves in each, and what a fault keeps.
+// The states, the valves in each, and the contents of a fault report.
 #include <unity.h>
 
 #include "../suite.h"
@@ -18,9 +18,9 @@ const ChamberState kOff = ChamberState::kOff;
 const ChamberState kVacuum = ChamberState::kVacuum;
 const ChamberState kPositive = ChamberState::kPositive;
 
-uint8_t pins = 0;  ///< what stands on the valves' pins
+uint8_t pins = 0;  ///< levels of the valves' pins
 uint8_t writes = 0;
-uint8_t outdated = 0;  ///< how often what waits was told that it came before a stop or fault
+uint8_t outdated = 0;  ///< how often waiting commands were marked as older than a stop or fault
 
 // ---- the states ----
 
@@ -181,7 +181,7 @@ void test_a_vent_ends_what_every_chamber_was_to_do() {
       TEST_ASSERT_TRUE(supervisor.wanted(chamber) == kOff);
       tick(supervisor, 10);
       TEST_ASSERT_EQUAL_HEX8(0, pins);
-      // and the valve has its time to close
+      // the valve has had its time to close
       if (way == 1 || way == 2) supervisor.clear();
       supervisor.hold(static_cast<Chamber>(chamber), kVacuum);
       tick(supervisor, 1);
@@ -194,7 +194,7 @@ void test_a_second_fault_vents_but_keeps_the_first_one_s_report() {
   Supervisor supervisor;
   LastSecond last_second;
   supervisor.trip(Fault::kOverPressure, 1, 12345, 10500, 777, last_second);
-  pins = 0xFF;  // whatever stands there
+  pins = 0xFF;  // arbitrary pin levels
   supervisor.trip(Fault::kHostSilent, bifa::kNoChannel, 1, 2, 888, last_second);
   TEST_ASSERT_EQUAL_HEX8(0, pins);
   TEST_ASSERT_TRUE(supervisor.fault().fault == Fault::kOverPressure);

@@ -1,4 +1,4 @@
-// The positive supply: the DAC that answers or does not, the regulator's monitor.
+// The positive supply: a DAC that answers or does not, and the regulator's monitor.
 #include <unity.h>
 
 #include "../suite.h"
@@ -16,7 +16,7 @@ uint16_t conversion(double volts, double supply_V = 5) {
 }
 double monitor_V(double pressure_psi) { return 1 + pressure_psi * 4 / 130; }
 
-/// Whether the watch finds a deviation within so many samples alike.
+/// Whether the watch finds a deviation within `samples` identical samples.
 bool finds(RegulatorWatch& watch, uint16_t samples, uint16_t conversion, uint16_t set_point_mpsi) {
   bool found = false;
   for (; samples > 0; --samples) found = watch.look(conversion, set_point_mpsi) || found;
@@ -55,7 +55,7 @@ void test_a_monitor_is_connected_once_it_has_shown_its_zero_for_a_second() {
   TEST_ASSERT_FALSE(watch.deviates());
   finds(watch, 1, 150, 14000);
   TEST_ASSERT_TRUE(watch.deviates());
-  TEST_ASSERT_TRUE(finds(watch, 300, 0, 14000));  // and stays so when its wire comes off
+  TEST_ASSERT_TRUE(finds(watch, 300, 0, 14000));  // and remains so if its wire comes off
 }
 
 void test_a_regulator_that_does_not_follow_is_found_in_two_and_a_half_seconds() {
@@ -88,7 +88,7 @@ void test_a_watch_that_is_reset_begins_to_count_anew() {
   TEST_ASSERT_TRUE(finds(watch, 1, conversion(monitor_V(20)), 8500));
 }
 
-/// Readings that are as far from the set-point as is borne.
+/// Readings as far from the set-point as is tolerated.
 void test_six_point_seven_psi_above_and_four_point_six_below_are_borne() {
   for (uint16_t set_point = 0; set_point <= 14000; set_point += 7000) {
     for (uint16_t conversion = 150; conversion < 400; ++conversion) {

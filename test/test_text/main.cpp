@@ -1,4 +1,4 @@
-// Numbers and texts, on this computer and in the chip, where texts lie in flash.
+// Numbers and texts, on this computer and in the chip, where texts are kept in flash.
 #include <unity.h>
 
 #include "../suite.h"
@@ -17,7 +17,7 @@ namespace {
 char printed[80];
 uint8_t length;
 
-/// From here on `printed` holds what is printed.
+/// Clears `printed`, which collects the output from here on.
 void begin_line() {
   memset(printed, 0, sizeof printed);
   length = 0;

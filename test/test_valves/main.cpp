@@ -1,4 +1,4 @@
-// One chamber's valves in time, and what can stand on the pins at all.
+// Timing of one chamber's valves, and the patterns that the pins can have.
 #include <unity.h>
 
 #include "../suite.h"
@@ -21,7 +21,7 @@ const ChamberState kPositive = ChamberState::kPositive;
 
 bool both_on(ValvePattern pattern) { return pattern.bits() & pattern.bits() >> 1 & 0x15; }
 
-/// Ticks until the sequencer is in `state`; gives up after 255.
+/// Ticks until the sequencer is in `state`; at most 255.
 uint8_t ticks_until(ValveSequencer& sequencer, ChamberState wanted, ChamberState state) {
   for (uint8_t ticks = 1; ticks < 255; ++ticks) {
     if (sequencer.tick(wanted) == state) return ticks;
@@ -29,7 +29,7 @@ uint8_t ticks_until(ValveSequencer& sequencer, ChamberState wanted, ChamberState
   return 255;
 }
 
-// A pattern is made from one state a chamber: there are 27, each with its own pins, and none with both valves on.
+// A pattern is made from one state per chamber: there are 27, each with different pins, and none with both valves on.
 void test_every_pattern_that_can_be_made_has_at_most_one_valve_of_a_chamber_on() {
   const ChamberState states[] = {kOff, kVacuum, kPositive};
   for (ChamberState body : states) {
@@ -78,7 +78,7 @@ void test_one_valve_closes_before_the_other_opens() {
   sequencer.tick(kPositive);
   for (uint8_t i = 0; i <= kDwell_ms; ++i) sequencer.tick(kPositive);
   TEST_ASSERT_TRUE(sequencer.tick(kVacuum) == kOff);
-  // Ticks come a millisecond apart, give or take a few microseconds: one more than the dead time makes it a least one.
+  // Ticks are a millisecond apart to within a few microseconds: one more than the dead time guarantees the dead time.
   TEST_ASSERT_EQUAL_UINT8(kDeadTime_ms + 1, ticks_until(sequencer, kVacuum, kVacuum));
 }
 
@@ -143,7 +143,7 @@ void test_random_commands_never_break_dead_time_or_dwell() {
   TEST_ASSERT_TRUE(driven > 500);
 }
 
-// ---- the set-point: the other thing that must not be sayable ----
+// ---- the set-point, which must not be constructible above its limit either ----
 
 void test_no_number_makes_a_set_point_above_14_psi() {
   const uint16_t kCountOf14Psi = 441;

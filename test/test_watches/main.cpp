@@ -1,4 +1,5 @@
-// Over-pressure and lost sensors: what trips, what does not, and three defects found in other pneumatic boards' sources.
+// Over-pressure and lost sensors: what trips, what does not, and three defects found in other pneumatic boards'
+// sources.
 #include <unity.h>
 
 #include "../sensor_looks.h"
@@ -34,7 +35,7 @@ void test_over_pressure_trips_after_exactly_its_time_and_not_before() {
   TEST_ASSERT_TRUE(look(watch, kTrip_mpsi + 1) == Fault::kOverPressure);
 }
 
-/// Samples above the limit after which it trips, of a watch that has seen `above` of them and then `below`.
+/// Samples above the limit until a watch trips that has already seen `above` such samples and then `below` others.
 uint8_t samples_to_trip(uint8_t above, uint8_t below) {
   SensorWatch watch;
   for (; above > 0; --above) look(watch, kTrip_mpsi + 1);
@@ -68,7 +69,7 @@ void test_a_pressure_at_the_limit_is_not_above_it() {
   for (uint8_t sample = 0; sample < 250; ++sample) TEST_ASSERT_TRUE(look(watch, kTrip_mpsi) == Fault::kNone);
 }
 
-// 300 * 1000 wraps in a 16-bit int: no time here is computed so, and none is longer than its counter.
+// 300 * 1000 overflows a 16-bit int: no time here is computed that way, and none exceeds its counter.
 void test_times_are_counted_in_samples_that_fit_their_counter() {
   TEST_ASSERT_TRUE(bifa::kTripTime_ms / bifa::kSamplePeriod_ms == 20);
   TEST_ASSERT_TRUE(bifa::kRangeTime_ms / bifa::kSamplePeriod_ms == 5);
@@ -99,7 +100,7 @@ void test_a_saturated_sensor_is_a_sensor_fault() {
   TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
 }
 
-// ---- a loose plug: what is out of range says nothing of the pressure, least of all that it is good ----
+// ---- a loose plug: a sample out of range carries no information about the pressure ----
 
 const uint16_t kUnplugged = 0;
 
@@ -113,7 +114,7 @@ void test_a_loose_plug_is_found_though_every_fifth_sample_is_good() {
   TEST_ASSERT_TRUE(fault == Fault::kSensorRange);
 }
 
-/// Samples out of range after which it is a fault, of a watch that has seen 4 of them and then so many good ones.
+/// Samples out of range until a watch faults that has already seen 4 of them and then `good` good ones.
 uint8_t lost_to_fault(uint8_t good) {
   SensorWatch watch;
   samples_of(watch, 4, 0, kUnplugged);
@@ -182,7 +183,7 @@ void test_a_range_fault_names_the_end_of_the_range_that_was_passed() {
   TEST_ASSERT_EQUAL_INT16(bifa::sensor_mpsi(997 * 8), high.look(8184, 0, kTrip_mpsi, kOff).limit);
 }
 
-// ---- a limit that is not a number disables the trip: here there are only integers, and every one of them is a limit ----
+// ---- a limit of NaN disables a trip: here there are only integers, and every one of them is a valid limit ----
 
 void test_whatever_the_set_point_there_is_a_limit_within_the_sensor_s_range() {
   for (uint32_t set_point = 0; set_point < 0x10000UL; set_point += 13) {

@@ -1,4 +1,4 @@
-// The facade, tick by tick: what may be asked for when, sampling, faults and how they are released.
+// The facade, tick by tick: which requests are allowed when, sampling, faults and how they are released.
 #include <unity.h>
 
 #include "../../suite.h"
@@ -25,17 +25,17 @@ const uint16_t kMonitorZero = 0;
 const uint8_t kBodyPositive = 0x01;
 const uint8_t kBodyVacuum = 0x02;
 
-uint8_t pins = 0;     ///< what stands on the valves' pins
-uint8_t ever_on = 0;  ///< what stood there ever
+uint8_t pins = 0;     ///< levels of the valves' pins
+uint8_t ever_on = 0;  ///< pins that have ever been on
 
-/// A controller, and a board around it whose converter answers at once.
+/// A controller on a board whose converter answers immediately.
 struct Bench {
   Controller controller;
   RawRound round = {{kZero, kZero, kZero}, kMonitorZero};
   bool pressed = false;
   uint16_t rounds = 0;
   bool strobed = true;  ///< the strobe rose with the last round
-  bool noisy = true;    ///< the last bit of the readings moves, as that of a sensor that lives
+  bool noisy = true;    ///< the readings' last bit changes, as with a working sensor
 
   explicit Bench(StartCause cause = StartCause::kPower, ParameterSet set = bifa::factory_preset(0)) {
     pins = ever_on = 0;
@@ -54,13 +54,13 @@ struct Bench {
     }
   }
 
-  /// In the receive interrupt, which others wait for.
+  /// A stop byte in the receive interrupt, which other interrupts wait for.
   void stop_byte() {
     const bifa::Critical interrupts_off;
     controller.stop_in_interrupt();
   }
 
-  /// A command that comes now.
+  /// A `clear` that is sent now.
   Verdict clear() {
     controller.hear_from_now_on();
     return controller.clear();
@@ -82,7 +82,7 @@ void equal(Fault expected, Fault actual) {
   TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(actual));
 }
 
-// ---- what may be asked for when ----
+// ---- which requests are allowed when ----
 
 void test_it_starts_idle_and_vented() {
   Bench bench;
@@ -434,7 +434,7 @@ void test_a_sample_says_what_stood_at_its_strobe() {
     TEST_ASSERT_TRUE(commands[i] == sample.command[i]);
     TEST_ASSERT_INT16_WITHIN(5, bifa::sensor_mpsi(conversions[i] * 8), sample.pressure_mpsi[i]);
   }
-  // What comes while it is converted stands in the next one.
+  // Changes during the conversion appear in the next sample.
   for (uint8_t ms = 0; ms < 10; ++ms) bench.controller.tick(false);
   bench.controller.stop();
   bench.controller.converted_in_interrupt(bench.round);
@@ -541,7 +541,7 @@ void test_a_mark_leaves_ten_strobes_out_and_names_the_sample_after_them() {
       bench.tick();
       Sample sample;
       if (!bench.controller.take_sample(sample)) continue;
-      const bool strobed = bench.strobed;  // of the round that this sample came from
+      const bool strobed = bench.strobed;  // the round that this sample came from
       if (!strobed) ++left_out;
       if (strobed && left_out > 0 && first_after == 0) first_after = sample.sequence;
     }
@@ -662,7 +662,7 @@ void test_over_pressure_behind_a_loose_plug_is_not_cleared() {
   bench.tick(10);
   equal(Verdict::kCauseStands, bench.clear());
   bench.pressure(2, 512 + 330);
-  for (uint8_t ms = 0; ms < 10; ++ms) {  // also between a round and the tick that looks at it
+  for (uint8_t ms = 0; ms < 10; ++ms) {  // also between a round and the tick that evaluates it
     bench.tick();
     equal(Verdict::kCauseStands, bench.clear());
   }
@@ -676,7 +676,7 @@ void test_a_stuck_sensor_is_a_fault_while_walking() {
   equal(Fault::kSensorStuck, bench.fault());
 }
 
-/// Ticks until there is a fault, at most `most`.
+/// Ticks until a fault, at most `most`.
 uint32_t ticks_to_fault(Bench& bench, uint32_t most) {
   uint32_t ticks = 0;
   for (; ticks < most && bench.fault() == Fault::kNone; ++ticks) bench.tick();
@@ -716,7 +716,7 @@ void test_an_open_input_is_found_within_two_seconds_whatever_the_valves_do() {
   }
 }
 
-// The hardest that air does: full supply and full vacuum every 20 ms at a sensor by the valves, with an overshoot.
+// The worst case of real air: full supply and full vacuum every 20 ms at a sensor near the valves, with overshoot.
 void test_pressures_that_follow_their_valves_are_no_open_input_at_the_fastest_gait() {
   ParameterSet set = bifa::factory_preset(0);
   set.period_us = 500000;
@@ -858,7 +858,7 @@ void test_a_fault_is_not_cleared_while_any_chamber_has_its_cause() {
 
 void test_what_stands_for_one_fault_does_not_keep_another() {
   Bench bench;
-  bench.round.monitor = 258;  // 8.5 psi, which in a fault is off the set-point of 0
+  bench.round.monitor = 258;  // 8.5 psi, which deviates from a fault's set-point of 0
   bench.tick(1100);
   bench.pressure(0, 512 + 330);
   bench.tick(230);
@@ -971,9 +971,9 @@ void test_a_stop_on_top_of_a_fault_leaves_the_fault_to_be_read() {
   equal(Fault::kWatchdog, bench.fault());
 }
 
-// ---- what the interrupts share with the main loop ----
+// ---- data shared between the interrupts and the main loop ----
 
-/// Guards that a call enters.
+/// How many guards a call enters.
 template <typename Call>
 unsigned guards(Call call) {
   const unsigned before = bifa::Critical::entered();
@@ -1010,7 +1010,7 @@ void test_everything_that_the_main_loop_calls_is_guarded() {
   TEST_ASSERT_EQUAL(0, bifa::Critical::depth());
 }
 
-// The tick lets other interrupts in: a stop may come between any two of its parts.
+// Other interrupts may nest in the tick: a stop may come between any two of its parts.
 void test_every_part_of_a_tick_that_a_stop_could_interrupt_is_guarded() {
   Bench bench;
   const auto tick = [&] { bench.tick(); };

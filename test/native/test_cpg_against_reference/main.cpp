@@ -31,7 +31,7 @@ void place(Oscillators& oscillators) {
   oscillators.place(body, head, chance.bits());
 }
 
-/// The update in double precision, and two more of it whose head or tail began with a nudge.
+/// The update in double precision, with two perturbed copies whose head or tail started slightly off.
 class Bundle {
  public:
   void begin(const Triple& phi) {
@@ -47,7 +47,7 @@ class Bundle {
     for (Update& one : nudged_) one.step(gait);
   }
   const Triple& phi() const { return straight_.phi(); }
-  /// How much the nudges have grown since the beginning.
+  /// How much the perturbations have grown since the beginning.
   double growth() const {
     return fmax(reference::greatest_difference(phi(), nudged_[0].phi()),
                 reference::greatest_difference(phi(), nudged_[1].phi())) /
@@ -65,8 +65,8 @@ class Bundle {
   Update nudged_[2];
 };
 
-/// How much a small change of the initial phases grows on a path: beside the saddles between the ways to settle no
-/// finite arithmetic can stay on the path of another.
+/// How much a small change of the initial phases grows along a path. Near the saddles between the basins of the settled
+/// states, no finite arithmetic can follow the path of another.
 double growth(const ParameterSet& set, const Triple& initial, int steps) {
   const reference::Gait gait(set);
   Bundle bundle;
@@ -91,7 +91,7 @@ void test_each_step_is_the_update_of_double_precision_to_a_few_microradians() {
     place(oscillators);
     Update update;
     for (int n = 0; n < 400; ++n) {
-      // Both begin this step and the one before it from the integers' phases.
+      // Both start this step and the one before it from the integers' phases.
       const Triple before = phases_of(oscillators);
       update.begin(before);
       oscillators.step();
@@ -112,8 +112,8 @@ void test_each_step_is_the_update_of_double_precision_to_a_few_microradians() {
   TEST_ASSERT_TRUE(greatest < 1e-5);
 }
 
-/// Beside a saddle any difference grows without bound, that of two roundings too. So where a nudge of the path has
-/// doubled the reference begins anew from the integers' phases, and no step of any path is left out.
+/// Near a saddle any difference grows without bound, even between two roundings. So the reference is restarted from the
+/// integers' phases wherever a perturbation of the path has doubled, and no step of any path is left out.
 void test_paths_stay_within_2e_4_rad_of_the_update_in_double_precision() {
   const int kSets = 400, kSteps = 4000;
   double greatest_whole = 0, greatest_parted = 0;
@@ -148,7 +148,7 @@ void test_paths_stay_within_2e_4_rad_of_the_update_in_double_precision() {
          greatest_whole, kSets - whole, beginnings / fmax(1, kSets - whole), greatest_parted);
   TEST_ASSERT_TRUE(greatest_whole <= 2e-4);
   TEST_ASSERT_TRUE(greatest_parted <= 2e-4);
-  TEST_ASSERT_TRUE(beginnings < kSets);  // a reference that always begins anew would show nothing
+  TEST_ASSERT_TRUE(beginnings < kSets);  // a reference that is always restarted would prove nothing
 }
 
 void test_parameters_may_change_at_any_step_without_a_jump() {
@@ -243,7 +243,7 @@ void test_period_is_within_10_ppm() {
     greatest_ppm = fmax(greatest_ppm, fabs(period_us / set.period_us - 1) * 1e6);
   }
   printf("  period: off by at most %.2g ppm\n", greatest_ppm);
-  TEST_ASSERT_TRUE(greatest_ppm < 0.1);  // 10 are asked for
+  TEST_ASSERT_TRUE(greatest_ppm < 0.1);  // 10 are required
 }
 
 void test_mean_of_the_phases_runs_at_exactly_f_whatever_the_coupling_does() {
@@ -261,8 +261,8 @@ void test_mean_of_the_phases_runs_at_exactly_f_whatever_the_coupling_does() {
 
 // ---- switching ----
 
-/// Follows settled oscillators for some cycles; returns the greatest distance (ms) of a switch from the instant at which
-/// the exact phase passes the threshold or a full turn, and checks that there are two a cycle.
+/// Follows settled oscillators for some cycles; returns the greatest deviation (ms) of a switch from the instant at
+/// which the exact phase passes the threshold or a full turn, and checks that there are two switches per cycle.
 double worst_switch_ms(const ParameterSet& set) {
   const reference::Gait exact(set);
   const double duty[3] = {set.duty_body_e4 * 1e-4, set.duty_head_e4 * 1e-4, set.duty_tail_e4 * 1e-4};

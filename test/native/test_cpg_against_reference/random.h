@@ -1,4 +1,4 @@
-// Seeded chance, the same everywhere.
+// Seeded random numbers, identical on every machine.
 #pragma once
 
 #include <stdint.h>
@@ -27,7 +27,7 @@ inline uint32_t random_value(bifa::ParameterId id, Random& chance) {
   return row.minimum + chance.below(row.maximum - row.minimum + 1);
 }
 
-/// Any valid set.
+/// A random valid set.
 inline bifa::ParameterSet random_set(Random& chance) {
   bifa::ParameterSet set = {};
   for (uint8_t i = 0; i < bifa::kParameterCount; ++i) {
@@ -37,7 +37,7 @@ inline bifa::ParameterSet random_set(Random& chance) {
   return set;
 }
 
-/// Another value for one of the parameters.
+/// Changes one of the parameters to another value.
 inline void change_one(bifa::ParameterSet& set, Random& chance) {
   const bifa::ParameterId id = static_cast<bifa::ParameterId>(chance.below(bifa::kParameterCount));
   bifa::put_value(set, id, random_value(id, chance));

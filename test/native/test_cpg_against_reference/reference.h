@@ -1,4 +1,4 @@
-// Eq. (9) in double precision, for comparison only: the exact solution, and the update that the integers make.
+// Eq. (9) in double precision, for comparison only: the exact solution, and the integer oscillators' update.
 #pragma once
 
 #include <math.h>
@@ -23,7 +23,7 @@ struct Gait {
         psi13(set.psi13_mdeg / 360e3 * kTurn) {}
 };
 
-/// Three phases, or what drives them; not wrapped.
+/// Three phases, or their derivatives; not wrapped.
 struct Triple {
   double of[3];
 };
@@ -48,7 +48,7 @@ inline Triple pull(const Gait& gait, const Triple& phi) {
   return sum;
 }
 
-/// The exact solution a millisecond on (Runge and Kutta's fourth order in four steps: off by less than 1e-9).
+/// Advances the exact solution by a millisecond (fourth-order Runge-Kutta in four steps: error below 1e-9).
 inline void solve(const Gait& gait, Triple& phi) {
   const double h = 0.25e-3;
   for (int part = 0; part < 4; ++part) {
@@ -62,14 +62,14 @@ inline void solve(const Gait& gait, Triple& phi) {
   }
 }
 
-/// The second-order Adams-Bashforth update that the integer oscillators make, in double precision.
+/// The second-order Adams-Bashforth update of the integer oscillators, in double precision.
 class Update {
  public:
   void begin(const Triple& phi) {
     phi_ = phi;
     begun_ = false;
   }
-  /// In the middle of a path, that came from `before` a step ago.
+  /// Starts in the middle of a path that was at `before` a step ago.
   void begin(const Gait& gait, const Triple& phi, const Triple& before) {
     phi_ = phi;
     last_ = pull(gait, before);

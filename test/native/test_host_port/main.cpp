@@ -1,4 +1,4 @@
-// All of lib/ behind its serial port: lines and frames, what a stop finds waiting, what a new session ends.
+// All of lib/ behind its serial port: lines and frames, commands that are waiting when a stop arrives, a new session.
 #include <unity.h>
 
 #include <string>
@@ -20,9 +20,9 @@ uint8_t pins = 0;
 std::string sent;
 uint8_t room = 127;  ///< for telemetry
 uint8_t cells[kEepromBytes];
-uint8_t cells_busy = 0;  ///< for so many milliseconds
+uint8_t cells_busy = 0;  ///< for this many milliseconds
 
-/// The board: a millisecond at a time, its converter answers at once.
+/// The board: advances by a millisecond at a time; its converter answers immediately.
 struct Bench {
   Controller controller;
   HostPort port;
@@ -62,7 +62,7 @@ struct Bench {
       if (++count % 16 == 0) port.poll();
     }
   }
-  /// What is printed in answer.
+  /// Sends a line and returns the printed answer.
   std::string say(const std::string& line) {
     sent.clear();
     arrive(line + "\n");
@@ -75,7 +75,7 @@ struct Bench {
     wait(2);
     sequence = 0;
   }
-  /// The next command of the session, as it travels.
+  /// The next command of the session, as transmitted.
   std::string command(MessageId message, const void* fields = nullptr, uint8_t size = 0) {
     return frame(message, sequence++, session_seed(kKey), fields, size);
   }
@@ -131,7 +131,7 @@ void result_is(Result expected, const std::string& bytes) {
   TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), body[2]);
 }
 
-// ---- what waits when a stop comes ----
+// ---- commands that are waiting when a stop arrives ----
 
 void test_a_clear_that_comes_behind_a_stop_is_carried_out_whatever_waits_before_it() {
   Bench bench;
@@ -155,7 +155,7 @@ void test_a_clear_that_waits_when_a_stop_comes_is_refused_whatever_comes_after_i
   TEST_ASSERT_TRUE(bench.controller.state() == State::kStopped);
 }
 
-// ---- a stop that is typed ----
+// ---- a typed stop ----
 
 void test_a_line_that_arrived_damaged_stops_if_it_ends_in_stop() {
   for (const char* line : {"\x93w\x81stop", "stop\x80", "abcstop\x01", "\xFF stop ", "\x80sstop", "\x80stostop"}) {
@@ -183,7 +183,7 @@ void test_other_lines_that_arrived_damaged_are_answered_so_and_do_nothing() {
   }
   Bench bench;
   TEST_ASSERT_TRUE(said(bench.say(std::string(64, 'x')), "error the line exceeds 63 characters"));
-  TEST_ASSERT_TRUE(said(bench.say("xstop"), "error no such command"));  // what is not damaged means what it says
+  TEST_ASSERT_TRUE(said(bench.say("xstop"), "error no such command"));  // an undamaged line is taken literally
 }
 
 void test_a_stop_is_carried_out_behind_a_frame_that_was_torn() {
@@ -241,7 +241,7 @@ void test_a_connect_of_another_start_opens_nothing() {
   TEST_ASSERT_EQUAL_HEX8(0x01, pins);
 }
 
-// ---- telemetry that there is no room for ----
+// ---- telemetry without room in the output ----
 
 std::string samples_lost(Bench& bench) {
   const std::string status = bench.say("status");

@@ -1,4 +1,5 @@
-// What comes over the line, byte by byte: the receiver against its own rules, the decoder against COBS as it is written.
+// Received bytes one by one: the receiver against its own rules, the decoder against a reference implementation of
+// COBS.
 #include <unity.h>
 
 #include <string>
@@ -39,7 +40,7 @@ std::string masked(std::string coded, char mask = 0x5A) {
 
 const uint32_t kSession = 0x12345678UL;
 
-/// Whether the decoder accepts these bytes as they stand between their delimiters.
+/// Whether the decoder accepts these bytes, given without their delimiters.
 bool accepts(FrameDecoder& decoder, const std::string& bytes, uint32_t session = kSession) {
   decoder.start();
   for (char c : bytes) decoder.feed(static_cast<uint8_t>(c));
@@ -108,9 +109,9 @@ void test_what_is_no_cobs_is_refused_though_its_checks_are_right() {
   ++coded[0];  // a run that does not end with the frame
   TEST_ASSERT_FALSE(accepts(masked(coded)));
   --coded[0];
-  TEST_ASSERT_FALSE(accepts(masked(coded + '\x02')));  // another that lacks its byte
+  TEST_ASSERT_FALSE(accepts(masked(coded + '\x02')));  // another run, without its byte
   TEST_ASSERT_FALSE(accepts(masked(coded + '\x01')));  // one byte, 0, too many
-  coded[0] = 0;                                        // 0 is no length of a run
+  coded[0] = 0;                                        // 0 is not a valid length of a run
   TEST_ASSERT_FALSE(accepts(masked(coded)));
 }
 
@@ -200,7 +201,7 @@ void test_a_frame_ends_after_more_than_twenty_milliseconds_of_silence() {
     silence(receiver, static_cast<uint8_t>(ms));
     TEST_ASSERT_EQUAL(ms > 20, receiver.push('!'));
   }
-  Receiver receiver;  // each byte begins it anew
+  Receiver receiver;  // each byte restarts the silence
   for (uint8_t byte : {0, 7, 8, 9}) {
     receiver.push(byte);
     silence(receiver, 20);

@@ -1,4 +1,4 @@
-// The Uno's end of a session, frame by frame: what is carried out, how often, and every field of every answer.
+// The Uno's end of a session, frame by frame: which commands are executed, how often, and every field of every answer.
 #include <unity.h>
 
 #include <string>
@@ -20,9 +20,9 @@ uint8_t pins = 0;
 std::string sent;
 uint8_t room = 127;
 uint8_t cells[kEepromBytes];
-uint8_t cells_busy = 0;  ///< for so many milliseconds
+uint8_t cells_busy = 0;  ///< for this many milliseconds
 
-/// A session on a board whose converter answers at once.
+/// A session on a board whose converter answers immediately.
 struct Bench {
   Controller controller;
   Commands commands;
@@ -73,7 +73,7 @@ struct Bench {
     take(MessageId::kConnect, 0, ConnectMessage{kNonce, key});
     sequence = 0;
   }
-  /// Carries out the next command of the session.
+  /// Executes the next command of the session.
   Result call(MessageId message, const void* fields = nullptr, uint8_t size = 0);
   template <typename Fields>
   Result call(MessageId message, const Fields& fields) {
@@ -81,14 +81,14 @@ struct Bench {
   }
 };
 
-/// The frames that were sent, without their delimiters.
+/// How many frames were sent.
 uint8_t frames_sent() {
   uint8_t zeros = 0;
   for (char c : sent) zeros += c == 0;
   return zeros / 3;
 }
 
-/// The body of the only frame that was sent; its checks must be those of `seed`.
+/// The body of the only frame that was sent; its checks must match `seed`.
 std::string body_sent(uint32_t seed) {
   TEST_ASSERT_EQUAL_UINT8(1, frames_sent());
   TEST_ASSERT_EQUAL_UINT8(0, sent[0] | sent[1] | sent[sent.size() - 1]);
@@ -125,7 +125,7 @@ Fields report(MessageId message, uint8_t sequence) {
   return report<Fields>(message, sequence, session_seed(kKey));
 }
 
-/// The result that was sent for that number.
+/// The result that was sent for command number `sequence`.
 Result done(uint8_t sequence) { return static_cast<Result>(report<DoneMessage>(MessageId::kDone, sequence).result); }
 
 Result Bench::call(MessageId message, const void* fields, uint8_t size) {
@@ -140,7 +140,7 @@ void equal(State expected, const Bench& bench) {
   TEST_ASSERT_EQUAL_UINT8(static_cast<uint8_t>(expected), static_cast<uint8_t>(bench.controller.state()));
 }
 
-/// Leaves letters where the next call puts its variables.
+/// Fills the stack with letters where the next call puts its variables.
 __attribute__((noinline)) void litter_the_stack() {
   volatile char letters[1024];
   for (volatile char& letter : letters) letter = 'z';
@@ -161,7 +161,7 @@ void test_hello_says_which_versions_which_start_and_which_session() {
   Bench bench(StartCause::kExternal);
   bench.take(MessageId::kVersion, 9);
   is_hello(report<HelloMessage>(MessageId::kHello, 0, kOpenSeed), 0, StartCause::kExternal);
-  bench.take(MessageId::kVersion, 9, ConnectMessage{kNonce, kKey});  // as an earlier frame may have left them
+  bench.take(MessageId::kVersion, 9, ConnectMessage{kNonce, kKey});  // fields as an earlier frame may have left them
   is_hello(report<HelloMessage>(MessageId::kHello, 0, kOpenSeed), 0, StartCause::kExternal);
   bench.connect();
   is_hello(report<HelloMessage>(MessageId::kHello, 0, kOpenSeed), kKey, StartCause::kExternal);
@@ -191,7 +191,7 @@ void test_the_stop_message_is_not_answered_as_a_command() {
   bench.connect();
   bench.take(MessageId::kStopNow, 0);
   TEST_ASSERT_EQUAL_UINT8(0, frames_sent());
-  equal(Result::kOk, bench.call(MessageId::kRun));  // it took no number either
+  equal(Result::kOk, bench.call(MessageId::kRun));  // it did not use up a number either
 }
 
 void test_a_new_session_begins_at_number_0_and_sends_no_telemetry() {
@@ -307,7 +307,7 @@ void test_a_command_that_saves_is_answered_when_that_is_done_and_others_wait() {
   equal(State::kIdle, bench);
   bench.take(MessageId::kSave, 1, save);  // again, too early
   TEST_ASSERT_EQUAL_UINT8(0, frames_sent());
-  bench.take(MessageId::kMark, 0);  // the one before it is answered all the same
+  bench.take(MessageId::kMark, 0);  // the one before it is still answered
   equal(Result::kOk, done(0));
   sent.clear();
   bench.wait(2000);
@@ -325,7 +325,7 @@ void test_a_save_that_fails_is_answered_so() {
   equal(Result::kOk, bench.call(MessageId::kMark));
   bench.take(MessageId::kSave, 1, SaveMessage{{'a'}});
   for (uint16_t ms = 0; ms < 60000 && frames_sent() == 0; ++ms) {
-    memset(cells, 0x55, sizeof cells);  // no cell keeps what is written
+    memset(cells, 0x55, sizeof cells);  // no cell retains a write
     bench.wait(1);
   }
   equal(Result::kEeprom, done(1));
